@@ -1,0 +1,23 @@
+#pragma once
+
+#include <CLI/App.hpp>
+
+/// One function a subcommand: adds its flags and help to `app`; its callback does the work, throws
+/// InputError for what is wrong outside, and sets `exit_code` (0 where it does not).
+namespace pointflight::apps {
+
+void add_map_command(CLI::App& app, int& exit_code);
+void add_scan_command(CLI::App& app, int& exit_code);
+void add_fly_command(CLI::App& app, int& exit_code);
+void add_scenario_command(CLI::App& app, int& exit_code);
+void add_lidar_command(CLI::App& app, int& exit_code);
+
+/// Exit codes that scripts can trust.
+enum ExitCode : int {
+  kDone = 0,
+  kRanButFailed = 1,   ///< Ended by a collision, or the mission was not finished.
+  kWrongInput = 2,     ///< Flags, files, disk: anything outside.
+  kInterrupted = 130,  ///< By a signal; files are closed.
+};
+
+}  // namespace pointflight::apps

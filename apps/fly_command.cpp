@@ -1,0 +1,222 @@
+#include <fmt/format.h>
+
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <chrono>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "apps/commands.hpp"
+#include "apps/pictures.hpp"
+#include "apps/scenario_command.hpp"
+#include "apps/terminal.hpp"
+#include "pointflight/core/input_error.hpp"
+#include "pointflight/core/output_file.hpp"
+#include "pointflight/core/resources.hpp"
+#include "pointflight/sim/flight_recorder.hpp"
+
+namespace pointflight::apps {
+namespace {
+
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+
+struct FlyFlags {
+  std::string input;
+  std::string output;
+  std::string rate = "max";
+  std::int64_t seed = -1;
+  int threads = 0;
+  bool force = false;
+  bool snapshot = false;
+};
+
+/// Passes samples on to the files and to the picture, and says collisions as they happen.
+class FlySink : public SampleSink {
+ public:
+  FlySink(FlightRecorder& recorder, OverviewSink& overview)
+      : recorder_(recorder), overview_(overview) {}
+
+  void on_state(const StateSample& sample) override {
+    recorder_.on_state(sample);
+    overview_.on_state(sample);
+  }
+  void on_imu(const ImuSample& sample) override { recorder_.on_imu(sample); }
+  void on_scan(const Scan& scan, const PoseAt& pose_at) override {
+    recorder_.on_scan(scan, pose_at);
+    overview_.on_scan(scan, pose_at);
+  }
+  void on_collision(const CollisionEvent& event) override {
+    recorder_.on_collision(event);
+    overview_.on_collision(event);
+    constexpr int kSaid = 20;
+    if (!event.entered || said_ > kSaid) return;
+    log(said_++ == kSaid
+            ? std::string("more collisions: see events.csv")
+            : fmt::format("warning: collision at {:.3f} s, vehicle at ({:.2f}, {:.2f}, {:.2f}), "
+                          "with the map at ({:.2f}, {:.2f}, {:.2f})",
+                          to_seconds(event.time),
+                          event.vehicle_world.x(), event.vehicle_world.y(),
+                          event.vehicle_world.z(), event.place_world.x(), event.place_world.y(),
+                          event.place_world.z()));
+  }
+
+ private:
+  FlightRecorder& recorder_;
+  OverviewSink& overview_;
+  int said_ = 0;
+};
+
+/// Holds the run back to `rate` simulated seconds a second; 0: as fast as it goes.
+class Pace {
+ public:
+  explicit Pace(double rate) : rate_(rate) {}
+
+  void wait_for(SimTime time) const {
+    if (rate_ <= 0.0) return;
+    const auto due = start_ + std::chrono::duration_cast<Clock::duration>(
+                                  std::chrono::duration<double>(to_seconds(time) / rate_));
+    if (due - Clock::now() > std::chrono::milliseconds(2)) std::this_thread::sleep_until(due);
+  }
+
+ private:
+  double rate_;
+  Clock::time_point start_ = Clock::now();
+};
+
+double parse_rate(const std::string& text) {
+  if (text == "max") return 0.0;
+  char* end = nullptr;
+  const double rate = std::strtod(text.c_str(), &end);
+  if (end == text.c_str() || *end != '\0' || !(rate > 0.0) || !(rate <= 1000.0)) {
+    throw InputError(fmt::format("--rate: '{}'; 'max' or a number such as 1.0", text));
+  }
+  return rate;
+}
+
+Scenario load_input(const FlyFlags& flags, const Executor& executor) {
+  if (fs::path(flags.input).extension() != ".pfmap") return load_scenario(flags.input);
+  log(fmt::format("looking for a way through {}", flags.input));
+  Scenario scenario =
+      make_scenario(flags.input, flags.input, "mid360", "quad_330", 60.0, 2.0, executor);
+  scenario.path.clear();
+  return scenario;
+}
+
+void check_folder(const FlyFlags& flags) {
+  std::error_code error;
+  if (fs::exists(flags.output, error) && !fs::is_directory(flags.output, error)) {
+    throw InputError(fmt::format("{}: is a file; give a folder with -o", flags.output));
+  }
+  if (!flags.force && fs::is_directory(flags.output, error) &&
+      !fs::is_empty(flags.output, error)) {
+    throw InputError(
+        fmt::format("{}: is not empty; choose another folder or give --force", flags.output));
+  }
+}
+
+/// Removes what an earlier run left, so that `--force` never mixes two runs.
+void clear_earlier_run(const FlyFlags& flags) {
+  std::error_code error;
+  fs::remove_all(fs::path(flags.output) / "scans", error);
+  for (const char* name : {"summary.json", "timing.json", "overview.png", "trajectory.csv",
+                           "trajectory.tum", "imu.csv", "events.csv", "scans.csv"}) {
+    fs::remove(fs::path(flags.output) / name, error);
+  }
+}
+
+void write_timing(const FlyFlags& flags, const Simulation& simulation, double wall, int threads) {
+  nlohmann::ordered_json json;
+  json["wall_time"] = wall;
+  json["real_time_factor"] = to_seconds(simulation.time()) / wall;
+  json["threads"] = threads;
+  OutputFile file((fs::path(flags.output) / "timing.json").string());
+  file.write(json.dump(2) + "\n");
+  file.commit();
+}
+
+void print_result(const FlyFlags& flags, const Simulation& simulation, double wall) {
+  const RunSummary& s = simulation.summary();
+  fmt::print("{}\n", flags.output);
+  fmt::print("  end               {}\n", to_string(s.end));
+  fmt::print("  flown             {:.1f} m in {:.1f} s, up to {:.2f} m/s\n", s.distance_flown,
+             to_seconds(s.time), s.speed_max);
+  fmt::print("  scans             {}, {} points of {} beams\n", s.scans,
+             short_count(static_cast<double>(s.points)), short_count(static_cast<double>(s.beams)));
+  fmt::print("  closest approach  {}\n",
+             s.closest_approach ? fmt::format("{:.2f} m at ({:.2f}, {:.2f}, {:.2f})",
+                                              *s.closest_approach, s.closest_place_world.x(),
+                                              s.closest_place_world.y(), s.closest_place_world.z())
+                                : std::string("over 10 m"));
+  fmt::print("  collisions        {}\n", s.collisions);
+  fmt::print("  tracking error    {:.0f} mm RMS, {:.0f} mm at most\n", s.tracking_error_rms * 1e3,
+             s.tracking_error_max * 1e3);
+  fmt::print("  real-time factor  {:.1f}\n", to_seconds(s.time) / wall);
+  fmt::print("  picture           {}\n", (fs::path(flags.output) / "overview.png").string());
+}
+
+int exit_code_of(RunEnd end) {
+  switch (end) {
+    case RunEnd::kCompleted: return kDone;
+    case RunEnd::kInterrupted: return kInterrupted;
+    default: return kRanButFailed;
+  }
+}
+
+int fly(const FlyFlags& flags) {
+  const double rate = parse_rate(flags.rate);
+  check_folder(flags);
+  const Executor executor(flags.threads);
+  Scenario scenario = load_input(flags, executor);
+  if (flags.seed >= 0) scenario.seed = flags.seed;
+  for (LidarMount& mount : scenario.lidars) mount.snapshot = mount.snapshot || flags.snapshot;
+  const auto map = SurfelMap::open(resolve_path(scenario.map, scenario.folder()));
+  Simulation simulation(scenario, map, executor);
+  warn_about(scenario, *map);
+  if (flags.force) clear_earlier_run(flags);
+
+  FlightRecorder recorder(flags.output, scenario, simulation.state().rotors.size());
+  OverviewSink overview;
+  FlySink sink(recorder, overview);
+  catch_interrupts();
+  const Progress progress = terminal_progress();
+  const Pace pace(rate);
+  const auto start = Clock::now();
+  while (simulation.step(sink)) {
+    if (interrupted()) simulation.interrupt();
+    pace.wait_for(simulation.time());
+    if (simulation.time().time_since_epoch() % std::chrono::milliseconds(100) == Duration{0}) {
+      report(progress, "flying", to_seconds(simulation.time()) / to_seconds(simulation.end_time()));
+    }
+  }
+  const double wall = std::chrono::duration<double>(Clock::now() - start).count();
+  end_progress();
+  write_timing(flags, simulation, wall, executor.threads());
+  draw_overview(*map, simulation, overview, (fs::path(flags.output) / "overview.png").string());
+  recorder.finish(simulation);
+  print_result(flags, simulation, wall);
+  return exit_code_of(simulation.summary().end);
+}
+
+}  // namespace
+
+void add_fly_command(CLI::App& parent, int& exit_code) {
+  auto* app = parent.add_subcommand("fly", "Fly a scenario, or a map in a scenario made up for it");
+  auto flags = std::make_shared<FlyFlags>();
+  app->add_option("scenario", flags->input, "A scenario .yaml, or a .pfmap")->required();
+  app->add_option("-o,--output", flags->output, "Folder for the results")->required();
+  app->add_option("--seed", flags->seed, "Instead of the scenario's")
+      ->check(CLI::Range(std::int64_t{0}, std::int64_t{9000000000000000}));
+  app->add_option("--rate", flags->rate, "Simulated seconds a second: 'max', or 1.0 for real time")
+      ->capture_default_str();
+  app->add_option("--threads", flags->threads, "0: all cores; results never depend on it")
+      ->check(CLI::Range(0, 1024));
+  app->add_flag("--force", flags->force, "Write into a folder that is not empty");
+  app->add_flag("--snapshot", flags->snapshot, "All beams of a scan from one pose, as in the paper");
+  app->callback([flags, &exit_code] { exit_code = fly(*flags); });
+}
+
+}  // namespace pointflight::apps

@@ -1,0 +1,240 @@
+#include <fmt/format.h>
+
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <chrono>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "apps/commands.hpp"
+#include "apps/pictures.hpp"
+#include "apps/terminal.hpp"
+#include "pointflight/core/input_error.hpp"
+#include "pointflight/geometry/shape_scene.hpp"
+#include "pointflight/io/pcd_writer.hpp"
+#include "pointflight/map/map_builder.hpp"
+
+namespace pointflight::apps {
+namespace {
+
+struct ImportFlags {
+  std::vector<std::string> inputs;
+  std::string output;
+  double resolution = 0.0;
+  double scale = 1.0;
+  std::string up = "z";
+  bool keep_outliers = false;
+  int outlier_neighbours = 8;
+  double outlier_sigmas = OutlierOptions{}.sigmas;
+  std::string outliers_out;
+  int threads = 0;
+};
+
+void print_report(const ImportReport& r, const ImportOptions& options) {
+  log(fmt::format("points        {} read{}{}",
+                  short_count(static_cast<double>(r.points_read)),
+                  r.points_not_finite > 0
+                      ? fmt::format(", {} NaN or infinite dropped", r.points_not_finite)
+                      : "",
+                  r.points_out_of_reach > 0
+                      ? fmt::format(", {} too far away dropped", r.points_out_of_reach)
+                      : ""));
+  const bool fine = r.spacing > 0.0 && r.resolution < 2.2 * r.spacing;
+  log(fmt::format("resolution    {:.4g} m{}; point spacing {:.1f} mm{}",
+                  r.resolution,
+                  r.resolution_was_chosen ? " (chosen from the spacing)" : "",
+                  r.spacing * 1e3,
+                  fine ? fmt::format(": {:.4g} m is finer than the points, {:.2g} m or more is "
+                                     "advised",
+                                     r.resolution,
+                                     r.supported_resolution)
+                       : ""));
+  log(fmt::format("outliers      {}",
+                  options.outliers.enabled
+                      ? fmt::format("{} of {} cells ({} points) dropped; --keep-outliers keeps "
+                                    "them, --export-outliers FILE.pcd shows them",
+                                    r.outlier_cells,
+                                    r.cells,
+                                    r.outlier_points)
+                      : "kept"));
+  log(fmt::format("surfels       {}, {:.0f} % planar{}",
+                  short_count(static_cast<double>(r.surfels)),
+                  100.0 * static_cast<double>(r.planar_surfels) /
+                      static_cast<double>(std::max<std::uint64_t>(1, r.surfels)),
+                  r.has_intensity ? ", with intensity" : ""));
+}
+
+void import_map(const ImportFlags& flags) {
+  const auto start = std::chrono::steady_clock::now();
+  ImportOptions options;
+  if (flags.resolution > 0.0) options.resolution = flags.resolution;
+  options.scale = flags.scale;
+  options.up = flags.up.front();
+  options.outliers.enabled = !flags.keep_outliers;
+  options.outliers.neighbours = flags.outlier_neighbours;
+  options.outliers.sigmas = flags.outlier_sigmas;
+  const Executor executor(flags.threads);
+  const ImportedMap map = import_clouds(flags.inputs, options, executor, terminal_progress());
+  end_progress();
+  write_map(flags.output, map.tree, map.description);
+  if (!flags.outliers_out.empty()) {
+    write_cloud_pcd(flags.outliers_out, map.outliers, map.report.has_intensity);
+  }
+  print_report(map.report, options);
+  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
+  log(fmt::format("took          {:.1f} s", took.count()));
+  fmt::print("{}\n", flags.output);
+}
+
+void add_import(CLI::App& parent) {
+  auto* app = parent.add_subcommand("import", "Make a .pfmap from clouds or meshes");
+  auto flags = std::make_shared<ImportFlags>();
+  app->add_option("inputs", flags->inputs,
+                  "Clouds or meshes: " + known_cloud_formats())->required();
+  app->add_option("-o,--output", flags->output, "The .pfmap to write")->required();
+  app->add_option("--resolution", flags->resolution,
+                  "Voxel size r, m; without it the one that the points' spacing supports")
+      ->check(CLI::Range(1e-4, 1e4));
+  app->add_option("--scale", flags->scale, "Metres per unit of the files")
+      ->check(CLI::Range(1e-9, 1e9))->capture_default_str();
+  app->add_option("--up", flags->up, "The files' up axis; y is turned to z")
+      ->check(CLI::IsMember({"y", "z"}))->capture_default_str();
+  app->add_flag("--keep-outliers", flags->keep_outliers,
+                "No outlier removal (thin wires, very uneven clouds)");
+  app->add_option("--outlier-neighbours", flags->outlier_neighbours,
+                  "Cells that a cell's distance is measured to")
+      ->check(CLI::Range(1, 100))->capture_default_str();
+  app->add_option("--outlier-sigmas", flags->outlier_sigmas,
+                  "A cell goes if it is this many deviations farther than the mean")
+      ->check(CLI::Range(0.0, 1e6))->capture_default_str();
+  app->add_option("--export-outliers", flags->outliers_out,
+                  "Write the dropped cells as a PCD cloud");
+  app->add_option("--threads", flags->threads, "0: all cores")->check(CLI::Range(0, 1024));
+  app->callback([flags] { import_map(*flags); });
+}
+
+struct InfoFlags {
+  std::string map;
+  std::string png;
+  bool json = false;
+  bool verify = false;
+};
+
+nlohmann::ordered_json metadata_of(const SurfelMap& map) {
+  auto parsed = nlohmann::ordered_json::parse(map.metadata(), nullptr, false);
+  return parsed.is_object() ? parsed : nlohmann::ordered_json::object();
+}
+
+void print_info(const SurfelMap& map, const InfoFlags& flags) {
+  std::uint64_t planar = 0;
+  std::uint64_t surfels = 0;
+  map.for_each_surfel([&](const Vector3d&, const Vector3d&, double, std::uint32_t word) {
+    ++surfels;
+    planar += is_planar(map.words()[word]) ? 1 : 0;
+  });
+  const double planar_share =
+      surfels == 0 ? 0.0 : static_cast<double>(planar) / static_cast<double>(surfels);
+  const double bytes_each =
+      surfels == 0 ? 0.0 : static_cast<double>(map.file_size()) / static_cast<double>(surfels);
+  const Aabb& b = map.bounds_world();
+  const auto metadata = metadata_of(map);
+  if (flags.json) {
+    nlohmann::ordered_json json;
+    json["file"] = flags.map;
+    json["surfels"] = surfels;
+    json["resolution"] = map.resolution();
+    json["min"] = {b.min.x(), b.min.y(), b.min.z()};
+    json["max"] = {b.max.x(), b.max.y(), b.max.z()};
+    json["planar_share"] = planar_share;
+    json["bytes"] = map.file_size();
+    json["bytes_per_surfel"] = bytes_each;
+    json["has_intensity"] = map.has_intensity();
+    json["verified"] = flags.verify;
+    json["made"] = metadata;
+    fmt::print("{}\n", json.dump(2));
+    return;
+  }
+  fmt::print("{}\n", flags.map);
+  fmt::print("  surfels     {}, {:.0f} % planar\n", surfels, 100.0 * planar_share);
+  fmt::print("  resolution  {:.4g} m\n", map.resolution());
+  fmt::print("  extent      {:.2f} x {:.2f} x {:.2f} m, from ({:.2f}, {:.2f}, {:.2f})\n",
+             b.size().x(), b.size().y(), b.size().z(), b.min.x(), b.min.y(), b.min.z());
+  fmt::print("  size        {:.1f} MB, {:.1f} bytes a surfel\n",
+             static_cast<double>(map.file_size()) * 1e-6, bytes_each);
+  fmt::print("  intensity   {}\n", map.has_intensity() ? "yes" : "no");
+  if (flags.verify) fmt::print("  checksums   match\n");
+  fmt::print("  made\n");
+  for (const auto& [key, value] : metadata.items()) fmt::print("    {} {}\n", key, value.dump());
+}
+
+void show_info(const InfoFlags& flags) {
+  const auto map = SurfelMap::open(flags.map);
+  if (flags.verify) map->verify();
+  print_info(*map, flags);
+  if (!flags.png.empty()) {
+    draw_map(*map, flags.map, flags.png);
+    log("picture: " + flags.png);
+  }
+}
+
+void add_info(CLI::App& parent) {
+  auto* app = parent.add_subcommand("info", "Say what is in a .pfmap and how it was made");
+  auto flags = std::make_shared<InfoFlags>();
+  app->add_option("map", flags->map, "A .pfmap")->required();
+  app->add_flag("--json", flags->json, "JSON on stdout");
+  app->add_option("--png", flags->png, "Draw a top and a side view");
+  app->add_flag("--verify", flags->verify, "Read all of it and check checksums and structure");
+  app->callback([flags] { show_info(*flags); });
+}
+
+struct ForestFlags {
+  std::string output;
+  ForestOptions options;
+  double density = 800.0;
+  double noise = 0.005;
+};
+
+void make_forest_cloud(const ForestFlags& flags) {
+  const ShapeScene scene = make_forest(flags.options);
+  std::vector<CloudPoint> points;
+  scene.sample(flags.density, flags.noise, flags.options.seed, [&](const Vector3d& p) {
+    points.push_back({p, 0.0f});
+  });
+  write_cloud_pcd(flags.output, points, false);
+  log(fmt::format("{} points on {} shapes",
+                  short_count(static_cast<double>(points.size())),
+                  short_count(static_cast<double>(scene.shapes.size()))));
+  fmt::print("{}\n", flags.output);
+}
+
+void add_forest(CLI::App& parent) {
+  auto* app = parent.add_subcommand("forest", "Make up a forest as a PCD cloud, to try things on");
+  auto flags = std::make_shared<ForestFlags>();
+  ForestOptions& o = flags->options;
+  app->add_option("-o,--output", flags->output, "The .pcd to write")->required();
+  app->add_option("--size-x", o.size_x, "m")->check(CLI::Range(5.0, 1000.0))->capture_default_str();
+  app->add_option("--size-y", o.size_y, "m")->check(CLI::Range(5.0, 1000.0))->capture_default_str();
+  app->add_option("--trees", o.trees_per_hectare, "Trees a hectare")
+      ->check(CLI::Range(0.0, 10000.0))->capture_default_str();
+  app->add_option("--spacing", o.min_spacing, "Least distance between trunks, m")
+      ->check(CLI::Range(0.0, 100.0))->capture_default_str();
+  app->add_option("--density", flags->density, "Points a square metre of surface")
+      ->check(CLI::Range(1.0, 1e6))->capture_default_str();
+  app->add_option("--noise", flags->noise, "Deviation of the points from the surface, m")
+      ->check(CLI::Range(0.0, 1.0))->capture_default_str();
+  app->add_option("--seed", o.seed, "Another seed, another forest")->capture_default_str();
+  app->callback([flags] { make_forest_cloud(*flags); });
+}
+
+}  // namespace
+
+void add_map_command(CLI::App& parent, int& /*exit_code*/) {
+  auto* app = parent.add_subcommand("map", "Make and look at maps");
+  app->require_subcommand(1);
+  add_import(*app);
+  add_info(*app);
+  add_forest(*app);
+}
+
+}  // namespace pointflight::apps

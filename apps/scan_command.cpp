@@ -1,0 +1,128 @@
+#include <fmt/format.h>
+
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "apps/commands.hpp"
+#include "apps/pictures.hpp"
+#include "apps/terminal.hpp"
+#include "pointflight/core/constants.hpp"
+#include "pointflight/core/input_error.hpp"
+#include "pointflight/geometry/rotation.hpp"
+#include "pointflight/io/byte_cursor.hpp"
+#include "pointflight/lidar/lidar.hpp"
+
+namespace pointflight::apps {
+namespace {
+
+struct ScanFlags {
+  std::string map;
+  std::string lidar = "mid360";
+  std::string pose;
+  std::string renderer = "beam";
+  std::uint64_t seed = 1;
+  std::uint64_t index = 0;
+  bool no_noise = false;
+  std::string output;
+  std::string png;
+  bool json = false;
+  int threads = 0;
+};
+
+Pose parse_pose(const std::string& text) {
+  std::vector<double> numbers;
+  std::string_view rest = text;
+  for (auto word = take_word(rest); !word.empty(); word = take_word(rest)) {
+    double value = 0.0;
+    if (!parse_number(word, value) || !std::isfinite(value)) {
+      throw InputError(fmt::format("--pose: '{}' is no number", excerpt(word)));
+    }
+    numbers.push_back(value);
+  }
+  if (numbers.size() != 6) {
+    throw InputError(fmt::format(
+        "--pose: {} numbers; six are wanted: x,y,z,roll,pitch,yaw (metres, degrees)",
+        numbers.size()));
+  }
+  return {quaternion_from_rpy(numbers[3] * kDegree, numbers[4] * kDegree, numbers[5] * kDegree),
+          {numbers[0], numbers[1], numbers[2]}};
+}
+
+void print_scan(const Scan& scan, const ScanFlags& flags) {
+  std::vector<float> ranges;
+  for (const ScanPoint& point : scan.points) ranges.push_back(point.range);
+  std::sort(ranges.begin(), ranges.end());
+  const auto at = [&](double share) {
+    return ranges.empty() ? 0.0f
+                          : ranges[static_cast<std::size_t>(share * static_cast<double>(
+                                                                        ranges.size() - 1))];
+  };
+  if (flags.json) {
+    nlohmann::ordered_json json;
+    json["lidar"] = flags.lidar;
+    json["renderer"] = flags.renderer;
+    json["seed"] = flags.seed;
+    json["beams"] = scan.beams;
+    json["points"] = scan.points.size();
+    json["range_min"] = at(0.0);
+    json["range_median"] = at(0.5);
+    json["range_max"] = at(1.0);
+    if (!flags.output.empty()) json["file"] = flags.output;
+    fmt::print("{}\n", json.dump(2));
+    return;
+  }
+  fmt::print("{} of {} beams returned; range {:.2f} to {:.2f} m, median {:.2f} m\n",
+             scan.points.size(), scan.beams, at(0.0), at(1.0), at(0.5));
+}
+
+void take_scan(const ScanFlags& flags) {
+  const Pose pose = parse_pose(flags.pose);
+  const auto map = SurfelMap::open(flags.map);
+  const LidarSettings settings = load_lidar(flags.lidar);
+  const Lidar lidar(settings, 0);
+  const auto renderer = make_renderer(flags.renderer, Scene{map});
+  const Executor executor(flags.threads);
+  ScanRequest request;
+  request.index = flags.index;
+  request.noise = !flags.no_noise;
+  request.seed = flags.seed;
+  const Scan scan = lidar.take(
+      request, [&](SimTime) { return pose; }, *renderer, executor);
+  if (scan.points.empty()) {
+    log("no beam met anything: is the pose inside the map? (pointflight map info shows its extent)");
+  }
+  if (!flags.output.empty()) write_scan_pcd(flags.output, scan);
+  if (!flags.png.empty()) draw_scan(lidar.beams(flags.index, executor), scan, settings, flags.png);
+  print_scan(scan, flags);
+}
+
+}  // namespace
+
+void add_scan_command(CLI::App& parent, int& /*exit_code*/) {
+  auto* app = parent.add_subcommand("scan", "Take one scan from one pose");
+  auto flags = std::make_shared<ScanFlags>();
+  app->add_option("map", flags->map, "A .pfmap")->required();
+  app->add_option("--lidar", flags->lidar, "A shipped sensor or a .yaml file")
+      ->capture_default_str();
+  app->add_option("--pose", flags->pose,
+                  "x,y,z,roll,pitch,yaw of the sensor in the world: metres, degrees")->required();
+  app->add_option("--renderer", flags->renderer, "How points are made")
+      ->check(CLI::IsMember(renderer_names()))->capture_default_str();
+  app->add_option("--seed", flags->seed, "Of the noise")->capture_default_str();
+  app->add_option("--index", flags->index, "Which scan of a pattern that does not repeat")
+      ->check(CLI::Range(0, 1 << 30));
+  app->add_flag("--no-noise", flags->no_noise, "Exact ranges");
+  app->add_option("-o,--output", flags->output,
+                  "PCD of the points in the sensor frame: x y z intensity range time ring");
+  app->add_option("--png", flags->png, "Picture: range over azimuth and elevation");
+  app->add_flag("--json", flags->json, "JSON on stdout");
+  app->add_option("--threads", flags->threads, "0: all cores")->check(CLI::Range(0, 1024));
+  app->callback([flags] { take_scan(*flags); });
+}
+
+}  // namespace pointflight::apps

@@ -1,0 +1,151 @@
+#include "apps/scenario_command.hpp"
+
+#include <fmt/format.h>
+
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <cmath>
+#include <filesystem>
+#include <memory>
+
+#include "apps/commands.hpp"
+#include "apps/terminal.hpp"
+#include "pointflight/core/constants.hpp"
+#include "pointflight/core/input_error.hpp"
+#include "pointflight/core/output_file.hpp"
+#include "pointflight/core/resources.hpp"
+#include "pointflight/sim/simulation.hpp"
+#include "pointflight/world/free_space.hpp"
+
+namespace pointflight::apps {
+namespace {
+
+namespace fs = std::filesystem;
+
+double rounded(double value) { return std::round(value * 100.0) / 100.0; }
+
+Vector3d rounded(const Vector3d& v) { return {rounded(v.x()), rounded(v.y()), rounded(v.z())}; }
+
+struct NewFlags {
+  std::string map;
+  std::string output;
+  std::string lidar = "mid360";
+  std::string vehicle = "quad_330";
+  double length = 60.0;
+  double speed = 2.0;
+};
+
+void new_scenario(const NewFlags& flags) {
+  const Executor executor;
+  // the scenario finds its map from its own folder
+  const fs::path folder = fs::absolute(flags.output).parent_path();
+  const std::string map_key = fs::absolute(flags.map).lexically_relative(folder).string();
+  const Scenario scenario = make_scenario(
+      flags.map, map_key, flags.lidar, flags.vehicle, flags.length, flags.speed, executor);
+  OutputFile file(flags.output);
+  file.write("# A pointflight scenario; every key: docs/scenario.md, or pointflight scenario keys\n" +
+             scenario_yaml(scenario));
+  file.commit();
+  const Mission mission(scenario.vehicle.start, 0.0, scenario.mission);
+  log(fmt::format("{} waypoints, {:.0f} m; fly it: pointflight fly {} -o run",
+                  scenario.mission.waypoints.size(), mission.length(), flags.output));
+  fmt::print("{}\n", flags.output);
+}
+
+void check_scenario(const std::string& path) {
+  const Scenario scenario = load_scenario(path);
+  const auto map = SurfelMap::open(resolve_path(scenario.map, scenario.folder()));
+  const Executor executor;
+  const Simulation simulation(scenario, map, executor);
+  warn_about(scenario, *map);
+  fmt::print("{}: ready: {} waypoints, {:.1f} m, {:.1f} s\n", path,
+             scenario.mission.waypoints.size(), simulation.mission().length(),
+             to_seconds(simulation.end_time()));
+}
+
+}  // namespace
+
+Scenario make_scenario(const std::string& map_path,
+                       const std::string& map_key,
+                       const std::string& lidar,
+                       const std::string& vehicle,
+                       double length,
+                       double speed,
+                       const Executor& executor) {
+  const auto map = SurfelMap::open(map_path);
+  const VehicleSettings airframe = load_vehicle(vehicle);
+  load_lidar(lidar);  // an unknown sensor is said before the search
+  std::optional<Tour> tour;
+  for (const double margin : {0.5, 0.3, 0.15}) {
+    TourOptions options;
+    options.radius = airframe.radius;
+    options.margin = margin;
+    options.length_min = length;
+    auto found = find_tour(*map, options, executor);
+    if (found && (!tour || found->length > 1.5 * tour->length)) tour = std::move(found);
+    if (tour && tour->length >= length) break;
+  }
+  if (!tour) {
+    throw InputError(fmt::format(
+        "{}: no free place for a vehicle of radius {:.2f} m was found; write vehicle.start and "
+        "mission.waypoints yourself",
+        map_path, airframe.radius));
+  }
+  Scenario scenario;
+  scenario.map = map_key;
+  scenario.vehicle.model = vehicle;
+  scenario.vehicle.start = rounded(tour->points_world.front());
+  scenario.lidars.front().model = lidar;
+  scenario.mission.motion.speed = speed;
+  for (std::size_t i = 1; i < tour->points_world.size(); ++i) {
+    scenario.mission.waypoints.push_back(rounded(tour->points_world[i]));
+  }
+  const Vector3d first = scenario.mission.waypoints.front() - scenario.vehicle.start;
+  scenario.vehicle.start_yaw_deg = std::round(std::atan2(first.y(), first.x()) / kDegree);
+  return scenario;
+}
+
+void warn_about(const Scenario& scenario, const SurfelMap& map) {
+  const double radius = load_vehicle(scenario.vehicle.model, scenario.folder()).radius;
+  Vector3d from = scenario.vehicle.start;
+  for (std::size_t i = 0; i < scenario.mission.waypoints.size(); ++i) {
+    const Vector3d& to = scenario.mission.waypoints[i];
+    const double free = clearance_along(map, from, to, radius, 1.0);
+    if (free <= 0.0) {
+      log(fmt::format("{}: warning: the leg to waypoint {} passes through the map; a collision is "
+                      "likely",
+                      scenario.place(fmt::format("mission.waypoints[{}]", i)), i + 1));
+    }
+    from = to;
+  }
+}
+
+void add_scenario_command(CLI::App& parent, int& /*exit_code*/) {
+  auto* app = parent.add_subcommand("scenario", "Make and check scenario files");
+  app->require_subcommand(1);
+  auto* make = app->add_subcommand("new", "A commented scenario with a free start and waypoints");
+  auto flags = std::make_shared<NewFlags>();
+  make->add_option("map", flags->map, "A .pfmap")->required();
+  make->add_option("-o,--output", flags->output, "The .yaml to write")->required();
+  make->add_option("--lidar", flags->lidar, "A shipped sensor")->capture_default_str();
+  make->add_option("--vehicle", flags->vehicle, "A shipped vehicle")->capture_default_str();
+  make->add_option("--length", flags->length, "Of the mission, where the map allows, m")
+      ->check(CLI::Range(1.0, 1e5))->capture_default_str();
+  make->add_option("--speed", flags->speed, "m/s")->check(CLI::Range(0.1, 30.0))
+      ->capture_default_str();
+  make->callback([flags] { new_scenario(*flags); });
+
+  auto* check = app->add_subcommand("check", "Read a scenario and say whether it can be flown");
+  auto path = std::make_shared<std::string>();
+  check->add_option("scenario", *path, "A .yaml")->required();
+  check->callback([path] { check_scenario(*path); });
+
+  auto* keys = app->add_subcommand("keys", "All keys as a Markdown table (docs/scenario.md)");
+  keys->callback([] {
+    fmt::print("| key | unit | default | range | meaning |\n| --- | --- | --- | --- | --- |\n{}",
+               scenario_reference());
+  });
+}
+
+}  // namespace pointflight::apps

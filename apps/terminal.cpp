@@ -1,0 +1,71 @@
+#include "apps/terminal.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <chrono>
+#include <csignal>
+#include <memory>
+
+namespace pointflight::apps {
+namespace {
+
+std::atomic<bool> progress_line_open{false};
+volatile std::sig_atomic_t interrupt_seen = 0;
+
+extern "C" void on_interrupt(int /*signal*/) { interrupt_seen = 1; }
+
+}  // namespace
+
+Progress terminal_progress() {
+  using Clock = std::chrono::steady_clock;
+  struct State {
+    Clock::time_point start = Clock::now();
+    Clock::time_point last = start;
+    std::string what;
+    int tenth = -1;
+    bool terminal = ::isatty(STDERR_FILENO) != 0;
+  };
+  auto state = std::make_shared<State>();
+  return [state](std::string_view what, double share) {
+    const auto now = Clock::now();
+    if (now - state->start < std::chrono::seconds(1)) return;
+    const int percent = static_cast<int>(share * 100.0 + 0.5);
+    if (state->terminal) {
+      if (now - state->last < std::chrono::milliseconds(100)) return;
+      state->last = now;
+      fmt::print(stderr, "\r\033[K{} {} %", what, percent);
+      progress_line_open = true;
+    } else if (what != state->what || percent / 10 != state->tenth) {
+      state->what = std::string(what);
+      state->tenth = percent / 10;
+      fmt::print(stderr, "{} {} %\n", what, percent);
+    }
+  };
+}
+
+void end_progress() {
+  if (progress_line_open.exchange(false)) fmt::print(stderr, "\r\033[K");
+}
+
+void log(std::string_view text) {
+  end_progress();
+  fmt::print(stderr, "{}\n", text);
+}
+
+std::string short_count(double count) {
+  if (count >= 1e9) return fmt::format("{:.2f} G", count / 1e9);
+  if (count >= 1e6) return fmt::format("{:.2f} M", count / 1e6);
+  if (count >= 1e4) return fmt::format("{:.1f} k", count / 1e3);
+  return fmt::format("{:.0f}", count);
+}
+
+void catch_interrupts() {
+  std::signal(SIGINT, on_interrupt);
+  std::signal(SIGTERM, on_interrupt);
+}
+
+bool interrupted() { return interrupt_seen != 0; }
+
+}  // namespace pointflight::apps

@@ -1,0 +1,34 @@
+# Third-party libraries, all from the distribution's packages (./dev installs them).
+
+# CMake packages set their include folders SYSTEM, so that our warnings stay ours.
+find_package(Eigen3 3.3 REQUIRED NO_MODULE)
+find_package(fmt REQUIRED)
+find_package(yaml-cpp REQUIRED)
+find_package(nlohmann_json REQUIRED)
+find_package(nanoflann REQUIRED)
+if(POINTFLIGHT_TBB)
+  find_package(TBB REQUIRED)
+endif()
+if(POINTFLIGHT_ASSIMP)
+  find_package(assimp QUIET)
+  # Debian's package makes the target assimp::assimp; Ubuntu 22.04's only variables
+  if(assimp_FOUND AND NOT TARGET assimp::assimp)
+    add_library(assimp::assimp INTERFACE IMPORTED)
+    target_link_libraries(assimp::assimp INTERFACE ${ASSIMP_LIBRARIES})
+    target_include_directories(assimp::assimp SYSTEM INTERFACE ${ASSIMP_INCLUDE_DIRS})
+  endif()
+endif()
+if(TARGET assimp::assimp)
+  set(POINTFLIGHT_HAS_ASSIMP ON)
+else()
+  set(POINTFLIGHT_HAS_ASSIMP OFF)
+  message(STATUS "assimp not found: meshes cannot be imported (install libassimp-dev)")
+endif()
+
+# sleef, xxhash and lzf come without a CMake package of a stable name: linked as plain libraries.
+foreach(library sleef xxhash lzf)
+  find_library(POINTFLIGHT_${library} ${library} REQUIRED)
+endforeach()
+
+# Random123 is headers only.
+find_path(POINTFLIGHT_RANDOM123 Random123/philox.h REQUIRED)

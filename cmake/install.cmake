@@ -1,0 +1,21 @@
+# `cmake --install` gives the program, the library with headers, the data, and a CMake package.
+include(CMakePackageConfigHelpers)
+
+get_property(modules GLOBAL PROPERTY POINTFLIGHT_MODULES)
+install(TARGETS ${modules} EXPORT pointflight ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+install(TARGETS pointflight RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+install(DIRECTORY pointflight DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}
+        FILES_MATCHING PATTERN "*.hpp")
+install(FILES ${PROJECT_BINARY_DIR}/generated/pointflight/core/version.hpp
+        DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/pointflight/core)
+install(DIRECTORY data/ DESTINATION ${CMAKE_INSTALL_DATADIR}/pointflight)
+install(EXPORT pointflight NAMESPACE pointflight:: FILE pointflight-targets.cmake
+        DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/pointflight)
+configure_package_config_file(cmake/pointflight-config.cmake.in
+  ${PROJECT_BINARY_DIR}/pointflight-config.cmake
+  INSTALL_DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/pointflight)
+write_basic_package_version_file(${PROJECT_BINARY_DIR}/pointflight-config-version.cmake
+  COMPATIBILITY SameMinorVersion)
+install(FILES ${PROJECT_BINARY_DIR}/pointflight-config.cmake
+              ${PROJECT_BINARY_DIR}/pointflight-config-version.cmake
+        DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/pointflight)

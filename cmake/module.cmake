@@ -1,0 +1,30 @@
+# Warnings are errors on our targets; no fused multiply-add anywhere: results must not depend on it.
+function(pointflight_target_options target)
+  target_compile_options(${target} PRIVATE
+    -Wall -Wextra -Wconversion -Wno-sign-conversion -Werror -ffp-contract=off)
+  target_include_directories(${target} PUBLIC
+    $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>
+    $<BUILD_INTERFACE:${PROJECT_BINARY_DIR}/generated>
+    $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
+  # Random123 and gcc 12's own headers as others' code
+  target_include_directories(${target} SYSTEM PRIVATE ${POINTFLIGHT_RANDOM123})
+  if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+    # false alarms of gcc 12 inside Eigen and libstdc++ at -O3
+    target_compile_options(${target} PRIVATE -Wno-maybe-uninitialized -Wno-array-bounds
+                                             -Wno-stringop-overflow -Wno-restrict)
+  endif()
+endfunction()
+
+# pointflight_module(name PUBLIC libs... PRIVATE libs...): the library target pointflight::<name>
+# from all sources in pointflight/<name>.
+function(pointflight_module name)
+  cmake_parse_arguments(ARG "" "" "PUBLIC;PRIVATE" ${ARGN})
+  file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/pointflight/${name}/*.cpp)
+  add_library(pointflight_${name} STATIC ${sources})
+  add_library(pointflight::${name} ALIAS pointflight_${name})
+  set_target_properties(pointflight_${name} PROPERTIES EXPORT_NAME ${name}
+                                                       POSITION_INDEPENDENT_CODE ON)
+  target_link_libraries(pointflight_${name} PUBLIC ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE})
+  pointflight_target_options(pointflight_${name})
+  set_property(GLOBAL APPEND PROPERTY POINTFLIGHT_MODULES pointflight_${name})
+endfunction()

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+
+namespace pointflight {
+
+/// A file mapped read-only: pages come from the page cache and are shared between processes.
+class MappedFile {
+ public:
+  /// Throws InputError where the file is missing, unreadable or not a regular file.
+  explicit MappedFile(const std::string& path);
+  ~MappedFile();
+  MappedFile(MappedFile&& other) noexcept;
+  MappedFile& operator=(MappedFile&& other) noexcept;
+
+  [[nodiscard]] std::span<const std::byte> bytes() const { return {data_, size_}; }
+  [[nodiscard]] const std::string& path() const { return path_; }
+
+  /// Tells the kernel that the file will be read once from front to back.
+  void will_read_sequentially() const;
+
+  /// Gives back the pages before `offset`: a streamed file does not grow the process.
+  void release_before(std::size_t offset) const;
+
+ private:
+  std::string path_;
+  const std::byte* data_ = nullptr;
+  std::size_t size_ = 0;
+};
+
+}  // namespace pointflight

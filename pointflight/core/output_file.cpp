@@ -1,0 +1,56 @@
+#include "pointflight/core/output_file.hpp"
+
+#include <fmt/format.h>
+
+#include <cerrno>
+#include <system_error>
+#include <utility>
+
+#include "pointflight/core/input_error.hpp"
+
+namespace pointflight {
+
+OutputFile::OutputFile(std::string path)
+    : path_(std::move(path)), partial_path_(path_ + ".partial"), buffer_(1 << 18) {
+  file_ = std::fopen(partial_path_.c_str(), "wbe");
+  if (file_ == nullptr) fail(errno);
+  std::setvbuf(file_, buffer_.data(), _IOFBF, buffer_.size());
+}
+
+OutputFile::~OutputFile() {
+  if (file_ == nullptr) return;
+  std::fclose(file_);
+  std::remove(partial_path_.c_str());
+}
+
+OutputFile::OutputFile(OutputFile&& other) noexcept
+    : path_(std::move(other.path_)),
+      partial_path_(std::move(other.partial_path_)),
+      buffer_(std::move(other.buffer_)),
+      file_(std::exchange(other.file_, nullptr)) {}
+
+void OutputFile::write(std::span<const std::byte> bytes) {
+  if (std::fwrite(bytes.data(), 1, bytes.size(), file_) != bytes.size()) fail(errno);
+}
+
+void OutputFile::write(std::string_view text) {
+  write(std::as_bytes(std::span<const char>(text.data(), text.size())));
+}
+
+void OutputFile::commit() {
+  if (std::fflush(file_) != 0) fail(errno);
+  const int closed = std::fclose(std::exchange(file_, nullptr));
+  if (closed != 0 || std::rename(partial_path_.c_str(), path_.c_str()) != 0) {
+    const int error = errno;
+    std::remove(partial_path_.c_str());
+    fail(error);
+  }
+}
+
+void OutputFile::fail(int error) const {
+  throw InputError(fmt::format("{}: cannot write: {}; choose another place with -o",
+                               path_,
+                               std::generic_category().message(error)));
+}
+
+}  // namespace pointflight

@@ -1,0 +1,85 @@
+#include "pointflight/core/parallel.hpp"
+
+#include <algorithm>
+#include <thread>
+
+#ifdef POINTFLIGHT_HAS_TBB
+#include <oneapi/tbb/info.h>
+#include <oneapi/tbb/parallel_for.h>
+#include <oneapi/tbb/task_arena.h>
+#else
+#include <atomic>
+#include <exception>
+#include <vector>
+#endif
+
+namespace pointflight {
+
+#ifdef POINTFLIGHT_HAS_TBB
+
+struct Executor::Arena {
+  explicit Arena(int threads) : arena(threads) {}
+  mutable tbb::task_arena arena;
+};
+
+Executor::Executor(int threads)
+    : threads_(threads > 0 ? threads : tbb::info::default_concurrency()),
+      arena_(std::make_unique<Arena>(threads_)) {}
+
+void Executor::parallel_for(
+    std::size_t count,
+    std::size_t chunk,
+    const std::function<void(std::size_t, std::size_t)>& body) const {
+  const std::size_t chunks = (count + chunk - 1) / chunk;
+  const auto run_chunk = [&](std::size_t i) {
+    body(i * chunk, std::min(count, (i + 1) * chunk));
+  };
+  if (threads_ == 1 || chunks <= 1) {
+    for (std::size_t i = 0; i < chunks; ++i) run_chunk(i);
+    return;
+  }
+  arena_->arena.execute([&] { tbb::parallel_for(std::size_t{0}, chunks, run_chunk); });
+}
+
+#else
+
+struct Executor::Arena {};
+
+Executor::Executor(int threads)
+    : threads_(threads > 0 ? threads
+                           : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()))) {}
+
+void Executor::parallel_for(
+    std::size_t count,
+    std::size_t chunk,
+    const std::function<void(std::size_t, std::size_t)>& body) const {
+  const std::size_t chunks = (count + chunk - 1) / chunk;
+  std::atomic<std::size_t> next{0};
+  std::atomic<bool> failed{false};
+  std::exception_ptr error;
+  const auto work = [&] {
+    for (std::size_t i = next++; i < chunks; i = next++) {
+      try {
+        body(i * chunk, std::min(count, (i + 1) * chunk));
+      } catch (...) {
+        if (!failed.exchange(true)) error = std::current_exception();
+      }
+    }
+  };
+  {
+    std::vector<std::jthread> workers;
+    for (int i = 1; i < threads_ && static_cast<std::size_t>(i) < chunks; ++i) {
+      workers.emplace_back(work);
+    }
+    work();
+  }
+  if (error) std::rethrow_exception(error);
+}
+
+#endif
+
+Executor::~Executor() = default;
+Executor::Executor(Executor&&) noexcept = default;
+Executor& Executor::operator=(Executor&&) noexcept = default;
+
+}  // namespace pointflight

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <memory>
+
+namespace pointflight {
+
+/// Runs loops on a fixed number of threads (oneTBB inside; std::jthread under the thread sanitizer).
+///
+/// Chunk boundaries depend on the data only and each chunk writes to its own places, so results
+/// never depend on the number of threads.
+class Executor {
+ public:
+  /// `threads` = 0 uses every core this process may run on.
+  explicit Executor(int threads = 0);
+  ~Executor();
+  Executor(Executor&&) noexcept;
+  Executor& operator=(Executor&&) noexcept;
+
+  [[nodiscard]] int threads() const { return threads_; }
+
+  /// Calls `body(begin, end)` for the chunks [0, chunk), [chunk, 2 chunk), ... of [0, count), in any
+  /// order and in parallel, and returns when all are done. An exception of a chunk is rethrown.
+  void parallel_for(std::size_t count,
+                    std::size_t chunk,
+                    const std::function<void(std::size_t begin, std::size_t end)>& body) const;
+
+ private:
+  struct Arena;
+  int threads_;
+  std::unique_ptr<Arena> arena_;
+};
+
+}  // namespace pointflight

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+namespace pointflight {
+
+/// What a random draw is for. The list only grows and numbers are never reused: a draw's address is
+/// part of every recorded result.
+enum class StreamId : std::uint32_t {
+  kLidarRangeNoise = 1,   ///< index: scan << 32 | beam
+  kImuGyroNoise = 2,      ///< index: sample * 3 + axis
+  kImuGyroBias = 3,       ///< index: sample * 3 + axis
+  kImuAccelNoise = 4,     ///< index: sample * 3 + axis
+  kImuAccelBias = 5,      ///< index: sample * 3 + axis
+  kForest = 6,            ///< layout of the parametric forest; index: draw number
+  kCloudSampling = 7,     ///< points on analytic shapes; entity: shape, index: point
+  kMissionSearch = 8,     ///< candidate places in `scenario new`; index: candidate
+  kSpacingSample = 9,     ///< which blocks of a cloud measure its point spacing; index: block key
+  kTest = 1000,           ///< inputs of tests and benchmarks
+};
+
+/// Random numbers addressed by (seed, stream, entity, index): Philox 4x32-10 as a pure function.
+///
+/// A draw costs no state and moves no other draw, so that adding a sensor, a vehicle or a thread
+/// changes nothing else. `entity` numbers the vehicle or sensor.
+class RandomStream {
+ public:
+  RandomStream(std::uint64_t seed, StreamId stream, std::uint32_t entity)
+      : seed_(seed), stream_(stream), entity_(entity) {}
+
+  /// 128 random bits.
+  [[nodiscard]] std::array<std::uint32_t, 4> bits(std::uint64_t index) const;
+
+  /// Two independent uniforms in [0, 1) with 53 bits each.
+  [[nodiscard]] std::array<double, 2> uniform2(std::uint64_t index) const;
+  [[nodiscard]] double uniform(std::uint64_t index) const { return uniform2(index)[0]; }
+  [[nodiscard]] double uniform(std::uint64_t index, double low, double high) const {
+    return low + (high - low) * uniform(index);
+  }
+
+  /// Two independent standard normals (Box-Muller; never rejection, which would need state).
+  [[nodiscard]] std::array<double, 2> normal2(std::uint64_t index) const;
+  [[nodiscard]] double normal(std::uint64_t index) const { return normal2(index)[0]; }
+
+ private:
+  std::uint64_t seed_;
+  StreamId stream_;
+  std::uint32_t entity_;
+};
+
+}  // namespace pointflight

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace pointflight {
+
+/// The folder with the shipped `lidars/`, `vehicles/` and `scenarios/`: `$POINTFLIGHT_DATA` if set,
+/// else `../share/pointflight` beside the program, else the source tree it was built from.
+std::string data_folder();
+
+/// The path of a model given by its name ("mid360" -> "<data>/lidars/mid360.yaml") or by a path that
+/// contains '/' or ends in ".yaml"; a relative path is taken from `base` (a folder; empty = the
+/// working directory). Throws InputError that lists the known names.
+std::string find_model(const std::string& kind,
+                       const std::string& name_or_path,
+                       const std::string& base = {});
+
+/// Names of the shipped models of a kind ("lidars", "vehicles"), sorted.
+std::vector<std::string> model_names(const std::string& kind);
+
+/// `path` as it is if absolute, else below `base` (a folder; empty = the working directory).
+std::string resolve_path(const std::string& path, const std::string& base);
+
+}  // namespace pointflight

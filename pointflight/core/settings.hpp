@@ -1,0 +1,185 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <cstdint>
+#include <initializer_list>
+#include <limits>
+#include <map>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace pointflight {
+
+/// One key of a settings file, for the reader, the generated documentation and the written template.
+struct Key {
+  std::string_view name;
+  std::string_view unit;  ///< "m", "deg", "" for pure numbers and text.
+  std::string_view help;
+  double min = -std::numeric_limits<double>::infinity();
+  double max = std::numeric_limits<double>::infinity();
+  bool required = false;
+};
+
+/// Walks over the keys of a settings struct. Each struct has one `describe(SettingsVisitor&, T&)`;
+/// reading a file, writing a commented template and generating docs are three visitors of it, so
+/// that they cannot disagree.
+class SettingsVisitor {
+ public:
+  virtual ~SettingsVisitor() = default;
+
+  virtual void value(const Key& key, double& value) = 0;
+  virtual void value(const Key& key, std::int64_t& value) = 0;
+  virtual void value(const Key& key, bool& value) = 0;
+  virtual void value(const Key& key, std::string& value) = 0;
+  virtual void value(const Key& key, Eigen::Vector3d& value) = 0;
+  virtual void value(const Key& key, std::vector<double>& value) = 0;
+  virtual void value(const Key& key, std::vector<Eigen::Vector3d>& value) = 0;
+  /// Text that must be one of `choices`.
+  virtual void choice(const Key& key,
+                      std::string& value,
+                      std::span<const std::string_view> choices) = 0;
+
+  /// Calls `describe_items(visitor, section)` one level down.
+  template <class Describe>
+  void section(const Key& key, const Describe& describe_items) {
+    if (!enter(key)) return;
+    describe_items(*this);
+    leave();
+  }
+
+  /// A list of sections; the reader resizes `items` to what the file has.
+  template <class T, class Describe>
+  void list(const Key& key, std::vector<T>& items, const Describe& describe_item) {
+    const std::size_t size = enter_list(key, items.size());
+    if (size == kAbsent) return;
+    items.resize(size);
+    for (std::size_t i = 0; i < items.size(); ++i) {
+      enter_item(i);
+      describe_item(*this, items[i]);
+      leave();
+    }
+    leave_list();
+  }
+
+ protected:
+  /// Returns false to skip the section (absent from the file: its defaults stay).
+  virtual bool enter(const Key& key) = 0;
+  virtual void leave() = 0;
+  /// Returns the number of items to visit, or kAbsent to leave the list as it is.
+  virtual std::size_t enter_list(const Key& key, std::size_t size) = 0;
+  virtual void enter_item(std::size_t index) = 0;
+  virtual void leave_list() = 0;
+
+  static constexpr std::size_t kAbsent = std::numeric_limits<std::size_t>::max();
+};
+
+/// Reads YAML. Unknown, duplicate and missing keys, values of a wrong type, out of range or with a
+/// unit written behind them throw InputError with file, line and what would do.
+class SettingsReader : public SettingsVisitor {
+ public:
+  explicit SettingsReader(const std::string& path);
+  /// From text; `name` stands for the path in messages.
+  SettingsReader(std::string_view text, const std::string& name);
+  ~SettingsReader() override;
+
+  /// Call after the last key: throws at the first key that nobody asked for.
+  void finish();
+
+  /// True if the file has this key in the present section (for settings with alternatives).
+  [[nodiscard]] bool has(std::string_view name) const;
+
+  /// Line of each key that was read, by its full name such as "vehicle.start.position" or
+  /// "lidars[0].model"; for messages about values that only make sense together.
+  [[nodiscard]] const std::map<std::string, int>& lines() const { return lines_; }
+
+  void value(const Key& key, double& value) override;
+  void value(const Key& key, std::int64_t& value) override;
+  void value(const Key& key, bool& value) override;
+  void value(const Key& key, std::string& value) override;
+  void value(const Key& key, Eigen::Vector3d& value) override;
+  void value(const Key& key, std::vector<double>& value) override;
+  void value(const Key& key, std::vector<Eigen::Vector3d>& value) override;
+  void choice(const Key& key,
+              std::string& value,
+              std::span<const std::string_view> choices) override;
+
+ protected:
+  bool enter(const Key& key) override;
+  void leave() override;
+  std::size_t enter_list(const Key& key, std::size_t size) override;
+  void enter_item(std::size_t index) override;
+  void leave_list() override;
+
+ private:
+  struct Document;
+  std::unique_ptr<Document> document_;
+  std::map<std::string, int> lines_;
+};
+
+/// Writes the values as YAML with a comment per key: `scenario new`.
+class SettingsWriter : public SettingsVisitor {
+ public:
+  [[nodiscard]] const std::string& text() const { return text_; }
+
+  void value(const Key& key, double& value) override;
+  void value(const Key& key, std::int64_t& value) override;
+  void value(const Key& key, bool& value) override;
+  void value(const Key& key, std::string& value) override;
+  void value(const Key& key, Eigen::Vector3d& value) override;
+  void value(const Key& key, std::vector<double>& value) override;
+  void value(const Key& key, std::vector<Eigen::Vector3d>& value) override;
+  void choice(const Key& key,
+              std::string& value,
+              std::span<const std::string_view> choices) override;
+
+ protected:
+  bool enter(const Key& key) override;
+  void leave() override;
+  std::size_t enter_list(const Key& key, std::size_t size) override;
+  void enter_item(std::size_t index) override;
+  void leave_list() override;
+
+ private:
+  void line(const Key& key, const std::string& value, const std::string& extra = {});
+  std::string text_;
+  int depth_ = 0;
+  bool first_of_item_ = false;
+};
+
+/// Writes a Markdown table of the keys: name, unit, default, range, meaning.
+class SettingsTable : public SettingsVisitor {
+ public:
+  [[nodiscard]] const std::string& text() const { return text_; }
+
+  void value(const Key& key, double& value) override;
+  void value(const Key& key, std::int64_t& value) override;
+  void value(const Key& key, bool& value) override;
+  void value(const Key& key, std::string& value) override;
+  void value(const Key& key, Eigen::Vector3d& value) override;
+  void value(const Key& key, std::vector<double>& value) override;
+  void value(const Key& key, std::vector<Eigen::Vector3d>& value) override;
+  void choice(const Key& key,
+              std::string& value,
+              std::span<const std::string_view> choices) override;
+
+ protected:
+  bool enter(const Key& key) override;
+  void leave() override;
+  std::size_t enter_list(const Key& key, std::size_t size) override;
+  void enter_item(std::size_t index) override;
+  void leave_list() override;
+
+ private:
+  void row(const Key& key, const std::string& value, const std::string& range);
+  std::string text_;
+  std::vector<std::string> path_;
+};
+
+/// The word of `known` closest to `word` (edit distance at most a third of its length), or "".
+std::string closest_word(std::string_view word, const std::vector<std::string>& known);
+
+}  // namespace pointflight

@@ -1,0 +1,26 @@
+#include "pointflight/io/byte_cursor.hpp"
+
+#include <charconv>
+
+namespace pointflight {
+
+bool parse_number(std::string_view word, double& value) {
+  if (!word.empty() && word.front() == '+') word.remove_prefix(1);
+  const char* end = word.data() + word.size();
+  const auto result = std::from_chars(word.data(), end, value);
+  if (result.ec == std::errc::result_out_of_range && result.ptr == end) {
+    value = 0.0;  // below the smallest double; too large a number never passes the range checks
+    return true;
+  }
+  return result.ec == std::errc() && result.ptr == end;
+}
+
+std::string excerpt(std::string_view text) {
+  constexpr std::size_t kLength = 40;
+  std::string shown;
+  for (const char c : text.substr(0, kLength)) shown += c >= ' ' && c <= '~' ? c : '?';
+  if (text.size() > kLength) shown += "...";
+  return shown;
+}
+
+}  // namespace pointflight

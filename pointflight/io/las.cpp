@@ -1,0 +1,115 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "pointflight/io/byte_cursor.hpp"
+#include "pointflight/io/formats.hpp"
+
+// ASPRS LAS Specification 1.4 R15, tables 3 (header) and 6 ff. (point formats).
+namespace pointflight {
+namespace {
+
+constexpr std::size_t kHeaderSize = 227;      // 1.0 - 1.2
+constexpr std::size_t kHeaderSize14 = 375;    // 1.4: 64-bit counts at byte 247
+constexpr std::size_t kMinPointSize[] = {20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67};
+
+class LasReader : public CloudReader {
+ public:
+  explicit LasReader(MappedFile file) : file_(std::move(file)) {
+    const auto bytes = file_.bytes();
+    if (bytes.size() < kHeaderSize || as_text(bytes.subspan(0, 4)) != "LASF") {
+      fail(0, "does not start with a LAS header ('LASF', 227 bytes)");
+    }
+    const auto minor = std::to_integer<unsigned>(bytes[25]);
+    if (std::to_integer<unsigned>(bytes[24]) != 1 || minor > 4) {
+      fail(24, fmt::format("LAS version {}.{}; 1.0 to 1.4 are read",
+                           std::to_integer<unsigned>(bytes[24]),
+                           minor));
+    }
+    read_layout(bytes, minor);
+    for (int axis = 0; axis < 3; ++axis) {
+      scale_[axis] = load<double>(bytes.data() + 131 + 8 * axis);
+      offset_[axis] = load<double>(bytes.data() + 155 + 8 * axis);
+      if (!std::isfinite(scale_[axis]) || scale_[axis] == 0.0 || !std::isfinite(offset_[axis])) {
+        fail(131 + 8 * static_cast<std::size_t>(axis), "scale or offset is not a usable number");
+      }
+    }
+    file_.will_read_sequentially();
+  }
+
+  bool read(std::vector<CloudPoint>& batch) override {
+    const std::uint64_t count = std::min<std::uint64_t>(kBatch, points_ - next_);
+    batch.resize(count);
+    for (std::uint64_t i = 0; i < count; ++i) {
+      const std::byte* p = file_.bytes().data() + data_ + (next_ + i) * point_size_;
+      for (int axis = 0; axis < 3; ++axis) {
+        batch[i].position[axis] = load<std::int32_t>(p + 4 * axis) * scale_[axis] + offset_[axis];
+      }
+      batch[i].intensity = static_cast<float>(load<std::uint16_t>(p + 12));
+    }
+    next_ += count;
+    file_.release_before(data_ + next_ * point_size_);
+    return count > 0;
+  }
+
+  [[nodiscard]] bool has_intensity() const override { return true; }
+  [[nodiscard]] double share_read() const override {
+    return points_ == 0 ? 1.0 : static_cast<double>(next_) / static_cast<double>(points_);
+  }
+
+ private:
+  [[noreturn]] void fail(std::size_t byte, const std::string& what) const {
+    throw InputError(fmt::format("{}: byte {}: {}", file_.path(), byte, what));
+  }
+
+  void read_layout(std::span<const std::byte> bytes, unsigned minor) {
+    const auto format = std::to_integer<unsigned>(bytes[104]);
+    if ((format & 0xc0u) != 0) {
+      fail(104,
+           fmt::format("the points are LAZ-compressed; unpack them first: laszip -i {} -o cloud.las",
+                       file_.path()));
+    }
+    if (format > 10) fail(104, fmt::format("point format {} is unknown; 0 to 10", format));
+    data_ = load<std::uint32_t>(bytes.data() + 96);
+    point_size_ = load<std::uint16_t>(bytes.data() + 105);
+    if (point_size_ < kMinPointSize[format]) {
+      fail(105, fmt::format("points of {} bytes; format {} needs {}",
+                            point_size_,
+                            format,
+                            kMinPointSize[format]));
+    }
+    points_ = load<std::uint32_t>(bytes.data() + 107);
+    if (minor >= 4 && bytes.size() >= kHeaderSize14) {
+      const auto wide = load<std::uint64_t>(bytes.data() + 247);
+      if (wide != 0) points_ = wide;
+    }
+    if (data_ < kHeaderSize || data_ > bytes.size()) {
+      fail(96, fmt::format("the points start at byte {}, outside the file", data_));
+    }
+    if (points_ > (bytes.size() - data_) / point_size_) {
+      fail(bytes.size(),
+           fmt::format("the header promises {} points of {} bytes, the file has {}; it is cut off "
+                       "or its header is wrong",
+                       points_,
+                       point_size_,
+                       (bytes.size() - data_) / point_size_));
+    }
+  }
+
+  MappedFile file_;
+  std::uint64_t points_ = 0;
+  std::size_t data_ = 0;
+  std::size_t point_size_ = 0;
+  Vector3d scale_ = Vector3d::Ones();
+  Vector3d offset_ = Vector3d::Zero();
+  std::uint64_t next_ = 0;
+};
+
+}  // namespace
+
+std::unique_ptr<CloudReader> open_las(MappedFile file) {
+  return std::make_unique<LasReader>(std::move(file));
+}
+
+}  // namespace pointflight

@@ -1,0 +1,97 @@
+#include "pointflight/lidar/lidar.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "pointflight/core/constants.hpp"
+#include "pointflight/core/random.hpp"
+
+namespace pointflight {
+namespace {
+
+constexpr std::size_t kChunk = 2048;  // beams
+
+/// Range with the sensor's Gaussian noise.
+float measured_range(float range,
+                     const RangeNoiseSettings& noise,
+                     const RandomStream& random,
+                     std::uint64_t index) {
+  const double r = static_cast<double>(range);
+  const double far = noise.range_sigma_per_m2 * r * r;
+  const double sigma = std::sqrt(noise.range_sigma * noise.range_sigma + far * far);
+  return sigma > 0.0 ? static_cast<float>(r + sigma * random.normal(index)) : range;
+}
+
+}  // namespace
+
+Lidar::Lidar(const LidarSettings& settings, std::uint32_t sensor)
+    : settings_(settings), sensor_(sensor), pattern_(make_pattern(settings)) {}
+
+Duration Lidar::period() const { return from_seconds(1.0 / settings_.rate); }
+
+Scan Lidar::take(const ScanRequest& request,
+                 const PoseAt& pose_at,
+                 const Renderer& renderer,
+                 const Executor& executor) const {
+  Scan scan;
+  scan.index = request.index;
+  scan.sensor = sensor_;
+  scan.start = request.start;
+  scan.end = request.start + period();
+  const std::vector<Beam> beams = pattern_->beams(request.index, executor);
+  scan.beams = beams.size();
+
+  // world rays, each from the pose at its own time
+  const Pose middle = pose_at(request.start + period() / 2);
+  const bool snapshot = request.snapshot || renderer.is_snapshot();
+  std::vector<Ray> rays(beams.size());
+  const auto range_max = static_cast<float>(settings_.range_max);
+  executor.parallel_for(beams.size(), kChunk, [&](std::size_t begin, std::size_t end) {
+    Pose pose = middle;
+    Duration pose_time{-1};
+    for (std::size_t i = begin; i < end; ++i) {
+      if (!snapshot && beams[i].time_offset != pose_time) {
+        pose_time = beams[i].time_offset;
+        pose = pose_at(request.start + pose_time);
+      }
+      rays[i].origin_world = pose * beams[i].origin_sensor.cast<double>();
+      rays[i].direction_world =
+          (pose.rotation * beams[i].direction_sensor.cast<double>()).cast<float>().normalized();
+      rays[i].range_max = range_max;
+    }
+  });
+
+  std::vector<Hit> hits(beams.size());
+  RayBatch batch;
+  batch.rays = rays;
+  batch.T_world_sensor = middle;
+  batch.range_max = range_max;
+  batch.image_resolution = settings_.image_resolution_deg * kDegree;
+  renderer.render(batch, hits, executor);
+
+  const RandomStream random(request.seed, StreamId::kLidarRangeNoise, sensor_);
+  std::vector<float> ranges(beams.size());
+  executor.parallel_for(beams.size(), kChunk, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      ranges[i] = hits[i].range;
+      if (!hits[i].is_return() || !request.noise) continue;
+      ranges[i] =
+          measured_range(hits[i].range, settings_.noise, random, request.index << 32 | i);
+    }
+  });
+  const auto range_min = static_cast<float>(settings_.range_min);
+  scan.points.reserve(beams.size());
+  for (std::size_t i = 0; i < beams.size(); ++i) {
+    // noise neither makes nor ends a return at the far limit; it may at the near one
+    if (!hits[i].is_return() || ranges[i] < range_min) continue;
+    scan.points.push_back({beams[i].origin_sensor + ranges[i] * beams[i].direction_sensor,
+                           ranges[i],
+                           hits[i].intensity,
+                           beams[i].time_offset,
+                           beams[i].ring,
+                           static_cast<std::uint32_t>(i)});
+  }
+  return scan;
+}
+
+}  // namespace pointflight

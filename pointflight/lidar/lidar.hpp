@@ -1,0 +1,53 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+
+#include "pointflight/core/parallel.hpp"
+#include "pointflight/lidar/beam_pattern.hpp"
+#include "pointflight/lidar/lidar_settings.hpp"
+#include "pointflight/lidar/scan.hpp"
+#include "pointflight/render/renderer.hpp"
+
+namespace pointflight {
+
+/// Where the sensor is at an instant: T_world_sensor. Must be callable from several threads.
+using PoseAt = std::function<Pose(SimTime)>;
+
+/// Which scan to take.
+struct ScanRequest {
+  std::uint64_t index = 0;   ///< Scan number: its pattern, and its place in the noise stream.
+  SimTime start;             ///< When it starts in the run.
+  bool snapshot = false;     ///< All beams from the pose at the scan's middle, as in the paper.
+  bool noise = true;
+  std::uint64_t seed = 0;
+};
+
+/// A LiDAR: pattern, renderer, noise.
+class Lidar {
+ public:
+  /// `sensor` numbers it within the run: the entity of its random streams.
+  Lidar(const LidarSettings& settings, std::uint32_t sensor);
+
+  [[nodiscard]] const LidarSettings& settings() const { return settings_; }
+  [[nodiscard]] Duration period() const;
+
+  /// Takes one scan in arrears: `pose_at` must know all instants of the scan. The result does not
+  /// depend on the executor's threads.
+  [[nodiscard]] Scan take(const ScanRequest& request,
+                          const PoseAt& pose_at,
+                          const Renderer& renderer,
+                          const Executor& executor) const;
+
+  /// The beams of a scan.
+  [[nodiscard]] std::vector<Beam> beams(std::uint64_t scan_index, const Executor& executor) const {
+    return pattern_->beams(scan_index, executor);
+  }
+
+ private:
+  LidarSettings settings_;
+  std::uint32_t sensor_;
+  std::unique_ptr<BeamPattern> pattern_;
+};
+
+}  // namespace pointflight

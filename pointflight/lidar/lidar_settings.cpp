@@ -1,0 +1,155 @@
+#include "pointflight/lidar/lidar_settings.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+
+#include "pointflight/core/input_error.hpp"
+#include "pointflight/core/resources.hpp"
+
+namespace pointflight {
+namespace {
+
+constexpr std::array<std::string_view, 5> kPatterns = {"rotor", "prisms", "rings", "grid", "csv"};
+constexpr std::array<std::string_view, 2> kConventions = {"velodyne", "ouster"};
+constexpr std::array<std::string_view, 2> kProjections = {"angular", "pinhole"};
+
+void describe_rotor(SettingsVisitor& v, RotorSettings& s) {
+  v.value({"shot_rate", "Hz", "all lines fire together at this rate", 1, 1e7}, s.shot_rate);
+  v.value({"shot_phase", "", "of the first shot, in shot periods", 0, 1}, s.shot_phase);
+  v.value({"rotor_rpm", "1/min", "turns of the rotor", -1e6, 1e6}, s.rotor_rpm);
+  v.value({"wedge_rpm", "1/min", "turns of the wedge", -1e6, 1e6}, s.wedge_rpm);
+  v.value({"wedge_wobble", "rad", "second harmonic of the wedge's angle", -1, 1}, s.wedge_wobble);
+  v.value({"wedge_phase", "rad", "of the wedge at time zero", -7, 7}, s.wedge_phase);
+  v.value({"wedge_angle_deg", "deg", "between the wedge's faces", 0, 60}, s.wedge_angle_deg);
+  v.value({"wedge_index", "", "refractive index of the wedge", 1, 4}, s.wedge_index);
+  v.value({"mirror_angle_deg", "deg", "of the rotor's prism", -45, 45}, s.mirror_angle_deg);
+  v.value({"mirror_index", "", "refractive index of the rotor's prism", 1, 4}, s.mirror_index);
+  v.value({"line_angles_deg", "deg", "of each line in the fan", -45, 45}, s.line_angles_deg);
+}
+
+void describe_prisms(SettingsVisitor& v, PrismsSettings& s) {
+  v.value({"shot_rate", "Hz", "all lines fire together at this rate", 1, 1e7}, s.shot_rate);
+  v.value({"shot_phase", "", "of the first shot, in shot periods", 0, 1}, s.shot_phase);
+  v.value({"line_heights", "", "z of each line's unit input direction", -0.7, 0.7},
+          s.line_heights);
+  v.list({"wedges", "", "in the order in which light passes them"},
+         s.wedges,
+         [](SettingsVisitor& w, WedgeSettings& wedge) {
+           w.value({"angle_deg", "deg", "between the faces", 0, 60, true}, wedge.angle_deg);
+           w.value({"index", "", "refractive index", 1, 4, true}, wedge.index);
+           w.value({"rate", "1/s", "turns a second; the sign is the sense", -1e4, 1e4, true},
+                   wedge.rate);
+           w.value({"phase_deg", "deg", "at time zero", -360, 360}, wedge.phase_deg);
+           w.value({"flat_first", "", "light meets the flat face first"}, wedge.flat_first);
+         });
+}
+
+void describe_rings(SettingsVisitor& v, RingsSettings& s) {
+  v.value({"table", "", "CSV of the channels, beside this file"}, s.table);
+  v.choice({"convention", "", "how the table's angles are meant"}, s.convention, kConventions);
+  v.value({"cycle_us", "us", "velodyne: between firings of one channel", 1, 1e6}, s.cycle_us);
+  v.value({"channel_interval_us", "us", "velodyne: between channels without times", 0, 1e5},
+          s.channel_interval_us);
+  v.value({"columns", "", "ouster: a turn", 1, 65536}, s.columns);
+  v.value({"beam_origin_radius", "m", "ouster: of the beams' origin from the axis", 0, 1},
+          s.beam_origin_radius);
+  v.value({"origin_z", "m", "ouster: height of the beams' origin", -1, 1}, s.origin_z);
+}
+
+void describe_grid(SettingsVisitor& v, GridSettings& s) {
+  v.choice({"projection", "", "how rows and columns lie"}, s.projection, kProjections);
+  v.value({"columns", "", "beams in a row", 1, 16384}, s.columns);
+  v.value({"rows", "", "rows", 1, 16384}, s.rows);
+  v.value({"fov_horizontal_deg", "deg", "angular: width", 0.001, 360}, s.fov_horizontal_deg);
+  v.value({"fov_vertical_deg", "deg", "angular: height", 0.001, 180}, s.fov_vertical_deg);
+  v.value({"fx", "px", "pinhole: focal length", 0, 1e6}, s.fx);
+  v.value({"fy", "px", "pinhole: focal length", 0, 1e6}, s.fy);
+  v.value({"cx", "px", "pinhole: principal point", -1e5, 1e5}, s.cx);
+  v.value({"cy", "px", "pinhole: principal point", -1e5, 1e5}, s.cy);
+}
+
+void describe_csv(SettingsVisitor& v, CsvSettings& s) {
+  v.value({"file", "", "CSV with columns azimuth and elevation or zenith, degrees"}, s.file);
+  v.value({"points_per_second", "1/s", "rows replayed in a second", 1, 1e8}, s.points_per_second);
+  v.value({"lines", "", "ring of row i is i mod lines", 1, 4096}, s.lines);
+}
+
+void describe_noise(SettingsVisitor& v, RangeNoiseSettings& s) {
+  v.value({"range_sigma", "m", "standard deviation of the range", 0, 10}, s.range_sigma);
+  v.value({"range_sigma_per_m2", "1/m", "part that grows with range squared (stereo)", 0, 1},
+          s.range_sigma_per_m2);
+}
+
+void describe_optics(SettingsVisitor& v, OpticsSettings& s) {
+  v.value({"wavelength_nm", "nm", "not used yet", 0, 20000}, s.wavelength_nm);
+  v.value({"divergence_horizontal_deg", "deg", "full angle, FWHM; not used yet", 0, 10},
+          s.divergence_horizontal_deg);
+  v.value({"divergence_vertical_deg", "deg", "full angle, FWHM; not used yet", 0, 10},
+          s.divergence_vertical_deg);
+  v.value({"angle_sigma_deg", "deg", "of the beam's direction; not used yet", 0, 10},
+          s.angle_sigma_deg);
+  v.value({"range_at_10_percent", "m", "detection range, 10 % target; not used yet", 0, 1e5},
+          s.range_at_10_percent);
+  v.value({"range_at_80_percent", "m", "detection range, 80 % target; not used yet", 0, 1e5},
+          s.range_at_80_percent);
+}
+
+LidarSettings read(SettingsReader& reader, const std::string& path) {
+  LidarSettings settings;
+  describe(reader, settings);
+  reader.finish();
+  settings.path = path;
+  if (settings.range_min >= settings.range_max) {
+    throw InputError(fmt::format("{}:{}: range_min {} m is not below range_max {} m",
+                                 path,
+                                 reader.lines().count("range_min") != 0
+                                     ? reader.lines().at("range_min")
+                                     : reader.lines().at("range_max"),
+                                 settings.range_min,
+                                 settings.range_max));
+  }
+  return settings;
+}
+
+}  // namespace
+
+void describe(SettingsVisitor& v, LidarSettings& s) {
+  v.value({"title", "", "maker and model"}, s.title);
+  v.value({"source", "", "where the figures come from"}, s.source);
+  v.value({"rate", "Hz", "scans a second", 0.01, 10000}, s.rate);
+  v.value({"range_min", "m", "shorter returns are dropped", 0, 1e5}, s.range_min);
+  v.value({"range_max", "m", "longest range", 0.01, 1e5, true}, s.range_max);
+  v.value({"image_resolution_deg", "deg", "theta_res of the paper renderer", 0.01, 10},
+          s.image_resolution_deg);
+  v.section({"noise", "", "Gaussian range noise"},
+            [&](SettingsVisitor& w) { describe_noise(w, s.noise); });
+  v.section({"optics", "", "figures for sensor models to come"},
+            [&](SettingsVisitor& w) { describe_optics(w, s.optics); });
+  Key pattern{"pattern", "", "scan principle; its figures stand in the section of this name"};
+  pattern.required = true;
+  v.choice(pattern, s.pattern, kPatterns);
+  v.section({"rotor", "", "prism, mirror and wedge on one shaft (Mid-360)"},
+            [&](SettingsVisitor& w) { describe_rotor(w, s.rotor); });
+  v.section({"prisms", "", "refracting wedges on one axis (Avia, Mid-40, Mid-70)"},
+            [&](SettingsVisitor& w) { describe_prisms(w, s.prisms); });
+  v.section({"rings", "", "spinning channels (Velodyne, Ouster)"},
+            [&](SettingsVisitor& w) { describe_rings(w, s.rings); });
+  v.section({"grid", "", "depth camera or dense angular grid"},
+            [&](SettingsVisitor& w) { describe_grid(w, s.grid); });
+  v.section({"csv", "", "a table of directions of your own"},
+            [&](SettingsVisitor& w) { describe_csv(w, s.csv); });
+}
+
+LidarSettings load_lidar(const std::string& name_or_path, const std::string& base) {
+  const std::string path = find_model("lidars", name_or_path, base);
+  SettingsReader reader(path);
+  return read(reader, path);
+}
+
+LidarSettings parse_lidar(std::string_view text, const std::string& path) {
+  SettingsReader reader(text, path);
+  return read(reader, path);
+}
+
+}  // namespace pointflight

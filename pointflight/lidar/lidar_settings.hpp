@@ -1,0 +1,119 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "pointflight/core/settings.hpp"
+
+namespace pointflight {
+
+/// Livox Mid-360: a rotating prism and mirror behind a slower wedge.
+struct RotorSettings {
+  double shot_rate = 50000.0;      ///< Hz; all lines fire together.
+  double shot_phase = 0.5;         ///< Of the first shot, in shot periods.
+  double rotor_rpm = 10945.0;      ///< theta
+  double wedge_rpm = 600.0;        ///< phi
+  double wedge_wobble = 0.15;      ///< psi = phi + wobble sin(2 phi) + phase, rad
+  double wedge_phase = -0.010644;  ///< rad
+  double wedge_angle_deg = 31.1723;
+  double wedge_index = 1.59285;
+  double mirror_angle_deg = 10.0;
+  double mirror_index = 1.96827;
+  std::vector<double> line_angles_deg = {2.12589, 0.70863, -0.70863, -2.12589};
+};
+
+/// One refracting wedge on a rotating axis.
+struct WedgeSettings {
+  double angle_deg = 0.0;
+  double index = 1.51;
+  double rate = 0.0;        ///< Turns a second; the sign is the sense.
+  double phase_deg = 0.0;
+  bool flat_first = false;  ///< Light meets the flat face first ("out"), else the inclined one.
+};
+
+/// Livox Avia, Mid-40, Mid-70: wedges on one axis.
+struct PrismsSettings {
+  double shot_rate = 40000.0;  ///< Hz; all lines fire together.
+  double shot_phase = 0.0;     ///< Of the first shot, in shot periods.
+  std::vector<double> line_heights = {0.0};  ///< z of each unit input direction (sqrt(1-s^2), 0, s).
+  std::vector<WedgeSettings> wedges;
+};
+
+/// Spinning LiDARs: a table of channels.
+struct RingsSettings {
+  std::string table;             ///< CSV beside the sensor's file.
+  std::string convention = "velodyne";
+  double cycle_us = 55.296;      ///< velodyne: from one firing of all channels to the next.
+  double channel_interval_us = 0.0;  ///< velodyne: between channels, where the table has no times.
+  std::int64_t columns = 1024;   ///< ouster: a turn.
+  double beam_origin_radius = 0.0;   ///< ouster: distance of the beams' origin from the axis, m.
+  double origin_z = 0.0;         ///< ouster: height of the beams' origin in the sensor frame, m.
+};
+
+/// Depth cameras and dense angular grids: all beams at the scan's start.
+struct GridSettings {
+  std::string projection = "angular";
+  std::int64_t columns = 385;
+  std::int64_t rows = 350;
+  double fov_horizontal_deg = 77.0;  ///< angular: beams at the centres of the grid's cells.
+  double fov_vertical_deg = 70.0;
+  double fx = 0.0;  ///< pinhole: pixels.
+  double fy = 0.0;
+  double cx = 0.0;
+  double cy = 0.0;
+};
+
+/// A user's own table of directions, replayed in a loop.
+struct CsvSettings {
+  std::string file;                     ///< Columns azimuth and elevation or zenith, degrees.
+  double points_per_second = 200000.0;
+  std::int64_t lines = 1;               ///< Ring of row i = i mod lines.
+};
+
+/// Standard deviation of the range: sqrt(range_sigma^2 + (range_sigma_per_m2 R^2)^2).
+struct RangeNoiseSettings {
+  double range_sigma = 0.0;         ///< m
+  double range_sigma_per_m2 = 0.0;  ///< m per m^2: stereo cameras.
+};
+
+/// Figures of the optics for models to come (angular noise, divergence, detection); they are read,
+/// shown by `lidar show` and not used yet.
+struct OpticsSettings {
+  double wavelength_nm = 0.0;
+  double divergence_horizontal_deg = 0.0;
+  double divergence_vertical_deg = 0.0;
+  double angle_sigma_deg = 0.0;
+  double range_at_10_percent = 0.0;  ///< Detection range on a 10 % target, m.
+  double range_at_80_percent = 0.0;
+};
+
+/// A sensor file, `data/lidars/<name>.yaml`.
+struct LidarSettings {
+  std::string path;    ///< Of the file, for messages and for files beside it.
+  std::string title;
+  std::string source;  ///< Where the figures come from.
+  double rate = 10.0;  ///< Scans a second.
+  double range_min = 0.1;
+  double range_max = 100.0;
+  double image_resolution_deg = 0.2;  ///< theta_res of the `paper` renderer.
+  RangeNoiseSettings noise;
+  OpticsSettings optics;
+  std::string pattern;
+  RotorSettings rotor;
+  PrismsSettings prisms;
+  RingsSettings rings;
+  GridSettings grid;
+  CsvSettings csv;
+};
+
+/// The one list of keys of a sensor file.
+void describe(SettingsVisitor& visitor, LidarSettings& settings);
+
+/// Reads a sensor by name ("mid360") or path; relative paths are taken from `base`.
+LidarSettings load_lidar(const std::string& name_or_path, const std::string& base = {});
+
+/// From text, for tests and fuzzers; `path` is where files beside it would lie.
+LidarSettings parse_lidar(std::string_view text, const std::string& path);
+
+}  // namespace pointflight

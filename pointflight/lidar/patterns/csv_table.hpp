@@ -1,0 +1,38 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace pointflight {
+
+/// A small table of numbers with named columns; empty cells are NaN. Lines that start with # are
+/// comments.
+class CsvTable {
+ public:
+  /// Throws InputError with file and line.
+  explicit CsvTable(const std::string& path);
+  CsvTable(std::string_view text, const std::string& name);
+
+  [[nodiscard]] std::size_t rows() const { return rows_; }
+
+  /// Index of the first column whose name starts with one of the given words (case ignored), or -1.
+  [[nodiscard]] int find(std::string_view prefix) const;
+
+  /// As `find`, but throws InputError where there is no such column.
+  [[nodiscard]] int require(std::string_view prefix) const;
+
+  [[nodiscard]] double at(std::size_t row, int column) const {
+    return values_[row * names_.size() + static_cast<std::size_t>(column)];
+  }
+
+ private:
+  void parse(std::string_view text);
+
+  std::string name_;
+  std::vector<std::string> names_;
+  std::vector<double> values_;
+  std::size_t rows_ = 0;
+};
+
+}  // namespace pointflight

@@ -1,0 +1,154 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+
+#include "pointflight/core/constants.hpp"
+#include "pointflight/core/input_error.hpp"
+#include "pointflight/core/math.hpp"
+#include "pointflight/core/resources.hpp"
+#include "pointflight/lidar/lidar_settings.hpp"
+#include "pointflight/lidar/patterns/csv_table.hpp"
+#include "pointflight/lidar/patterns/patterns.hpp"
+
+namespace pointflight {
+namespace {
+
+CsvTable load_table(const LidarSettings& settings) {
+  if (settings.rings.table.empty()) {
+    throw InputError(fmt::format("{}: rings.table: missing; name the CSV of channels",
+                                 settings.path));
+  }
+  const std::string folder = std::filesystem::path(settings.path).parent_path().string();
+  return CsvTable(resolve_path(settings.rings.table, folder));
+}
+
+/// Velodyne: the head turns clockwise seen from above; a channel fires at its own time within the
+/// cycle, at azimuth encoder(time) - rot_correction. Geometry of the channels as in the maker's ROS
+/// driver (velodyne_pointcloud, RawData::unpack), with the offsets as the beam's origin.
+class VelodynePattern : public BeamPattern {
+ public:
+  explicit VelodynePattern(const LidarSettings& settings)
+      : rate_(settings.rate),
+        train_(1e6 / settings.rings.cycle_us, Duration{0}, settings.rate) {
+    const CsvTable table = load_table(settings);
+    const int ring = table.require("ring");
+    const int elevation = table.require("elevation_deg");
+    const int azimuth = table.require("azimuth_offset_deg");
+    const int fire_time = table.find("fire_time_us");
+    const int vertical = table.find("vert_offset_mm");
+    const int horizontal = table.find("horiz_offset_mm");
+    for (std::size_t row = 0; row < table.rows(); ++row) {
+      Channel channel;
+      channel.elevation = math::sincos(table.at(row, elevation) * kDegree);
+      channel.azimuth = table.at(row, azimuth) * kDegree;
+      double time_us = fire_time < 0 ? std::nan("") : table.at(row, fire_time);
+      if (std::isnan(time_us)) {
+        time_us = settings.rings.channel_interval_us * static_cast<double>(row);
+      }
+      channel.fire_time = from_seconds(time_us * 1e-6);
+      channel.vertical = vertical < 0 ? 0.0 : table.at(row, vertical) * 1e-3;
+      channel.horizontal = horizontal < 0 ? 0.0 : table.at(row, horizontal) * 1e-3;
+      channel.ring = static_cast<std::uint16_t>(table.at(row, ring));
+      if (!std::isfinite(channel.elevation.sin + channel.azimuth + channel.vertical +
+                         channel.horizontal)) {
+        throw InputError(fmt::format("{}: row {} lacks a number", settings.rings.table, row + 1));
+      }
+      channels_.push_back(channel);
+    }
+    std::stable_sort(channels_.begin(), channels_.end(), [](const Channel& a, const Channel& b) {
+      return a.fire_time < b.fire_time;
+    });
+  }
+
+  [[nodiscard]] std::vector<Beam> beams(std::uint64_t scan_index,
+                                        const Executor& executor) const override {
+    const ShotTrain::Range range = train_.in_scan(scan_index);
+    const auto cycles = static_cast<std::size_t>(range.end - range.begin);
+    std::vector<Beam> beams(cycles * channels_.size());
+    executor.parallel_for(cycles, 64, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) {
+        const SimTime cycle = train_.shots.at(range.begin + static_cast<std::int64_t>(i));
+        for (std::size_t c = 0; c < channels_.size(); ++c) {
+          const SimTime time = cycle + channels_[c].fire_time;
+          beams[i * channels_.size() + c] = fire(channels_[c], time, range.scan_start);
+        }
+      }
+    });
+    return beams;
+  }
+
+ private:
+  struct Channel {
+    math::SinCos elevation;
+    double azimuth;     ///< rot_correction, rad
+    Duration fire_time;
+    double vertical;    ///< m
+    double horizontal;  ///< m
+    std::uint16_t ring;
+  };
+
+  [[nodiscard]] Beam fire(const Channel& c, SimTime time, SimTime scan_start) const {
+    const double turns = rate_ * to_seconds(time);
+    const auto a = math::sincos(2.0 * kPi * (turns - std::floor(turns)) - c.azimuth);
+    const Vector3d direction(
+        c.elevation.cos * a.cos, -c.elevation.cos * a.sin, c.elevation.sin);
+    const Vector3d origin(-c.vertical * c.elevation.sin * a.cos + c.horizontal * a.sin,
+                          c.vertical * c.elevation.sin * a.sin + c.horizontal * a.cos,
+                          c.vertical * c.elevation.cos);
+    return {origin.cast<float>(), direction.cast<float>(), time - scan_start, c.ring};
+  }
+
+  double rate_;
+  ShotTrain train_;
+  std::vector<Channel> channels_;
+};
+
+/// Ouster: all rows of a column share one time; geometry of the maker's SDK ("lidar range to XYZ"),
+/// in the sensor frame (half a turn about z from the lidar frame). A scan is one turn.
+class OusterPattern : public BeamPattern {
+ public:
+  explicit OusterPattern(const LidarSettings& settings) {
+    const RingsSettings& s = settings.rings;
+    const CsvTable table = load_table(settings);
+    const int altitude = table.require("beam_altitude_deg");
+    const int azimuth = table.require("beam_azimuth_deg");
+    const Schedule columns(settings.rate * static_cast<double>(s.columns));
+    for (std::int64_t column = 0; column < s.columns; ++column) {
+      const double encoder =
+          2.0 * kPi * (1.0 - static_cast<double>(column) / static_cast<double>(s.columns));
+      const auto e = math::sincos(encoder);
+      for (std::size_t row = 0; row < table.rows(); ++row) {
+        const Vector3d lidar = direction_of(encoder - table.at(row, azimuth) * kDegree,
+                                            table.at(row, altitude) * kDegree);
+        const Vector3d origin(
+            -s.beam_origin_radius * e.cos, -s.beam_origin_radius * e.sin, s.origin_z);
+        if (!lidar.allFinite()) {
+          throw InputError(fmt::format("{}: row {} lacks a number", s.table, row + 1));
+        }
+        beams_.push_back({origin.cast<float>(),
+                          Vector3d(-lidar.x(), -lidar.y(), lidar.z()).cast<float>(),
+                          columns.at(column).time_since_epoch(),
+                          static_cast<std::uint16_t>(table.rows() - 1 - row)});
+      }
+    }
+  }
+
+  [[nodiscard]] std::vector<Beam> beams(std::uint64_t /*scan_index*/,
+                                        const Executor& /*executor*/) const override {
+    return beams_;
+  }
+
+ private:
+  std::vector<Beam> beams_;
+};
+
+}  // namespace
+
+std::unique_ptr<BeamPattern> make_rings_pattern(const LidarSettings& settings) {
+  if (settings.rings.convention == "ouster") return std::make_unique<OusterPattern>(settings);
+  return std::make_unique<VelodynePattern>(settings);
+}
+
+}  // namespace pointflight

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "pointflight/core/time.hpp"
+#include "pointflight/geometry/types.hpp"
+
+namespace pointflight {
+
+/// One measured point.
+struct ScanPoint {
+  Vector3f position_sensor;  ///< In the sensor frame at the point's own firing time, m.
+  float range;               ///< Measured, noise included, m.
+  float intensity;           ///< Of the map, in its cloud's scale; 0 where it had none.
+  Duration time_offset;      ///< After the scan's start.
+  std::uint16_t ring;
+  std::uint32_t beam;        ///< Index of the beam in the scan's pattern.
+};
+
+/// What a LiDAR delivers for one scan: the returns in firing order.
+struct Scan {
+  std::uint64_t index = 0;
+  std::uint32_t sensor = 0;  ///< Number of the LiDAR in the scenario.
+  SimTime start;
+  SimTime end;
+  std::size_t beams = 0;     ///< Fired, whether they returned or not.
+  std::vector<ScanPoint> points;
+};
+
+/// Writes x y z intensity range time (float32; time in seconds after the scan's start) and ring
+/// (uint16) as binary PCD. Throws InputError.
+void write_scan_pcd(const std::string& path, const Scan& scan);
+
+}  // namespace pointflight

@@ -1,0 +1,68 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "pointflight/core/parallel.hpp"
+#include "pointflight/core/progress.hpp"
+#include "pointflight/io/cloud_reader.hpp"
+#include "pointflight/map/map_file.hpp"
+#include "pointflight/map/outliers.hpp"
+
+namespace pointflight {
+
+struct ImportOptions {
+  std::optional<double> resolution;  ///< r, m; without it the one that the spacing supports.
+  double scale = 1.0;                ///< Metres per unit of the file.
+  char up = 'z';                     ///< The file's up axis: 'z', or 'y' (turned to z).
+  OutlierOptions outliers;
+  RenderModel model;
+};
+
+/// What an import did, for the user and for the map's metadata.
+struct ImportReport {
+  std::vector<std::string> sources;  ///< File names without folders.
+  std::uint64_t points_read = 0;
+  std::uint64_t points_not_finite = 0;
+  std::uint64_t points_out_of_reach = 0;  ///< More than 2^20 cells from the first point.
+  std::uint64_t cells = 0;
+  std::uint64_t outlier_cells = 0;
+  std::uint64_t outlier_points = 0;
+  std::uint64_t surfels = 0;
+  std::uint64_t planar_surfels = 0;
+  double resolution = 0.0;
+  double spacing = 0.0;               ///< Median nearest-neighbour distance, m; 0 if unknown.
+  double supported_resolution = 0.0;  ///< 2.5 spacings.
+  bool resolution_was_chosen = false;
+  bool has_intensity = false;
+};
+
+/// A finished import in memory.
+struct ImportedMap {
+  Bvh8 tree;
+  MapDescription description;
+  ImportReport report;
+  std::vector<CloudPoint> outliers;  ///< Centroids of the dropped cells.
+};
+
+/// Opens the sources again for each pass over the points.
+using CloudOpener = std::function<std::unique_ptr<CloudReader>(std::size_t source)>;
+
+/// Builds a map from clouds that are streamed, never held. `opener(i)` opens source i of
+/// `source_names`. Throws InputError (empty cloud, all NaN, too wide for the resolution, ...).
+ImportedMap build_map(const std::vector<std::string>& source_names,
+                      const CloudOpener& opener,
+                      const ImportOptions& options,
+                      const Executor& executor,
+                      const Progress& progress = {});
+
+/// Imports files: meshes are sampled at 8 points per r^2.
+ImportedMap import_clouds(const std::vector<std::string>& paths,
+                          const ImportOptions& options,
+                          const Executor& executor,
+                          const Progress& progress = {});
+
+}  // namespace pointflight

@@ -1,0 +1,82 @@
+#include "pointflight/map/spacing.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <nanoflann.hpp>
+
+#include "pointflight/core/random.hpp"
+
+namespace pointflight {
+namespace {
+
+struct Points {
+  const std::vector<Vector3d>& points;
+  [[nodiscard]] std::size_t kdtree_get_point_count() const { return points.size(); }
+  [[nodiscard]] double kdtree_get_pt(std::size_t i, std::size_t axis) const {
+    return points[i][static_cast<int>(axis)];
+  }
+  template <class Box>
+  bool kdtree_get_bbox(Box& /*box*/) const {
+    return false;
+  }
+};
+
+using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, Points>,
+                                                 Points,
+                                                 3,
+                                                 std::uint32_t>;
+
+}  // namespace
+
+bool SpacingEstimate::is_chosen(const Vector3d& point, std::uint64_t one_in) const {
+  if (one_in == 1) return true;
+  std::uint64_t key = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double cell = std::floor(point[axis] / kBlock);
+    key = key * 0x9e3779b97f4a7c15ull + static_cast<std::uint64_t>(static_cast<std::int64_t>(cell));
+  }
+  return RandomStream(0, StreamId::kSpacingSample, 0).bits(key)[0] % one_in == 0;
+}
+
+void SpacingEstimate::add(const Vector3d& point) {
+  if (!(point.cwiseAbs().maxCoeff() < 1e12) || !is_chosen(point, one_in_)) return;
+  kept_.push_back(point);
+  // a single block may hold more than all of them: then keep what came first
+  while (kept_.size() > kMaxPoints && one_in_ < (1u << 20)) {
+    one_in_ *= 2;
+    std::erase_if(kept_, [&](const Vector3d& p) { return !is_chosen(p, one_in_); });
+    if (kept_.empty()) kept_.push_back(point);
+  }
+  if (kept_.size() > 2 * kMaxPoints) kept_.pop_back();
+}
+
+double SpacingEstimate::median_spacing() const {
+  constexpr std::size_t kMaxQueries = 20000;
+  const Points points{kept_};
+  if (kept_.size() < 20) return 0.0;
+  const Tree tree(3, points, nanoflann::KDTreeSingleIndexAdaptorParams(16));
+  const std::size_t stride = std::max<std::size_t>(1, kept_.size() / kMaxQueries);
+  std::vector<double> spacing;
+  for (std::size_t i = 0; i < kept_.size(); i += stride) {
+    std::uint32_t index[2];
+    double squared[2];
+    tree.knnSearch(kept_[i].data(), 2, index, squared);
+    // the same point given twice (overlapping files) says nothing of the spacing
+    if (squared[1] > 1e-12) spacing.push_back(std::sqrt(squared[1]));
+  }
+  if (spacing.empty()) return 0.0;
+  const auto middle = spacing.begin() + static_cast<std::ptrdiff_t>(spacing.size() / 2);
+  std::nth_element(spacing.begin(), middle, spacing.end());
+  return *middle;
+}
+
+double supported_resolution(double spacing) {
+  const double wanted = 2.5 * spacing;
+  if (!(wanted > 0.0)) return 0.0;
+  double step = 1.0;  // the second digit, without logarithms
+  while (step * 10.0 > wanted) step /= 10.0;
+  while (step * 100.0 <= wanted) step *= 10.0;
+  return std::ceil(wanted / step - 1e-9) * step;
+}
+
+}  // namespace pointflight

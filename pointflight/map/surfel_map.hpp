@@ -1,0 +1,112 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+
+#include "pointflight/geometry/types.hpp"
+#include "pointflight/map/bvh8.hpp"
+
+namespace pointflight {
+
+/// Constants of the measurement model, stored with every map (docs/architecture.md, "Hit rule").
+struct RenderModel {
+  float support = kSupport;  ///< Standard deviations.
+  float tau = 0.35f;         ///< Coverage from which there is a return.
+  float window = 0.5f;       ///< Depth over which coverage adds up, in units of r.
+};
+
+/// The nearest thing to a point.
+struct Nearest {
+  double distance;        ///< To the surfel's box, m; 0 inside it.
+  Vector3d center_world;  ///< Of that surfel.
+  std::uint32_t word;     ///< Index of the surfel in `SurfelMap::words()`.
+};
+
+/// An opened `.pfmap`: immutable, mapped read-only, shared between processes by the page cache.
+///
+/// The same hierarchy answers rays (render/) and distances. A corrupt body can give wrong answers
+/// but never a read outside the file or an endless loop: every offset is bounded at use.
+class SurfelMap {
+ public:
+  /// Opens in milliseconds: header, section table and lengths are checked, the body is not read.
+  /// Throws InputError where the file is not a map of this version.
+  static std::shared_ptr<const SurfelMap> open(const std::string& path);
+
+  /// Bytes of a whole file; `name` stands for the path in messages.
+  static std::shared_ptr<const SurfelMap> from_bytes(std::span<const std::byte> bytes,
+                                                     const std::string& name);
+
+  virtual ~SurfelMap() = default;
+
+  [[nodiscard]] double resolution() const { return resolution_; }           ///< r, m.
+  [[nodiscard]] const Vector3d& origin_world() const { return origin_; }    ///< Of voxel (0, 0, 0).
+  [[nodiscard]] const Aabb& bounds_world() const { return bounds_; }        ///< Of the surfel centres.
+  [[nodiscard]] const RenderModel& model() const { return model_; }
+  [[nodiscard]] std::uint64_t surfel_count() const { return surfel_count_; }
+  [[nodiscard]] std::uint64_t file_size() const { return file_size_; }
+
+  /// How the map was made, as JSON text.
+  [[nodiscard]] std::string_view metadata() const { return metadata_; }
+
+  [[nodiscard]] std::span<const Bvh8Node> nodes() const { return nodes_; }
+  [[nodiscard]] std::span<const SurfelWord> words() const { return words_; }
+  [[nodiscard]] bool has_intensity() const { return !intensity_.empty(); }
+
+  /// Intensity of the surfel at a word index, in the cloud's own scale; 0 without intensities.
+  [[nodiscard]] float intensity(std::uint32_t word) const {
+    return word < intensity_.size()
+               ? intensity_offset_ + intensity_step_ * static_cast<float>(intensity_[word])
+               : 0.0f;
+  }
+
+  /// The nearest surfel within `max_distance` of a point: distance to its oriented box with half
+  /// sides sqrt(3) s_k (r / 2 for a filled cell). Nothing where all are farther.
+  [[nodiscard]] std::optional<Nearest> nearest(const Vector3d& point_world,
+                                               double max_distance) const;
+
+  /// Reads the whole file: checksums and structure. Throws InputError that names the section.
+  void verify() const;
+
+  /// Calls `visit(center_world, normal_world, thickness_m, word_index)` for every surfel.
+  template <class Visit>
+  void for_each_surfel(const Visit& visit) const {
+    for (std::size_t at = 0; at + kLeafPadding < words_.size();) {
+      const LeafHeader leaf = decode_leaf(words_[at]);
+      const Vector3d leaf_origin = origin_ + resolution_ * Vector3d(leaf.x, leaf.y, leaf.z);
+      for (std::size_t i = 1; i <= leaf.count && at + i + kLeafPadding < words_.size() + 1; ++i) {
+        const Surfel surfel = decode(words_[at + i]);
+        const Vector3d center = leaf_origin + resolution_ * surfel.center_voxels.cast<double>();
+        const Vector3d normal = surfel.axes.col(0).cast<double>();
+        visit(center, normal, surfel.s[0] * resolution_, static_cast<std::uint32_t>(at + i));
+      }
+      at += leaf.count + 1;
+    }
+  }
+
+ protected:
+  SurfelMap() = default;
+  /// Points the views into `bytes`, which must outlive the map. Throws InputError.
+  void attach(std::span<const std::byte> bytes, const std::string& name);
+
+ private:
+  std::string name_;
+  std::span<const std::byte> bytes_;
+  std::span<const Bvh8Node> nodes_;
+  std::span<const SurfelWord> words_;
+  std::span<const std::uint8_t> intensity_;
+  std::string_view metadata_;
+  double resolution_ = 0.0;
+  Vector3d origin_ = Vector3d::Zero();
+  Aabb bounds_;
+  RenderModel model_;
+  std::uint64_t surfel_count_ = 0;
+  std::uint64_t file_size_ = 0;
+  float intensity_offset_ = 0.0f;
+  float intensity_step_ = 0.0f;
+};
+
+}  // namespace pointflight

@@ -1,0 +1,77 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "pointflight/geometry/types.hpp"
+
+namespace pointflight {
+
+/// Count, sums and products of the points in a cell, relative to a reference point: everything that
+/// a plane fit needs, and moments of neighbours add.
+struct Moments {
+  double n = 0.0;
+  Vector3d sum = Vector3d::Zero();
+  Matrix3d products = Matrix3d::Zero();  ///< Sum of p p^T.
+
+  void add(const Moments& other) {
+    n += other.n;
+    sum += other.sum;
+    products += other.products;
+  }
+  [[nodiscard]] Vector3d mean() const { return sum / n; }
+  [[nodiscard]] Matrix3d covariance() const {
+    const Vector3d m = mean();
+    return products / n - m * m.transpose();
+  }
+  /// The same points seen from a reference point that lies at `shift` from the present one.
+  [[nodiscard]] Moments about(const Vector3d& shift) const;
+};
+
+/// One occupied cell, 52 bytes. Sums are relative to the cell's centre, metres.
+struct VoxelCell {
+  std::array<std::int32_t, 3> voxel;  ///< Coordinates in the grid.
+  std::uint32_t n = 0;
+  std::array<float, 3> sum{};
+  std::array<float, 6> products{};  ///< xx, xy, xz, yy, yz, zz.
+  float intensity_sum = 0.0f;
+
+  [[nodiscard]] Moments moments() const;
+};
+
+/// Sparse grid that accumulates points in one pass; memory grows with occupied cells, not points.
+class VoxelGrid {
+ public:
+  /// Cell (0, 0, 0) has its low corner at `base_world`; `resolution` in metres.
+  VoxelGrid(const Vector3d& base_world, double resolution);
+
+  /// False if the point lies more than 2^20 cells from the base.
+  bool add(const Vector3d& point_world, float intensity);
+
+  [[nodiscard]] const std::vector<VoxelCell>& cells() const { return cells_; }
+  [[nodiscard]] const Vector3d& base_world() const { return base_; }
+  [[nodiscard]] double resolution() const { return resolution_; }
+
+  /// Index of a cell in `cells()`, or kNone.
+  [[nodiscard]] std::uint32_t find(const std::array<std::int32_t, 3>& voxel) const;
+  static constexpr std::uint32_t kNone = 0xffffffffu;
+
+  /// World position of the cell's mean point.
+  [[nodiscard]] Vector3d centroid_world(const VoxelCell& cell) const;
+
+  /// Keeps the cells for which `keep[index]` is true, in the given order of indices.
+  void reorder(const std::vector<std::uint32_t>& indices);
+
+ private:
+  [[nodiscard]] std::size_t slot_of(const std::array<std::int32_t, 3>& voxel) const;
+  void grow(std::size_t slots);
+
+  Vector3d base_;
+  double resolution_;
+  std::vector<VoxelCell> cells_;
+  std::vector<std::uint32_t> slots_;  ///< Open addressing: indices into cells_, or kNone.
+};
+
+}  // namespace pointflight

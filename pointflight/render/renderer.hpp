@@ -1,0 +1,61 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "pointflight/core/parallel.hpp"
+#include "pointflight/geometry/types.hpp"
+#include "pointflight/map/surfel_map.hpp"
+
+namespace pointflight {
+
+/// What there is to see: the map, and later bodies that move (obstacles, other vehicles).
+struct Scene {
+  std::shared_ptr<const SurfelMap> map;
+};
+
+/// The rays of one scan and what a renderer that makes images needs to lay them out.
+struct RayBatch {
+  std::span<const Ray> rays;
+  /// Where the sensor is and how it is turned: middle of the scan for a moving one. Renderers that
+  /// trace single rays ignore it.
+  Pose T_world_sensor;
+  float range_max = 100.0f;               ///< Longest range of any ray, m.
+  double image_resolution = 0.2 * 0.0174532925199432958;  ///< theta_res of image renderers, rad.
+};
+
+/// What a ray met.
+struct Hit {
+  float range = -1.0f;          ///< Metres along the ray; negative where it met nothing.
+  float cos_incidence = 0.0f;   ///< |cos| of the angle between the ray and the surface normal.
+  float intensity = 0.0f;       ///< The cloud's own scale; 0 where it had none.
+  [[nodiscard]] bool is_return() const { return range >= 0.0f; }
+};
+
+/// Turns rays into hits. Results do not depend on the executor's threads.
+///
+/// To add one: derive, write its file in render/, add one line to the table in renderer.cpp and a
+/// test that compares it with `beam` on the scenes of tests/render.
+class Renderer {
+ public:
+  virtual ~Renderer() = default;
+
+  /// Writes `hits[i]` for `batch.rays[i]`; both have the same length.
+  virtual void render(const RayBatch& batch,
+                      std::span<Hit> hits,
+                      const Executor& executor) const = 0;
+
+  /// True if all rays are rendered from `T_world_sensor` whatever their own origins are.
+  [[nodiscard]] virtual bool is_snapshot() const { return false; }
+};
+
+/// Makes a renderer by name ("beam", "paper") for a scene. Throws InputError that lists the names.
+std::unique_ptr<Renderer> make_renderer(const std::string& name, const Scene& scene);
+
+/// Names of the renderers.
+std::vector<std::string> renderer_names();
+
+}  // namespace pointflight

@@ -1,0 +1,79 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "pointflight/core/time.hpp"
+#include "pointflight/geometry/types.hpp"
+#include "pointflight/vehicle/controller.hpp"
+
+namespace pointflight {
+
+/// Limits of a smooth move.
+struct MotionLimits {
+  double speed = 2.0;
+  double acceleration = 2.0;
+  double jerk = 4.0;
+};
+
+/// Rest-to-rest move over a distance with limited speed, acceleration and jerk: the double-S profile
+/// of seven phases (Biagiotti, Melchiorri, Trajectory Planning for Automatic Machines, 2008, 3.4).
+class SmoothMove {
+ public:
+  SmoothMove() = default;
+  /// `distance` >= 0; the limits must be positive. Peak speed shrinks where the distance is short.
+  SmoothMove(double distance, const MotionLimits& limits);
+
+  struct Sample {
+    double position, speed, acceleration, jerk;
+  };
+  /// At `t` seconds after the start; at rest before and after.
+  [[nodiscard]] Sample at(double t) const;
+  [[nodiscard]] double duration() const { return 4.0 * t_jerk_ + 2.0 * t_steady_ + t_cruise_; }
+
+ private:
+  double distance_ = 0.0;
+  double jerk_ = 1.0;
+  double t_jerk_ = 0.0;    ///< Of each jerk phase.
+  double t_steady_ = 0.0;  ///< At constant acceleration.
+  double t_cruise_ = 0.0;
+};
+
+struct MissionSettings {
+  MotionLimits motion;
+  std::string yaw = "along_path";  ///< or "fixed"
+  double yaw_rate_deg = 90.0;      ///< Limit while turning.
+  double hold = 0.0;               ///< Seconds at each waypoint.
+  std::vector<Vector3d> waypoints;
+};
+
+/// Flies straight legs between waypoints, smooth in time and at rest at each, turning towards the
+/// next before it leaves. A pure function of time.
+class Mission {
+ public:
+  Mission() = default;
+  Mission(const Vector3d& start, double yaw, const MissionSettings& settings);
+
+  [[nodiscard]] PositionCommand at(SimTime time) const;
+  [[nodiscard]] double duration() const { return duration_; }  ///< s
+  [[nodiscard]] double length() const { return length_; }      ///< m
+  [[nodiscard]] const Vector3d& goal() const { return goal_; }
+
+ private:
+  struct Leg {
+    double start;      ///< s
+    Vector3d from;
+    Vector3d direction;
+    double yaw_from;
+    double yaw_sign;
+    SmoothMove turn;
+    SmoothMove travel;
+  };
+  std::vector<Leg> legs_;
+  Vector3d goal_ = Vector3d::Zero();
+  double yaw_ = 0.0;
+  double duration_ = 0.0;
+  double length_ = 0.0;
+};
+
+}  // namespace pointflight

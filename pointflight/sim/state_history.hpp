@@ -1,0 +1,32 @@
+#pragma once
+
+#include <deque>
+
+#include "pointflight/core/time.hpp"
+#include "pointflight/geometry/types.hpp"
+
+namespace pointflight {
+
+/// Poses of a body at recorded instants, interpolated between them: what scans in arrears look up.
+/// States may come from the local dynamics or from anywhere else.
+class StateHistory {
+ public:
+  /// Instants must increase.
+  void record(SimTime time, const Pose& T_world_body);
+
+  /// Forgets what is not needed for instants at or after `time`.
+  void forget_before(SimTime time);
+
+  /// T_world_body: linear in position and nearly constant-rate in rotation between the two records
+  /// around `time`; the first or last record outside them. Safe to call from several threads.
+  [[nodiscard]] Pose at(SimTime time) const;
+
+ private:
+  struct Record {
+    SimTime time;
+    Pose pose;
+  };
+  std::deque<Record> records_;
+};
+
+}  // namespace pointflight

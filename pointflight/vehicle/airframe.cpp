@@ -1,0 +1,147 @@
+#include "pointflight/vehicle/airframe.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "pointflight/core/constants.hpp"
+#include "pointflight/core/input_error.hpp"
+#include "pointflight/core/resources.hpp"
+
+namespace pointflight {
+namespace {
+
+Key required(Key key) {
+  key.required = true;
+  return key;
+}
+
+void describe_rotor(SettingsVisitor& v, RotorModel& r) {
+  v.value(required({"thrust_coefficient", "N s^2/rad^2", "k_f: thrust = k_f w^2", 1e-12, 1}),
+          r.thrust_coefficient);
+  v.value(required({"torque_coefficient", "N m s^2/rad^2", "k_m: torque = k_m w^2", 0, 1}),
+          r.torque_coefficient);
+  v.value({"inertia", "kg m^2", "of one rotor about its axis", 0, 1}, r.inertia);
+  v.value({"drag_coefficient", "N s^2/m/rad", "linear rotor drag: force = -c w v", 0, 1},
+          r.drag_coefficient);
+  v.value({"speed_min", "rad/s", "least commanded speed", 0, 1e5}, r.speed_min);
+  v.value(required({"speed_max", "rad/s", "greatest commanded speed", 1, 1e5}), r.speed_max);
+  v.value({"natural_frequency", "rad/s", "of the speed's response; 0: follows at once", 0, 1e4},
+          r.natural_frequency);
+  v.value({"damping", "", "of the speed's response", 0.1, 10}, r.damping);
+}
+
+void describe_loop(SettingsVisitor& v, LoopDesign& loop) {
+  v.value({"natural_frequency", "rad/s", "of the closed loop", 0.01, 1000},
+          loop.natural_frequency);
+  v.value({"damping", "", "of the closed loop", 0.1, 10}, loop.damping);
+  v.value({"integral", "", "integral gain in units of natural_frequency^3", 0, 1}, loop.integral);
+}
+
+void describe_controller(SettingsVisitor& v, ControllerSettings& c) {
+  v.section({"horizontal", "", "position loop, x and y"},
+            [&](SettingsVisitor& w) { describe_loop(w, c.horizontal); });
+  v.section({"vertical", "", "position loop, z"},
+            [&](SettingsVisitor& w) { describe_loop(w, c.vertical); });
+  v.section({"roll_pitch", "", "attitude loop"},
+            [&](SettingsVisitor& w) { describe_loop(w, c.roll_pitch); });
+  v.section({"yaw", "", "heading loop"}, [&](SettingsVisitor& w) { describe_loop(w, c.yaw); });
+  v.value({"tilt_max_deg", "deg", "greatest tilt", 1, 85}, c.tilt_max_deg);
+  v.value({"acceleration_max", "m/s^2", "of the position loop, horizontal", 0.1, 100},
+          c.acceleration_max);
+  v.value({"climb_acceleration_max", "m/s^2", "of the position loop, up", 0.1, 100},
+          c.climb_acceleration_max);
+  v.value({"error_max", "m", "position errors count no more than this", 0.01, 1e4}, c.error_max);
+  v.value({"integral_max", "m/s^2", "the integral asks for no more than this", 0, 100},
+          c.integral_max);
+  v.value({"body_rate_max", "rad/s", "demanded rates", 0.1, 100}, c.body_rate_max);
+}
+
+void describe_imu(SettingsVisitor& v, ImuSettings& i) {
+  v.value({"rate", "Hz", "samples a second", 1, 10000}, i.rate);
+  v.value({"position", "m", "in the body frame", -10, 10}, i.position);
+  v.value({"rotation_rpy_deg", "deg", "roll, pitch, yaw of its axes in the body", -360, 360},
+          i.rotation_rpy_deg);
+  v.value({"gyro_noise_density", "rad/s/sqrt(Hz)", "white noise", 0, 1}, i.gyro_noise_density);
+  v.value({"gyro_bias_walk", "rad/s^2/sqrt(Hz)", "random walk of the bias", 0, 1},
+          i.gyro_bias_walk);
+  v.value({"accel_noise_density", "m/s^2/sqrt(Hz)", "white noise", 0, 10},
+          i.accel_noise_density);
+  v.value({"accel_bias_walk", "m/s^3/sqrt(Hz)", "random walk of the bias", 0, 10},
+          i.accel_bias_walk);
+}
+
+VehicleSettings read(SettingsReader& reader, const std::string& path) {
+  VehicleSettings settings;
+  describe(reader, settings);
+  reader.finish();
+  settings.path = path;
+  const auto fail = [&](const char* key, const std::string& what) {
+    const auto line = reader.lines().find(key);
+    throw InputError(fmt::format("{}:{}: {}: {}",
+                                 path,
+                                 line == reader.lines().end() ? 1 : line->second,
+                                 key,
+                                 what));
+  };
+  if (settings.rotors.size() < 4) {
+    fail("rotors", fmt::format("{} rotors; at least 4 are needed", settings.rotors.size()));
+  }
+  if (settings.rotor.speed_min >= settings.rotor.speed_max) {
+    fail("rotor.speed_min", "not below speed_max");
+  }
+  if (settings.thrust_to_weight() <= 1.0) {
+    fail("mass",
+         fmt::format("thrust to weight is {:.2f}: this vehicle cannot hover",
+                     settings.thrust_to_weight()));
+  }
+  return settings;
+}
+
+}  // namespace
+
+void describe(SettingsVisitor& v, VehicleSettings& s) {
+  v.value({"title", "", "what it is"}, s.title);
+  v.value({"source", "", "where the figures come from"}, s.source);
+  v.value(required({"mass", "kg", "with everything on board", 1e-3, 1e4}), s.mass);
+  v.value(required({"inertia_diagonal", "kg m^2", "about the body axes", 1e-9, 1e4}),
+          s.inertia_diagonal);
+  v.value({"radius", "m", "of the sphere that must stay free", 0.001, 100}, s.radius);
+  v.value({"drag_area", "m^2", "c_d A along each body axis", 0, 100}, s.drag_area);
+  v.section(required({"rotor", "", "all rotors are alike"}),
+            [&](SettingsVisitor& w) { describe_rotor(w, s.rotor); });
+  v.list(required({"rotors", "", "where they sit"}),
+         s.rotors,
+         [](SettingsVisitor& w, RotorPlacement& rotor) {
+           w.value(required({"position", "m", "in the body frame", -10, 10}), rotor.position);
+           w.value(required({"yaw_sign", "", "sign of the reaction torque about body z", -1, 1}),
+                   rotor.yaw_sign);
+         });
+  v.section({"controller", "", "cascaded PID; gains follow from these and the airframe"},
+            [&](SettingsVisitor& w) { describe_controller(w, s.controller); });
+  v.section({"imu", "", "continuous-time densities"},
+            [&](SettingsVisitor& w) { describe_imu(w, s.imu); });
+}
+
+double VehicleSettings::hover_speed() const {
+  const double thrust = mass * kGravity / static_cast<double>(rotors.size());
+  return std::sqrt(thrust / rotor.thrust_coefficient);
+}
+
+double VehicleSettings::thrust_to_weight() const {
+  return static_cast<double>(rotors.size()) * rotor.thrust_coefficient * rotor.speed_max *
+         rotor.speed_max / (mass * kGravity);
+}
+
+VehicleSettings load_vehicle(const std::string& name_or_path, const std::string& base) {
+  const std::string path = find_model("vehicles", name_or_path, base);
+  SettingsReader reader(path);
+  return read(reader, path);
+}
+
+VehicleSettings parse_vehicle(std::string_view text, const std::string& path) {
+  SettingsReader reader(text, path);
+  return read(reader, path);
+}
+
+}  // namespace pointflight

@@ -1,0 +1,87 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "pointflight/core/settings.hpp"
+#include "pointflight/geometry/types.hpp"
+
+namespace pointflight {
+
+/// One rotor: where it sits and how it turns. All thrust along body +z.
+struct RotorPlacement {
+  Vector3d position = Vector3d::Zero();  ///< m, body frame.
+  double yaw_sign = 1.0;  ///< Sign of the reaction torque about body z that its thrust comes with.
+};
+
+/// Rotors are alike; their placement differs.
+struct RotorModel {
+  double thrust_coefficient = 0.0;   ///< k_f: thrust = k_f w^2, N s^2.
+  double torque_coefficient = 0.0;   ///< k_m: reaction torque = k_m w^2, N m s^2.
+  double inertia = 0.0;              ///< J_r about its axis, kg m^2: gyroscopic and spin-up torque.
+  double drag_coefficient = 0.0;     ///< Linear rotor drag: force = -c w v_perp, N s^2 / m.
+  double speed_min = 0.0;            ///< rad/s
+  double speed_max = 0.0;            ///< rad/s
+  double natural_frequency = 0.0;    ///< Of the speed's second-order response, rad/s; 0: ideal.
+  double damping = 1.0;
+};
+
+/// Gains follow from these and from the airframe's mass and inertia.
+struct LoopDesign {
+  double natural_frequency = 1.0;  ///< rad/s
+  double damping = 0.9;
+  double integral = 0.0;  ///< Integral gain in units of natural_frequency^3.
+};
+
+struct ControllerSettings {
+  LoopDesign horizontal{1.8, 0.9, 0.05};
+  LoopDesign vertical{2.5, 0.9, 0.05};
+  LoopDesign roll_pitch{12.0, 0.9, 0.0};
+  LoopDesign yaw{4.0, 0.9, 0.0};
+  double tilt_max_deg = 35.0;
+  double acceleration_max = 10.0;  ///< Of the position loop, horizontal, m/s^2.
+  double climb_acceleration_max = 10.0;
+  double error_max = 5.0;          ///< Position errors count no more than this, m.
+  double integral_max = 2.0;       ///< Acceleration that the integral may ask for, m/s^2.
+  double body_rate_max = 10.0;     ///< Demanded rates, rad/s.
+};
+
+struct ImuSettings {
+  double rate = 200.0;                      ///< Hz
+  Vector3d position = Vector3d::Zero();     ///< m, body frame.
+  Vector3d rotation_rpy_deg = Vector3d::Zero();
+  double gyro_noise_density = 0.0;          ///< rad/s/sqrt(Hz)
+  double gyro_bias_walk = 0.0;              ///< rad/s^2/sqrt(Hz)
+  double accel_noise_density = 0.0;         ///< m/s^2/sqrt(Hz)
+  double accel_bias_walk = 0.0;             ///< m/s^3/sqrt(Hz)
+};
+
+/// A vehicle file, `data/vehicles/<name>.yaml`.
+struct VehicleSettings {
+  std::string path;
+  std::string title;
+  std::string source;
+  double mass = 1.0;                              ///< kg
+  Vector3d inertia_diagonal = Vector3d::Ones();   ///< kg m^2
+  double radius = 0.3;                            ///< Of the sphere that must stay free, m.
+  Vector3d drag_area = Vector3d::Zero();          ///< c_d A along each body axis, m^2.
+  RotorModel rotor;
+  std::vector<RotorPlacement> rotors;
+  ControllerSettings controller;
+  ImuSettings imu;
+
+  [[nodiscard]] double hover_speed() const;       ///< rad/s of each rotor.
+  [[nodiscard]] double thrust_to_weight() const;
+};
+
+/// The one list of keys of a vehicle file.
+void describe(SettingsVisitor& visitor, VehicleSettings& settings);
+
+/// Reads a vehicle by name ("quad_330") or path; relative paths are taken from `base`.
+VehicleSettings load_vehicle(const std::string& name_or_path, const std::string& base = {});
+
+/// From text, for tests and fuzzers.
+VehicleSettings parse_vehicle(std::string_view text, const std::string& path);
+
+}  // namespace pointflight

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <cstdint>
+
+#include "pointflight/core/constants.hpp"
+#include "pointflight/core/time.hpp"
+#include "pointflight/vehicle/airframe.hpp"
+#include "pointflight/vehicle/state.hpp"
+
+namespace pointflight {
+
+struct ImuSample {
+  SimTime time;
+  Vector3d gyro;   ///< rad/s, IMU axes.
+  Vector3d accel;  ///< Specific force, m/s^2, IMU axes: +9.81 on z when level and at rest.
+};
+
+/// What an ideal accelerometer at the body origin reads: acceleration minus gravity (REP 145).
+inline Vector3d specific_force_body(const Quaterniond& q_world_body, const Vector3d& a_world) {
+  return q_world_body.conjugate() * (a_world + Vector3d(0, 0, kGravity));
+}
+
+/// Gyroscope and accelerometer with lever arm, white noise and bias random walks.
+///
+/// Discrete noise: density / sqrt(dt); bias steps: walk * sqrt(dt) (docs/conventions.md). Draws are
+/// addressed by sample number, so that a sample does not depend on what else was simulated; the
+/// biases are the only state.
+class Imu {
+ public:
+  Imu(const ImuSettings& settings, std::uint64_t seed, std::uint32_t vehicle);
+
+  /// Sample number `index` (0, 1, ...; ask for each once and in order).
+  ImuSample sample(std::int64_t index,
+                   SimTime time,
+                   const RigidBodyState& state,
+                   const BodyAcceleration& acceleration);
+
+ private:
+  ImuSettings settings_;
+  std::uint64_t seed_;
+  std::uint32_t vehicle_;
+  Quaterniond q_body_imu_;
+  Vector3d gyro_bias_ = Vector3d::Zero();
+  Vector3d accel_bias_ = Vector3d::Zero();
+};
+
+}  // namespace pointflight

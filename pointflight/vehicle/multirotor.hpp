@@ -1,0 +1,44 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "pointflight/vehicle/airframe.hpp"
+#include "pointflight/vehicle/state.hpp"
+
+namespace pointflight {
+
+/// Rigid body with rotors (Lee, Leok, McClamroch 2010, with rotor dynamics, drag and gyroscopic
+/// torque added):
+///
+///   m dv/dt = R (sum_i T_i e3 + F_rotor_drag + F_body_drag) - m g e3
+///   J dw/dt = sum_i (r_i x F_i + s_i (k_m w_i^2 + J_r dw_i/dt) e3 + s_i J_r w_i w x e3) - w x J w
+///   d2w_i/dt2 = wn^2 (w_cmd - w_i) - 2 z wn dw_i/dt
+///
+/// s_i is the sign of the rotor's reaction torque: a rotor with s = +1 turns in the -z sense.
+class Multirotor {
+ public:
+  explicit Multirotor(const VehicleSettings& settings);
+
+  /// At rest at a pose, rotors at hover speed.
+  [[nodiscard]] VehicleState hover_at(const Vector3d& p_world, double yaw) const;
+
+  /// Advances by `dt` seconds (RK4) under rotor speed commands (rad/s, clamped to the rotor's
+  /// limits), held over the step. Without rotor lag speeds take their commands at once.
+  void step(VehicleState& state, std::span<const double> rotor_commands, double dt) const;
+
+  /// What the state does under the commands: for the IMU.
+  [[nodiscard]] BodyAcceleration acceleration(const VehicleState& state,
+                                              std::span<const double> rotor_commands) const;
+
+  [[nodiscard]] const VehicleSettings& settings() const { return settings_; }
+
+ private:
+  struct Rate;
+  [[nodiscard]] Rate rate(const VehicleState& state, std::span<const double> commands) const;
+  [[nodiscard]] double clamped(double command) const;
+
+  VehicleSettings settings_;
+};
+
+}  // namespace pointflight

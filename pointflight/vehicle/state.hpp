@@ -1,0 +1,37 @@
+#pragma once
+
+#include <vector>
+
+#include "pointflight/geometry/types.hpp"
+
+namespace pointflight {
+
+/// Where a vehicle is and how it moves. World: ENU, z up. Body: x forward, y left, z up, origin at the
+/// centre of mass.
+struct RigidBodyState {
+  Vector3d p_world = Vector3d::Zero();
+  Vector3d v_world = Vector3d::Zero();
+  Quaterniond q_world_body = Quaterniond::Identity();
+  Vector3d omega_body = Vector3d::Zero();  ///< rad/s
+
+  [[nodiscard]] Pose T_world_body() const { return {q_world_body, p_world}; }
+};
+
+/// A rotor's speed and its rate of change.
+struct RotorState {
+  double speed = 0.0;         ///< rad/s, never negative
+  double acceleration = 0.0;  ///< rad/s^2
+};
+
+struct VehicleState {
+  RigidBodyState body;
+  std::vector<RotorState> rotors;
+};
+
+/// Accelerations that belong to a state: what an IMU feels.
+struct BodyAcceleration {
+  Vector3d a_world = Vector3d::Zero();      ///< Of the centre of mass.
+  Vector3d alpha_body = Vector3d::Zero();   ///< rad/s^2
+};
+
+}  // namespace pointflight

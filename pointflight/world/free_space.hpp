@@ -1,0 +1,33 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "pointflight/core/parallel.hpp"
+#include "pointflight/geometry/types.hpp"
+#include "pointflight/map/surfel_map.hpp"
+
+namespace pointflight {
+
+struct TourOptions {
+  double radius = 0.3;        ///< Of the vehicle, m.
+  double margin = 0.4;        ///< Kept free beyond it, m.
+  double length_min = 60.0;   ///< m
+  std::optional<Vector3d> start;  ///< Else one is found.
+};
+
+/// A way through free space: straight legs that a vehicle can fly.
+struct Tour {
+  std::vector<Vector3d> points_world;  ///< The start first.
+  double length = 0.0;                 ///< m
+};
+
+/// Finds a start and waypoints inside a map: free of it by radius + margin, above ground and
+/// surrounded by it (not outside the walls of a scanned hall). Long legs first; as long as
+/// `length_min` where the map allows. Nothing where no free place is found. Deterministic.
+std::optional<Tour> find_tour(const SurfelMap& map,
+                              const TourOptions& options,
+                              const Executor& executor);
+
+}  // namespace pointflight
