@@ -85,6 +85,7 @@ class Canvas {
 
   void dot(double x, double y, double radius, Color c, double alpha = 1.0) {
     color(c, alpha);
+    cairo_new_path(cr_);
     cairo_arc(cr_, x, y, radius, 0.0, 2.0 * kPi);
     cairo_fill(cr_);
   }
@@ -92,6 +93,7 @@ class Canvas {
   void ring(double x, double y, double radius, double width, Color c) {
     color(c);
     cairo_set_line_width(cr_, width);
+    cairo_new_path(cr_);
     cairo_arc(cr_, x, y, radius, 0.0, 2.0 * kPi);
     cairo_stroke(cr_);
   }
@@ -106,6 +108,7 @@ class Canvas {
     color(c);
     cairo_set_line_width(cr_, width);
     cairo_set_line_join(cr_, CAIRO_LINE_JOIN_ROUND);
+    cairo_new_path(cr_);  // text leaves a current point behind
     for (const auto& [x, y] : points) cairo_line_to(cr_, x, y);
     cairo_stroke(cr_);
   }
@@ -217,12 +220,12 @@ void draw_surfels(Canvas& canvas, const SurfelMap& map, const Page& page, bool p
   for (const View* view : {&page.top, &page.side}) {
     for (const Vector3d& p : centers) {
       const double share = (p.z() - page.z_low) / (page.z_high - page.z_low);
-      const double grey = 0.9 - 0.35 * std::clamp(share, 0.0, 1.0);
+      const double grey = 0.78 - 0.38 * std::clamp(share, 0.0, 1.0);
       const Color c = pale ? Color{grey, grey, grey} : ramp(share);
       const auto [x, y] = view->at(p);
       for (int i = 0; i < thick; ++i) {
         for (int j = 0; j < thick; ++j) {
-          canvas.put(static_cast<int>(x) + i, static_cast<int>(y) - j, c, pale ? 0.35 : 0.7);
+          canvas.put(static_cast<int>(x) + i, static_cast<int>(y) - j, c, pale ? 0.5 : 0.7);
         }
       }
     }

@@ -6,6 +6,9 @@
 namespace pointflight {
 namespace {
 
+constexpr double kStandsOut = 2.0;     // times the mean distance of the neighbours
+constexpr double kFarInCells = 10.0;
+
 /// nanoflann's view of the centroids.
 struct Centroids {
   std::vector<Vector3d> points;
@@ -39,13 +42,17 @@ std::vector<std::uint32_t> find_outliers(const VoxelGrid& grid,
   const Tree tree(3, centroids, nanoflann::KDTreeSingleIndexAdaptorParams(16));
 
   std::vector<double> distance(cells.size());
+  std::vector<std::uint32_t> neighbours(cells.size() * k);
   executor.parallel_for(cells.size(), 4096, [&](std::size_t begin, std::size_t end) {
     std::vector<std::uint32_t> index(k + 1);
     std::vector<double> squared(k + 1);
     for (std::size_t i = begin; i < end; ++i) {
       tree.knnSearch(centroids.points[i].data(), k + 1, index.data(), squared.data());
       double sum = 0.0;
-      for (std::size_t j = 1; j <= k; ++j) sum += std::sqrt(squared[j]);  // 0 is the cell itself
+      for (std::size_t j = 1; j <= k; ++j) {  // 0 is the cell itself
+        sum += std::sqrt(squared[j]);
+        neighbours[i * k + j - 1] = index[j];
+      }
       distance[i] = sum / static_cast<double>(k);
     }
   });
@@ -60,7 +67,13 @@ std::vector<std::uint32_t> find_outliers(const VoxelGrid& grid,
 
   std::vector<std::uint32_t> outliers;
   for (std::size_t i = 0; i < distance.size(); ++i) {
-    if (distance[i] > limit) outliers.push_back(static_cast<std::uint32_t>(i));
+    if (distance[i] <= limit) continue;
+    double around = 0.0;
+    for (std::size_t j = 0; j < k; ++j) around += distance[neighbours[i * k + j]];
+    const bool stands_out = distance[i] > kStandsOut * around / static_cast<double>(k);
+    if (stands_out || distance[i] > kFarInCells * grid.resolution()) {
+      outliers.push_back(static_cast<std::uint32_t>(i));
+    }
   }
   return outliers;
 }

@@ -29,8 +29,10 @@ Angles angles_of(const Vector3d& v) {
 /// The depth image: rows of elevation, columns of azimuth, in the sensor's frame.
 class PaperRenderer::Image {
  public:
-  Image(const RayBatch& batch, const std::vector<Angles>& rays, double margin)
-      : step_(batch.image_resolution), range_max_(static_cast<double>(batch.range_max)) {
+  Image(const RayBatch& batch, const std::vector<Angles>& rays, double plane_reach)
+      : step_(batch.image_resolution),
+        range_max_(static_cast<double>(batch.range_max)),
+        reach_squared_(plane_reach * plane_reach) {
     double low = kPi;
     double high = -kPi;
     elevation_min_ = kPi / 2;
@@ -48,7 +50,6 @@ class PaperRenderer::Image {
     columns_ = static_cast<int>(std::ceil(width / step_ - 1e-9)) + (full_turn_ ? 0 : 1);
     rows_ = static_cast<int>(std::floor((elevation_max_ - elevation_min_) / step_ + 1e-9)) + 1;
     column_step_ = full_turn_ ? width / columns_ : step_;
-    margin_ = margin;
     pixels_.assign(static_cast<std::size_t>(rows_) * static_cast<std::size_t>(columns_),
                    {kEmpty, 0.0f, 0.0f});
     for (int c = 0; c < columns_; ++c) {
@@ -72,7 +73,7 @@ class PaperRenderer::Image {
     const double distance = center.norm();
     if (distance - radius > range_max_) return false;
     if (distance <= radius) return true;
-    const double half = math::asin(radius / distance) + margin_;
+    const double half = math::asin(radius / distance) + step_;
     const Angles a = angles_of(center);
     if (a.elevation + half < elevation_min_ || a.elevation - half > elevation_max_) return false;
     if (full_turn_) return true;
@@ -160,8 +161,11 @@ class PaperRenderer::Image {
         put(row, column, distance, planar ? std::abs(slope) : 1.0, intensity);
         continue;
       }
+      // a point stands for a cube of substance: its plane ends near it (the paper leaves that open,
+      // and grazing planes would reach to the sensor)
       const double depth = plane_offset / slope;
-      if (depth > 0.0) put(row, column, depth, std::abs(slope), intensity);
+      const bool near_point = (depth * ray - distance * axis).squaredNorm() < reach_squared_;
+      if (depth > 0.0 && near_point) put(row, column, depth, std::abs(slope), intensity);
     }
     return touched;
   }
@@ -175,7 +179,7 @@ class PaperRenderer::Image {
   double step_;
   double column_step_ = 0.0;
   double range_max_;
-  double margin_ = 0.0;
+  double reach_squared_;
   double azimuth_min_ = 0.0;
   double elevation_min_ = 0.0;
   double elevation_max_ = 0.0;
@@ -222,7 +226,7 @@ void PaperRenderer::render(const RayBatch& batch,
   });
   const double radius = std::sqrt(3.0) / 2.0 * map_->resolution();
   const double ball = std::sqrt(3.0) / 2.0 * options_.voxel_length + radius;
-  Image image(batch, angles, batch.image_resolution);
+  Image image(batch, angles, 2.0 * radius);
 
   std::vector<std::size_t> seen;
   const Vector3d half = Vector3d::Constant(0.5 * options_.voxel_length);

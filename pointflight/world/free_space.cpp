@@ -305,10 +305,10 @@ std::optional<Tour> find_tour(const SurfelMap& map,
                               const Executor& executor) {
   if (map.surfel_count() == 0) return std::nullopt;
   const FreeSpaceGrid grid(map, options, executor);
-  // the most enclosed places that still make a tour long enough, else the longest of all
+  // well enclosed places if they make a tour long enough, else the longest of all
   Tour best;
   for (const bool near_ground : {true, false}) {
-    for (const int sides : {8, 7, 6, 4, 2, 0}) {
+    for (const int sides : {6, 4, 2, 0}) {
       Tour tour = tour_in(map, options, grid, grid.usable(sides, near_ground));
       if (tour.length > best.length) best = std::move(tour);
       if (best.length >= options.length_min) return best;

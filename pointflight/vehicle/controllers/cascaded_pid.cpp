@@ -11,6 +11,7 @@ namespace pointflight {
 namespace {
 
 constexpr double kAttitudeIntegralMax = 5.0;  // rad/s^2
+constexpr double kIntegralZone = 1.5;         // m: farther away an integral only winds up
 
 Vector3d limited(const Vector3d& v, double length) {
   const double norm = v.norm();
@@ -67,7 +68,8 @@ Vector3d CascadedPid::demanded_acceleration(const RigidBodyState& state,
   const Vector3d allowed(sideways.x(), sideways.y(), up);
   // anti-windup: integrate where the demand is not cut, and never beyond its own limit
   for (int axis = 0; axis < 3; ++axis) {
-    if (std::abs(a[axis] - allowed[axis]) > 1e-9) continue;
+    const bool cut = std::abs(a[axis] - allowed[axis]) > 1e-9;
+    if (cut || std::abs(e_p[axis]) > kIntegralZone) continue;
     position_integral_[axis] = std::clamp(position_integral_[axis] + ki[axis] * e_p[axis] * dt,
                                           -c.integral_max,
                                           c.integral_max);

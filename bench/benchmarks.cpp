@@ -1,0 +1,126 @@
+// What a scan, an import and a physics step cost, measured side by side in one run on one map: the
+// machine may be shared, so read ratios, not milliseconds. See BENCHMARK.md.
+#include <benchmark/benchmark.h>
+#include <fmt/format.h>
+
+#include <chrono>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+
+#include "pointflight/core/random.hpp"
+#include "pointflight/geometry/shape_scene.hpp"
+#include "pointflight/io/pcd_writer.hpp"
+#include "pointflight/lidar/lidar.hpp"
+#include "pointflight/map/map_builder.hpp"
+#include "pointflight/vehicle/controller.hpp"
+#include "pointflight/vehicle/multirotor.hpp"
+
+namespace pointflight {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A forest at 0.05 m, imported once, and where its files lie.
+struct Bench {
+  fs::path folder = fs::temp_directory_path() / "pointflight_bench";
+  std::string cloud = (folder / "forest.pcd").string();
+  std::string map_path = (folder / "forest.pfmap").string();
+  std::uint64_t points = 0;
+  std::shared_ptr<const SurfelMap> map;
+
+  Bench() {
+    fs::create_directories(folder);
+    ForestOptions options;
+    std::vector<CloudPoint> cloud_points;
+    make_forest(options).sample(800.0, 0.005, 1, [&](const Vector3d& p) {
+      cloud_points.push_back({p, 0.0f});
+    });
+    points = cloud_points.size();
+    write_cloud_pcd(cloud, cloud_points, false);
+    import(2);
+    map = SurfelMap::open(map_path);
+  }
+
+  void import(int threads) const {
+    ImportOptions options;
+    options.resolution = 0.05;
+    const ImportedMap imported = import_clouds({cloud}, options, Executor(threads));
+    write_map(map_path, imported.tree, imported.description);
+  }
+};
+
+const Bench& bench() {
+  static const Bench instance;
+  return instance;
+}
+
+void scan(benchmark::State& state, const char* lidar_name, const char* renderer_name) {
+  const Lidar lidar(load_lidar(lidar_name), 0);
+  const auto renderer = make_renderer(renderer_name, Scene{bench().map});
+  const Executor executor(static_cast<int>(state.range(0)));
+  const Pose pose{Quaterniond::Identity(), {30, 30, 2}};
+  std::uint64_t index = 0;
+  std::size_t beams = 0;
+  for (auto _ : state) {
+    ScanRequest request;
+    request.index = index++;
+    const Scan result = lidar.take(
+        request, [&](SimTime) { return pose; }, *renderer, executor);
+    beams += result.beams;
+  }
+  state.SetItemsProcessed(static_cast<std::int64_t>(beams));
+}
+BENCHMARK_CAPTURE(scan, mid360_beam, "mid360", "beam")->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(scan, mid360_paper, "mid360", "paper")->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(scan, grid_beam, "marsim_grid", "beam")->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(scan, grid_paper, "marsim_grid", "paper")->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond);
+
+void pattern(benchmark::State& state) {
+  const Lidar lidar(load_lidar("mid360"), 0);
+  const Executor executor(1);
+  std::uint64_t index = 0;
+  for (auto _ : state) benchmark::DoNotOptimize(lidar.beams(index++, executor));
+}
+BENCHMARK(pattern)->Unit(benchmark::kMillisecond);
+
+void nearest(benchmark::State& state) {
+  const RandomStream random(1, StreamId::kTest, 0);
+  std::uint64_t i = 0;
+  for (auto _ : state) {
+    const Vector3d p(random.uniform(3 * i, 5, 55), random.uniform(3 * i + 1, 5, 55),
+                     random.uniform(3 * i + 2, 0.5, 4));
+    benchmark::DoNotOptimize(bench().map->nearest(p, 10.0));
+    ++i;
+  }
+  state.SetItemsProcessed(state.iterations());
+}
+BENCHMARK(nearest);
+
+void open_map(benchmark::State& state) {
+  bench();
+  for (auto _ : state) benchmark::DoNotOptimize(SurfelMap::open(bench().map_path));
+}
+BENCHMARK(open_map)->Unit(benchmark::kMillisecond);
+
+void import_cloud(benchmark::State& state) {
+  for (auto _ : state) bench().import(static_cast<int>(state.range(0)));
+  state.SetItemsProcessed(static_cast<std::int64_t>(bench().points) * state.iterations());
+}
+BENCHMARK(import_cloud)->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond)->Iterations(1);
+
+void physics_step(benchmark::State& state) {
+  const VehicleSettings settings = load_vehicle("quad_330");
+  const Multirotor vehicle(settings);
+  const auto controller = make_controller(settings);
+  VehicleState s = vehicle.hover_at({0, 0, 0}, 0.0);
+  PositionCommand command;
+  command.p_world = {1, 0, 0};
+  for (auto _ : state) vehicle.step(s, controller->update(s.body, command, 1e-3), 1e-3);
+}
+BENCHMARK(physics_step);
+
+}  // namespace
+}  // namespace pointflight
+
+BENCHMARK_MAIN();

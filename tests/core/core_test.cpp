@@ -1,0 +1,148 @@
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cmath>
+#include <stdexcept>
+#include <vector>
+
+#include "pointflight/core/constants.hpp"
+#include "pointflight/core/math.hpp"
+#include "pointflight/core/output_file.hpp"
+#include "pointflight/core/parallel.hpp"
+#include "pointflight/core/random.hpp"
+#include "pointflight/core/time.hpp"
+#include "tests/support.hpp"
+
+namespace pointflight {
+namespace {
+
+using testing::error_of;
+using testing::expect_contains;
+using testing::TemporaryFolder;
+
+TEST(Schedule, RatesThatDoNotDivideASecondDoNotDrift) {
+  const Schedule thirty(30.0);
+  EXPECT_EQ(thirty.at(1).time_since_epoch().count(), 33'333'333);
+  EXPECT_EQ(thirty.at(3).time_since_epoch().count(), 100'000'000);
+  // a thousand hours later it still falls on whole seconds
+  EXPECT_EQ(thirty.at(30 * 3'600'000LL).time_since_epoch().count(), 3'600'000'000'000'000LL);
+}
+
+TEST(Schedule, PhaseShiftsEveryInstant) {
+  const Schedule schedule(10.0, Duration(5));
+  EXPECT_EQ(schedule.at(7).time_since_epoch().count(), 700'000'005);
+}
+
+// Known answers of Philox 4x32-10 from the Random123 distribution (kat_vectors).
+TEST(RandomStream, IsPhiloxWithKnownAnswers) {
+  const auto zeros = RandomStream(0, static_cast<StreamId>(0), 0).bits(0);
+  EXPECT_EQ(zeros[0], 0x6627e8d5u);
+  EXPECT_EQ(zeros[1], 0xe169c58du);
+  EXPECT_EQ(zeros[2], 0xbc57ac4cu);
+  EXPECT_EQ(zeros[3], 0x9b00dbd8u);
+  const auto ones = RandomStream(~0ull, static_cast<StreamId>(~0u), ~0u).bits(~0ull);
+  EXPECT_EQ(ones[0], 0x408f276du);
+  EXPECT_EQ(ones[1], 0x41c83b0eu);
+  EXPECT_EQ(ones[2], 0xa20bc7c6u);
+  EXPECT_EQ(ones[3], 0x6d5451fdu);
+}
+
+TEST(RandomStream, NormalsHaveTheMomentsOfANormal) {
+  const RandomStream random(7, StreamId::kTest, 3);
+  constexpr int kCount = 200000;
+  double m1 = 0.0;
+  double m2 = 0.0;
+  double m4 = 0.0;
+  for (int i = 0; i < kCount; ++i) {
+    const double x = random.normal(static_cast<std::uint64_t>(i));
+    m1 += x;
+    m2 += x * x;
+    m4 += x * x * x * x;
+  }
+  // five standard errors: 1, sqrt(2), sqrt(96) over sqrt(n)
+  EXPECT_NEAR(m1 / kCount, 0.0, 5.0 / std::sqrt(kCount));
+  EXPECT_NEAR(m2 / kCount, 1.0, 5.0 * std::sqrt(2.0 / kCount));
+  EXPECT_NEAR(m4 / kCount, 3.0, 5.0 * std::sqrt(96.0 / kCount));
+}
+
+TEST(RandomStream, AddressesAreIndependent) {
+  const RandomStream a(1, StreamId::kLidarRangeNoise, 0);
+  const RandomStream other_seed(2, StreamId::kLidarRangeNoise, 0);
+  const RandomStream other_stream(1, StreamId::kImuGyroNoise, 0);
+  const RandomStream other_entity(1, StreamId::kLidarRangeNoise, 1);
+  EXPECT_EQ(a.uniform(5), RandomStream(1, StreamId::kLidarRangeNoise, 0).uniform(5));
+  EXPECT_NE(a.uniform(5), other_seed.uniform(5));
+  EXPECT_NE(a.uniform(5), other_stream.uniform(5));
+  EXPECT_NE(a.uniform(5), other_entity.uniform(5));
+  EXPECT_NE(a.uniform(5), a.uniform(6));
+}
+
+TEST(Math, AgreesWithTheSystemToAFewUnitsInTheLastPlace) {
+  const RandomStream random(1, StreamId::kTest, 0);
+  for (std::uint64_t i = 0; i < 2000; ++i) {
+    const double x = random.uniform(i, -20.0, 20.0);
+    const double unit = random.uniform(i + 10000, -1.0, 1.0);
+    EXPECT_NEAR(math::sin(x), std::sin(x), 4e-16);
+    EXPECT_NEAR(math::cos(x), std::cos(x), 4e-16);
+    EXPECT_NEAR(math::exp(x) / std::exp(x), 1.0, 5e-16);
+    EXPECT_NEAR(math::asin(unit), std::asin(unit), 5e-16);
+    EXPECT_NEAR(math::atan2(x, unit), std::atan2(x, unit), 1e-15);
+    EXPECT_NEAR(math::sincos(x).sin, math::sin(x), 4e-16);
+    EXPECT_NEAR(math::sincos(x).cos, math::cos(x), 4e-16);
+  }
+}
+
+TEST(Executor, VisitsEveryIndexOnceWithAnyNumberOfThreads) {
+  for (const int threads : {1, 2, 8}) {
+    const Executor executor(threads);
+    std::vector<std::atomic<int>> visits(10007);
+    executor.parallel_for(visits.size(), 100, [&](std::size_t begin, std::size_t end) {
+      EXPECT_EQ(begin % 100, 0u);
+      for (std::size_t i = begin; i < end; ++i) ++visits[i];
+    });
+    for (const auto& v : visits) ASSERT_EQ(v, 1);
+  }
+}
+
+TEST(Executor, PassesOnAnException) {
+  const Executor executor(2);
+  EXPECT_THROW(executor.parallel_for(1000,
+                                     10,
+                                     [](std::size_t begin, std::size_t) {
+                                       if (begin == 500) throw InputError("at 500");
+                                     }),
+               InputError);
+}
+
+TEST(OutputFile, AppearsOnlyWhenCommitted) {
+  const TemporaryFolder folder;
+  {
+    OutputFile file(folder / "a.txt");
+    file.write("text");
+    EXPECT_FALSE(std::filesystem::exists(folder / "a.txt"));
+  }
+  EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
+  OutputFile file(folder / "a.txt");
+  file.write("text");
+  file.commit();
+  EXPECT_EQ(testing::read_file(folder / "a.txt"), "text");
+}
+
+TEST(OutputFile, SaysWhereAndWhyItCannotWrite) {
+  const std::string error = error_of([] { OutputFile("/nowhere/at/all.txt"); });
+  expect_contains(error, "/nowhere/at/all.txt");
+  expect_contains(error, "No such file or directory");
+}
+
+TEST(OutputFile, AFullDiskIsAnErrorNotASilentLoss) {
+  // /dev/full fails every write with "no space left": reach it through a link
+  const TemporaryFolder folder;
+  std::filesystem::create_symlink("/dev/full", folder / "a.txt.partial");
+  OutputFile file(folder / "a.txt");
+  file.write("text");
+  expect_contains(error_of([&] { file.commit(); }), "No space left on device");
+  EXPECT_FALSE(std::filesystem::exists(folder / "a.txt"));
+}
+
+}  // namespace
+}  // namespace pointflight

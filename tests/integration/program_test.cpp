@@ -1,0 +1,280 @@
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <csignal>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+#include <vector>
+
+#include "tests/support.hpp"
+
+// Runs the program as a user would: exit codes, messages, files.
+namespace pointflight {
+namespace {
+
+using testing::expect_contains;
+using testing::read_file;
+using testing::TemporaryFolder;
+using testing::write_file;
+
+struct Result {
+  int code = -1;
+  std::string out;
+  std::string err;
+};
+
+Result run(const std::string& arguments, const std::string& before = "") {
+  const TemporaryFolder folder;
+  const std::string command =
+      fmt::format("{} '{}' {} >'{}' 2>'{}'", before, POINTFLIGHT_PROGRAM, arguments, folder / "out",
+                  folder / "err");
+  const int status = std::system(command.c_str());  // NOLINT(concurrency-mt-unsafe)
+  Result result;
+  result.code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+  result.out = read_file(folder / "out");
+  result.err = read_file(folder / "err");
+  return result;
+}
+
+/// One line on stderr that starts with the program's name, exit code 2.
+void expect_user_error(const Result& result, const std::string& words) {
+  EXPECT_EQ(result.code, 2) << result.err;
+  EXPECT_EQ(result.err.rfind("pointflight: ", 0), 0u) << result.err;
+  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+  expect_contains(result.err, words);
+}
+
+/// A small forest, imported once for all tests of this file.
+class Program : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = new TemporaryFolder;
+    ASSERT_EQ(run(fmt::format("map forest --size-x 24 --size-y 20 --density 300 -o {}", cloud())).code,
+              0);
+    ASSERT_EQ(run(fmt::format("map import {} -o {} --resolution 0.1", cloud(), map())).code, 0);
+  }
+  static void TearDownTestSuite() { delete folder_; }
+  static std::string cloud() { return *folder_ / "forest.pcd"; }
+  static std::string map() { return *folder_ / "forest.pfmap"; }
+  static TemporaryFolder* folder_;
+};
+TemporaryFolder* Program::folder_ = nullptr;
+
+TEST_F(Program, HelpAndVersionEverywhere) {
+  expect_contains(run("--version").out, "pointflight 0.");
+  for (const char* command : {"", "map", "map import", "map info", "map forest", "scan", "fly",
+                              "scenario new", "scenario check", "lidar list", "lidar show"}) {
+    const Result result = run(fmt::format("{} --help", command));
+    EXPECT_EQ(result.code, 0) << command;
+    expect_contains(result.out, "-h,--help");
+  }
+}
+
+TEST_F(Program, WrongFlagsAreWrongInput) {
+  expect_user_error(run(""), "subcommand is required");
+  expect_user_error(run("fly"), "scenario is required");
+  expect_user_error(run("fly x.yaml -o /tmp/x --rate fast"), "--rate: 'fast'");
+  expect_user_error(run(fmt::format("map import {} -o /tmp/x --resolution -1", cloud())), "resolution");
+  expect_user_error(run(fmt::format("scan {} --pose 1,2,3", map())), "six are wanted");
+  expect_user_error(run(fmt::format("scan {} --pose 1,2,3,4,5,x", map())), "'x' is no number");
+  expect_user_error(run(fmt::format("scan {} --lidar mid36 --pose 1,2,3,0,0,0", map())),
+                    "did you mean 'mid360'");
+  expect_user_error(run("frobnicate"), "");
+}
+
+TEST_F(Program, MapInfoSaysWhatIsInAMap) {
+  const TemporaryFolder folder;
+  const Result text = run(fmt::format("map info {} --verify --png {}", map(), folder / "m.png"));
+  EXPECT_EQ(text.code, 0) << text.err;
+  expect_contains(text.out, "checksums   match");
+  EXPECT_EQ(read_file(folder / "m.png").substr(1, 3), "PNG");
+  const auto json = nlohmann::json::parse(run(fmt::format("map info {} --json", map())).out);
+  EXPECT_GT(json["surfels"].get<int>(), 10000);
+  EXPECT_EQ(json["resolution"].get<double>(), 0.1);
+  EXPECT_LT(json["bytes_per_surfel"].get<double>(), 15.5);
+  EXPECT_GT(json["planar_share"].get<double>(), 0.3);
+  EXPECT_EQ(json["made"]["sources"][0], "forest.pcd");
+}
+
+TEST_F(Program, ScansWithEverySensorAndBothRenderers) {
+  const TemporaryFolder folder;
+  for (const char* lidar :
+       {"avia", "mid360", "vlp32c", "hdl64e", "os1_32", "os1_128", "d455", "marsim_grid"}) {
+    for (const char* renderer : {"beam", "paper"}) {
+      SCOPED_TRACE(fmt::format("{} {}", lidar, renderer));
+      const Result result =
+          run(fmt::format("scan {} --lidar {} --renderer {} --pose 12,10,1.5,0,10,45 --json -o {} "
+                          "--png {}",
+                          map(), lidar, renderer, folder / "s.pcd", folder / "s.png"));
+      ASSERT_EQ(result.code, 0) << result.err;
+      const auto json = nlohmann::json::parse(result.out);
+      EXPECT_GT(json["points"].get<double>(), 0.05 * json["beams"].get<double>());
+      expect_contains(read_file(folder / "s.pcd").substr(0, 400), "x y z intensity range time ring");
+      EXPECT_EQ(read_file(folder / "s.png").substr(1, 3), "PNG");
+    }
+  }
+}
+
+TEST_F(Program, TheSameScanForTheSameSeed) {
+  const TemporaryFolder folder;
+  const auto scan = [&](int seed, int threads) {
+    const std::string path = folder / "s.pcd";
+    run(fmt::format("scan {} --pose 12,10,1.5,0,0,0 --seed {} --threads {} -o {}", map(), seed,
+                    threads, path));
+    return read_file(path);
+  };
+  const std::string first = scan(1, 1);
+  EXPECT_GT(first.size(), 10000u);
+  EXPECT_EQ(first, scan(1, 2));
+  EXPECT_EQ(first, scan(1, 8));
+  EXPECT_NE(first, scan(2, 1));
+}
+
+TEST_F(Program, ImportsEveryBadCloudWithOneLine) {
+  const TemporaryFolder folder;
+  const auto import = [&](const std::string& name, const std::string& bytes) {
+    if (name != "absent.pcd") write_file(folder / name, bytes);
+    const Result result = run(fmt::format("map import {} -o {}", folder / name, folder / "o.pfmap"));
+    EXPECT_FALSE(std::filesystem::exists(folder / "o.pfmap"));
+    EXPECT_FALSE(std::filesystem::exists(folder / "o.pfmap.partial"));
+    return result;
+  };
+  const std::string header =
+      "VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH {0}\nHEIGHT 1\n"
+      "POINTS {0}\nDATA {1}\n";
+  const auto pcd = [&](const char* points, const char* data) {
+    return fmt::format(fmt::runtime(header), points, data);
+  };
+  expect_user_error(import("absent.pcd", ""), "No such file");
+  expect_user_error(import("empty.pcd", ""), "the file is empty");
+  expect_user_error(import("none.pcd", pcd("0", "ascii")), "no points");
+  expect_user_error(import("nan.pcd", pcd("2", "ascii") + "nan nan nan\n1 2 nan\n"),
+                    "all 2 points are NaN");
+  expect_user_error(import("billion.pcd", pcd("1000000000", "binary") + "abc"),
+                    "promises 1000000000 points");
+  expect_user_error(import("cut.pcd", pcd("3", "ascii") + "1 2 3\n"), "cut.pcd:10");
+  expect_user_error(import("type.pcd", "FIELDS x y z\nSIZE 4 4 4\nTYPE F F C\n"), "TYPE 'C'");
+  expect_user_error(import("a.laz", "LASF"), "laszip -i");
+  expect_user_error(import("a.docx", "x"), "these are read: .pcd");
+  expect_user_error(import("few.xyz", "1 2 3\n4 5 6\n"), "give --resolution");
+}
+
+TEST_F(Program, RefusesDamagedMaps) {
+  const TemporaryFolder folder;
+  const std::string good = read_file(map());
+  write_file(folder / "cut.pfmap", good.substr(0, good.size() / 2));
+  expect_user_error(run(fmt::format("map info {}", folder / "cut.pfmap")), "does not lie inside");
+  std::string flipped = good;
+  flipped[good.size() / 2] = static_cast<char>(flipped[good.size() / 2] ^ 1);
+  write_file(folder / "flip.pfmap", flipped);
+  expect_user_error(run(fmt::format("map info {} --verify", folder / "flip.pfmap")), "checksum");
+  expect_user_error(run(fmt::format("map info {}", cloud())), "pointflight map import");
+  expect_user_error(run("map info /absent.pfmap"), "No such file");
+}
+
+TEST_F(Program, NothingIsLeftWhereAFileCannotBeWritten) {
+  const TemporaryFolder folder;
+  expect_user_error(run(fmt::format("map import {} -o /nowhere/x.pfmap --resolution 0.1", cloud())),
+                    "/nowhere/x.pfmap: cannot write");
+  // a file-size limit of 512 kB stands for a full disk
+  const Result full = run(fmt::format("map import {} -o {} --resolution 0.1", cloud(), folder / "x.pfmap"),
+                          "ulimit -f 512;");
+  expect_contains(full.err, "x.pfmap: cannot write: File too large");
+  EXPECT_EQ(full.code, 2);
+  EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
+}
+
+TEST_F(Program, ScenarioNewCheckAndFly) {
+  const TemporaryFolder folder;
+  const std::string yaml = folder / "s.yaml";
+  ASSERT_EQ(run(fmt::format("scenario new {} -o {} --length 10", map(), yaml)).code, 0);
+  expect_contains(read_file(yaml), "# [m/s] greatest speed");
+  const Result check = run(fmt::format("scenario check {}", yaml));
+  EXPECT_EQ(check.code, 0) << check.err;
+  expect_contains(check.out, "ready:");
+  const Result fly = run(fmt::format("fly {} -o {}", yaml, folder / "run"));
+  ASSERT_EQ(fly.code, 0) << fly.err;
+  expect_contains(fly.out, "closest approach");
+  for (const char* name : {"trajectory.csv", "trajectory.tum", "imu.csv", "events.csv", "scans.csv",
+                           "summary.json", "timing.json", "overview.png", "scans/0_000000.pcd"}) {
+    EXPECT_FALSE(read_file(folder / (std::string("run/") + name)).empty()) << name;
+  }
+  const auto summary = nlohmann::json::parse(read_file(folder / "run/summary.json"));
+  EXPECT_EQ(summary["end"], "completed");
+  EXPECT_EQ(summary["collisions"], 0);
+  // a second run into the same folder needs --force
+  expect_user_error(run(fmt::format("fly {} -o {}", yaml, folder / "run")), "--force");
+  EXPECT_EQ(run(fmt::format("fly {} -o {} --force", yaml, folder / "run")).code, 0);
+}
+
+TEST_F(Program, BadScenariosSayFileAndLine) {
+  const TemporaryFolder folder;
+  const auto check = [&](const std::string& text) {
+    write_file(folder / "s.yaml", text);
+    const Result fly = run(fmt::format("fly {} -o {}", folder / "s.yaml", folder / "run"));
+    EXPECT_FALSE(std::filesystem::exists(folder / "run"));
+    return fly;
+  };
+  const std::string map_line = fmt::format("map: {}\n", map());
+  expect_user_error(check("seed: 1\n"), "map: missing");
+  expect_user_error(check("map: absent.pfmap\n"), "absent.pfmap: cannot open");
+  expect_user_error(check(map_line + "sede: 1\n"), "s.yaml:2: sede: unknown key; did you mean 'seed'");
+  expect_user_error(check(map_line + "output:\n  trajectory_rate: -5\n"), "s.yaml:3: output.trajectory_rate");
+  expect_user_error(check(map_line + "mission:\n  speed: 2 km/h\n"), "plain number in m/s");
+  expect_user_error(check(map_line + "vehicle: {model: helicopter}\n"), "quad_330");
+  expect_user_error(check(map_line + "lidars:\n  - model: mid3600\n"), "did you mean 'mid360'");
+  expect_user_error(check(map_line + "vehicle:\n  start: [12, 10, 0.0]\n"), "s.yaml:3: vehicle.start");
+  expect_user_error(check(map_line + "vehicle: [\n"), "not valid YAML");
+}
+
+TEST_F(Program, EndsOneForAMissionCutShortAndForACollisionUnderStop) {
+  const TemporaryFolder folder;
+  write_file(folder / "s.yaml",
+             fmt::format("map: {}\nduration: 1\nlidars: []\nvehicle:\n  start: [12, 10, 4]\n"
+                         "mission:\n  waypoints:\n    - [12, 14, 4]\n",
+                         map()));
+  EXPECT_EQ(run(fmt::format("fly {} -o {}", folder / "s.yaml", folder / "a")).code, 1);
+  // into the ground
+  write_file(folder / "t.yaml",
+             fmt::format("map: {}\nlidars: []\nvehicle:\n  start: [12, 10, 3]\n  on_collision: stop\n"
+                         "mission:\n  waypoints:\n    - [12, 10, -3]\n",
+                         map()));
+  const Result crash = run(fmt::format("fly {} -o {}", folder / "t.yaml", folder / "b"));
+  EXPECT_EQ(crash.code, 1);
+  expect_contains(crash.err, "t.yaml:8: warning: the leg to waypoint 1 passes through the map");
+  expect_contains(crash.err, "warning: collision at");
+  const auto summary = nlohmann::json::parse(read_file(folder / "b/summary.json"));
+  EXPECT_EQ(summary["end"], "collision");
+}
+
+TEST_F(Program, AFullDiskWhileFlyingIsSaid) {
+  const TemporaryFolder folder;
+  write_file(folder / "s.yaml",
+             fmt::format("map: {}\nduration: 3\nvehicle:\n  start: [12, 10, 4]\n", map()));
+  const Result full = run(fmt::format("fly {} -o {}", folder / "s.yaml", folder / "run"), "ulimit -f 64;");
+  EXPECT_EQ(full.code, 2);
+  expect_contains(full.err, "cannot write: File too large");
+  EXPECT_FALSE(std::filesystem::exists(folder / "run/summary.json"));
+  EXPECT_FALSE(std::filesystem::exists(folder / "run/trajectory.csv"));
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder / "run")) {
+    EXPECT_NE(entry.path().extension(), ".partial") << entry.path();
+  }
+  expect_user_error(run(fmt::format("fly {} -o /proc/nowhere", folder / "s.yaml")), "/proc/nowhere");
+}
+
+TEST_F(Program, AnInterruptClosesTheFilesAndEnds130) {
+  const TemporaryFolder folder;
+  write_file(folder / "s.yaml",
+             fmt::format("map: {}\nduration: 100\nvehicle:\n  start: [12, 10, 4]\n", map()));
+  const Result result = run(fmt::format("fly {} -o {} --rate 1.0", folder / "s.yaml", folder / "run"),
+                            "timeout --preserve-status -s INT 2");
+  EXPECT_EQ(result.code, 130) << result.err;
+  const auto summary = nlohmann::json::parse(read_file(folder / "run/summary.json"));
+  EXPECT_EQ(summary["end"], "interrupted");
+  EXPECT_NEAR(summary["simulated_time"].get<double>(), 2.0, 0.8);
+  EXPECT_FALSE(read_file(folder / "run/trajectory.csv").empty());
+}
+
+}  // namespace
+}  // namespace pointflight

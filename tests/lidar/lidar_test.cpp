@@ -1,0 +1,127 @@
+#include "pointflight/lidar/lidar.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "pointflight/core/constants.hpp"
+#include "pointflight/geometry/rotation.hpp"
+#include "pointflight/io/cloud_reader.hpp"
+#include "tests/support.hpp"
+
+namespace pointflight {
+namespace {
+
+using testing::map_of;
+
+LidarSettings exact_lidar(const std::string& name) {
+  LidarSettings settings = load_lidar(name);
+  settings.noise = {};
+  return settings;
+}
+
+TEST(Lidar, AScanTakenWhileFlyingUsesThePoseOfEachBeam) {
+  // 5 m/s along x and 180 deg/s of yaw inside a box
+  ShapeScene scene;
+  scene.add_box({-6, -6, -2}, {6, 6, 4});
+  const auto map = map_of(scene, 0.05);
+  const auto renderer = make_renderer("beam", Scene{map});
+  const Lidar lidar(exact_lidar("mid360"), 0);
+  const PoseAt moving = [](SimTime t) {
+    const double s = to_seconds(t);
+    return Pose{quaternion_from_rpy(0, 0, kPi * s), {5.0 * s, 0, 0}};
+  };
+  const Executor executor(2);
+  ScanRequest request;
+  const Scan scan = lidar.take(request, moving, *renderer, executor);
+  EXPECT_GT(scan.points.size(), 19000u);
+  const auto off_wall = [](const Vector3d& p) {
+    return std::min({std::abs(std::abs(p.x()) - 6), std::abs(std::abs(p.y()) - 6),
+                     std::abs(p.z() + 2), std::abs(p.z() - 4)});
+  };
+  double worst = 0.0;
+  double mean_own = 0.0;
+  double mean_snapshot = 0.0;
+  for (const ScanPoint& point : scan.points) {
+    // each point at its own time lies on the box; all at one time, they do not
+    const Vector3d p = point.position_sensor.cast<double>();
+    const double own = off_wall(moving(scan.start + point.time_offset) * p);
+    worst = std::max(worst, own);
+    mean_own += own / static_cast<double>(scan.points.size());
+    mean_snapshot += off_wall(moving(scan.start) * p) / static_cast<double>(scan.points.size());
+  }
+  EXPECT_LT(worst, 0.06);
+  EXPECT_LT(mean_own, 0.003);
+  EXPECT_GT(mean_snapshot, 0.1);
+  // the paper's way: one pose
+  request.snapshot = true;
+  double mean_one_pose = 0.0;
+  const Scan one_pose = lidar.take(request, moving, *renderer, executor);
+  const Pose middle = moving(one_pose.start + lidar.period() / 2);
+  for (const ScanPoint& point : one_pose.points) {
+    mean_one_pose += off_wall(middle * point.position_sensor.cast<double>()) /
+                     static_cast<double>(one_pose.points.size());
+  }
+  EXPECT_LT(mean_one_pose, 0.003);
+}
+
+TEST(Lidar, RangeNoiseHasTheFilesDeviationAndNoBias) {
+  ShapeScene scene;
+  scene.add_box({-6, -6, -2}, {6, 6, 4});
+  const auto renderer = make_renderer("beam", Scene{map_of(scene, 0.1)});
+  LidarSettings settings = load_lidar("mid360");
+  settings.noise.range_sigma = 0.03;
+  const Lidar noisy(settings, 0);
+  const Lidar exact(exact_lidar("mid360"), 0);
+  const PoseAt still = [](SimTime) { return Pose{}; };
+  const Executor executor(2);
+  ScanRequest request;
+  request.seed = 5;
+  const Scan a = noisy.take(request, still, *renderer, executor);
+  const Scan b = exact.take(request, still, *renderer, executor);
+  ASSERT_EQ(a.points.size(), b.points.size());
+  double mean = 0.0;
+  double square = 0.0;
+  const auto n = static_cast<double>(a.points.size());
+  for (std::size_t i = 0; i < a.points.size(); ++i) {
+    const double e = static_cast<double>(a.points[i].range - b.points[i].range);
+    mean += e / n;
+    square += e * e / n;
+  }
+  EXPECT_NEAR(mean, 0.0, 5 * 0.03 / std::sqrt(n));
+  EXPECT_NEAR(std::sqrt(square), 0.03, 5 * 0.03 / std::sqrt(2 * n));
+  // another seed, other noise; the same seed, the same bytes
+  EXPECT_EQ(noisy.take(request, still, *renderer, executor).points[7].range, a.points[7].range);
+  request.seed = 6;
+  EXPECT_NE(noisy.take(request, still, *renderer, executor).points[7].range, a.points[7].range);
+  request.noise = false;
+  EXPECT_EQ(noisy.take(request, still, *renderer, executor).points[7].range, b.points[7].range);
+}
+
+TEST(Lidar, DropsReturnsNearerThanItsMinimum) {
+  ShapeScene scene;
+  scene.add_rectangle({0.5, -3, -3}, {0, 6, 0}, {0, 0, 6});
+  const auto renderer = make_renderer("beam", Scene{map_of(scene, 0.05)});
+  const Executor executor(1);
+  const PoseAt still = [](SimTime) { return Pose{}; };
+  const Lidar avia(exact_lidar("avia"), 0);  // from 1 m
+  for (const ScanPoint& p : avia.take({}, still, *renderer, executor).points) {
+    EXPECT_GE(p.range, 1.0f);
+  }
+}
+
+TEST(Scan, PcdHasAllFields) {
+  const testing::TemporaryFolder folder;
+  Scan scan;
+  scan.points.push_back({{1, 2, 3}, 3.74f, 77.0f, Duration(50'000'000), 9, 0});
+  write_scan_pcd(folder / "s.pcd", scan);
+  testing::expect_contains(testing::read_file(folder / "s.pcd"),
+                           "FIELDS x y z intensity range time ring\nSIZE 4 4 4 4 4 4 2\n");
+  std::vector<CloudPoint> batch;
+  ASSERT_TRUE(open_cloud(folder / "s.pcd")->read(batch));
+  EXPECT_EQ(batch.at(0).position, Vector3d(1, 2, 3));
+  EXPECT_EQ(batch.at(0).intensity, 77.0f);
+}
+
+}  // namespace
+}  // namespace pointflight

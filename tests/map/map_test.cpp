@@ -1,0 +1,310 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "pointflight/core/hash.hpp"
+#include "pointflight/core/random.hpp"
+#include "pointflight/io/pcd_writer.hpp"
+#include "pointflight/map/map_builder.hpp"
+#include "pointflight/map/spacing.hpp"
+#include "tests/support.hpp"
+
+namespace pointflight {
+namespace {
+
+using testing::error_of;
+using testing::expect_contains;
+using testing::import_points;
+using testing::map_of;
+using testing::TemporaryFolder;
+
+ShapeScene room() {
+  ShapeScene scene;
+  scene.add_box({0, 0, 0}, {6, 5, 3});
+  scene.shapes.emplace_back(Sphere{{3, 2, 1}, 0.6});
+  return scene;
+}
+
+std::vector<CloudPoint> cloud_of(const ShapeScene& scene, double density, double noise = 0.0) {
+  std::vector<CloudPoint> points;
+  scene.sample(density, noise, 1, [&](const Vector3d& p) { points.push_back({p, 0.0f}); });
+  return points;
+}
+
+TEST(VoxelGrid, MomentsOfACellMatchItsPoints) {
+  VoxelGrid grid({0, 0, 0}, 1.0);
+  const std::vector<Vector3d> points = {{0.1, 0.2, 0.3}, {0.9, 0.4, 0.5}, {0.5, 0.8, 0.1}};
+  Vector3d mean = Vector3d::Zero();
+  for (const Vector3d& p : points) {
+    EXPECT_TRUE(grid.add(p, 2.0f));
+    mean += p / 3.0;
+  }
+  Matrix3d covariance = Matrix3d::Zero();
+  for (const Vector3d& p : points) covariance += (p - mean) * (p - mean).transpose() / 3.0;
+  ASSERT_EQ(grid.cells().size(), 1u);
+  EXPECT_TRUE(grid.centroid_world(grid.cells()[0]).isApprox(mean, 1e-6));
+  EXPECT_TRUE(grid.cells()[0].moments().covariance().isApprox(covariance, 1e-5));
+  // covariance does not depend on where moments are taken about
+  const Moments moved = grid.cells()[0].moments().about({3, -2, 1});
+  EXPECT_TRUE(moved.covariance().isApprox(covariance, 1e-5));
+  EXPECT_FALSE(grid.add({2e6, 0, 0}, 0.0f));
+}
+
+TEST(Import, SurfelsOfAPlaneLieOnItWithItsNormal) {
+  ShapeScene plane;
+  const Vector3d normal = Vector3d(0.3, -0.2, 0.93).normalized();
+  const Vector3d u = normal.cross(Vector3d::UnitX()).normalized();
+  plane.add_rectangle({1, 2, 3}, 4.0 * u, 4.0 * normal.cross(u));
+  const auto map = map_of(plane, 0.05);
+  std::size_t count = 0;
+  std::size_t planar = 0;
+  map->for_each_surfel([&](const Vector3d& p, const Vector3d& n, double, std::uint32_t word) {
+    ++count;
+    planar += is_planar(map->words()[word]) ? 1 : 0;
+    EXPECT_LT(std::abs((p - Vector3d(1, 2, 3)).dot(normal)), 0.05 / 64.0 + 1e-5);
+    EXPECT_GT(std::abs(n.dot(normal)), 0.99);
+  });
+  EXPECT_EQ(count, map->surfel_count());
+  EXPECT_GT(static_cast<double>(planar), 0.99 * static_cast<double>(count));
+  map->verify();
+}
+
+TEST(Import, AMapInUtmCoordinatesIsAsExactAsOneAtZero) {
+  const Vector3d shift(500000.0, 5400000.0, 300.0);
+  std::vector<Vector3d> here;
+  std::vector<Vector3d> there;
+  room().sample(800.0, 0.0, 1, [&](const Vector3d& p) {
+    here.push_back(p);
+    there.push_back(p + shift);
+  });
+  const auto near_map = map_of(here, 0.125);
+  const auto far_map = map_of(there, 0.125);
+  ASSERT_EQ(near_map->surfel_count(), far_map->surfel_count());
+  for (const Vector3d& p : {Vector3d(3, 2, 2), Vector3d(1, 1, 1), Vector3d(5, 4, 0.5)}) {
+    const auto a = near_map->nearest(p, 10.0);
+    const auto b = far_map->nearest(p + shift, 10.0);
+    ASSERT_TRUE(a && b);
+    EXPECT_NEAR(a->distance, b->distance, 1e-4);
+  }
+}
+
+TEST(Import, CountsAndDropsWhatIsNotFinite) {
+  auto points = cloud_of(room(), 500.0);
+  const std::size_t good = points.size();
+  points.push_back({{std::nan(""), 0, 0}, 0.0f});
+  points.push_back({{0, std::numeric_limits<double>::infinity(), 0}, 0.0f});
+  ImportOptions options;
+  options.resolution = 0.1;
+  const ImportedMap map = import_points(points, options);
+  EXPECT_EQ(map.report.points_read, good + 2);
+  EXPECT_EQ(map.report.points_not_finite, 2u);
+}
+
+TEST(Import, EmptyAndAllNanCloudsAreErrors) {
+  ImportOptions options;
+  options.resolution = 0.1;
+  expect_contains(error_of([&] { import_points({}, options); }), "no points");
+  const std::vector<CloudPoint> nan(3, {{std::nan(""), 0, 0}, 0.0f});
+  expect_contains(error_of([&] { import_points(nan, options); }), "all 3 points are NaN");
+}
+
+TEST(Import, TooWideForTheResolutionIsAnError) {
+  ImportOptions options;
+  options.resolution = 0.001;
+  const std::vector<CloudPoint> points = {{{0, 0, 0}, 0}, {{5000, 0, 0}, 0}, {{5001, 0, 0}, 0},
+                                          {{5002, 0, 0}, 0}};
+  expect_contains(error_of([&] { import_points(points, options); }), "coarser --resolution");
+}
+
+TEST(Import, OnePointMakesAMapOfOneSurfel) {
+  const auto map = map_of(std::vector<Vector3d>{{1, 2, 3}}, 0.1);
+  EXPECT_EQ(map->surfel_count(), 1u);
+  map->verify();
+  // a lone point is a small blob, smaller than its cell
+  const double gap = map->nearest({1, 2, 4}, 5.0)->distance;
+  EXPECT_GT(gap, 0.95);
+  EXPECT_LT(gap, 0.99);
+}
+
+TEST(Import, TakesStrayPointsOutAndLeavesEvenlySparseGroundIn) {
+  auto points = cloud_of(room(), 800.0, 0.002);
+  // stray points in the room's air, and ground outside with a point every 0.4 m
+  const RandomStream random(1, StreamId::kTest, 0);
+  constexpr std::size_t kStray = 40;
+  for (std::uint64_t i = 0; i < kStray; ++i) {
+    points.push_back({{random.uniform(3 * i, 1.0, 5.0), random.uniform(3 * i + 1, 1.0, 4.0),
+                       random.uniform(3 * i + 2, 1.9, 2.4)},
+                      0.0f});
+  }
+  for (int i = 0; i < 30; ++i) {
+    for (int j = 0; j < 30; ++j) points.push_back({{10.0 + 0.4 * i, 0.4 * j, 0.0}, 0.0f});
+  }
+  ImportOptions options;
+  options.resolution = 0.05;
+  const ImportedMap map = import_points(points, options);
+  std::size_t stray = 0;
+  std::size_t ground = 0;
+  for (const CloudPoint& p : map.outliers) {
+    stray += p.position.x() < 6.0 && p.position.z() > 1.7 && p.position.z() < 2.6 ? 1 : 0;
+    ground += p.position.x() > 9.0 ? 1 : 0;
+  }
+  EXPECT_GE(stray, kStray * 9 / 10);
+  EXPECT_LE(ground, 9u);
+  EXPECT_EQ(map.report.outlier_cells, map.outliers.size());
+  // and can be switched off
+  options.outliers.enabled = false;
+  EXPECT_EQ(import_points(points, options).report.outlier_cells, 0u);
+}
+
+TEST(Import, ChoosesTheResolutionThatTheSpacingSupports) {
+  std::vector<CloudPoint> points;
+  for (int i = 0; i < 100; ++i) {
+    for (int j = 0; j < 100; ++j) points.push_back({{0.02 * i, 0.02 * j, 1.0}, 0.0f});
+  }
+  const ImportedMap map = import_points(points, {});
+  EXPECT_NEAR(map.report.spacing, 0.02, 1e-9);
+  EXPECT_NEAR(map.report.resolution, 0.05, 1e-9);
+  EXPECT_TRUE(map.report.resolution_was_chosen);
+  EXPECT_NEAR(supported_resolution(0.0257), 0.065, 1e-9);
+  EXPECT_NEAR(supported_resolution(1.3), 3.3, 1e-9);
+}
+
+TEST(Import, KeepsIntensities) {
+  const TemporaryFolder folder;
+  auto points = cloud_of(room(), 500.0);
+  for (CloudPoint& p : points) p.intensity = p.position.z() > 2.9 ? 200.0f : 50.0f;
+  write_cloud_pcd(folder / "a.pcd", points, true);
+  ImportOptions options;
+  options.resolution = 0.1;
+  const Executor executor(1);
+  const ImportedMap imported = import_clouds({folder / "a.pcd"}, options, executor);
+  write_map(folder / "a.pfmap", imported.tree, imported.description);
+  const auto map = SurfelMap::open(folder / "a.pfmap");
+  ASSERT_TRUE(map->has_intensity());
+  EXPECT_NEAR(map->intensity(map->nearest({3, 2, 2.95}, 1.0)->word), 200.0f, 1.0f);
+  EXPECT_NEAR(map->intensity(map->nearest({1, 1, 0.1}, 1.0)->word), 50.0f, 1.0f);
+}
+
+TEST(Import, UpAxisAndScale) {
+  // a wall of the plane y = 2000 mm, file y up: world z = 2 m
+  std::vector<CloudPoint> points;
+  for (int i = 0; i < 50; ++i) {
+    for (int j = 0; j < 50; ++j) points.push_back({{20.0 * i, 2000.0, 20.0 * j}, 0.0f});
+  }
+  ImportOptions options;
+  options.resolution = 0.05;
+  options.scale = 0.001;
+  options.up = 'y';
+  const ImportedMap map = import_points(points, options);
+  EXPECT_NEAR(map.description.bounds_world.min.z(), 2.0, 1e-4);
+  EXPECT_NEAR(map.description.bounds_world.min.y(), -0.98, 1e-4);
+}
+
+TEST(Import, DoesNotDependOnThreads) {
+  const auto points = cloud_of(room(), 1500.0, 0.004);
+  ImportOptions options;
+  options.resolution = 0.05;
+  std::uint64_t first = 0;
+  const TemporaryFolder folder;
+  write_cloud_pcd(folder / "a.pcd", points, false);
+  for (const int threads : {1, 2, 8}) {
+    const Executor executor(threads);
+    const ImportedMap map = import_clouds({folder / "a.pcd"}, options, executor);
+    const std::uint64_t hash = hash64(map_bytes(map.tree, map.description));
+    if (threads == 1) first = hash;
+    EXPECT_EQ(hash, first) << threads << " threads";
+  }
+}
+
+/// Distance to a surfel's box: the slow twin of SurfelMap::nearest.
+double brute_force_distance(const SurfelMap& map, const Vector3d& p) {
+  double best = 1e300;
+  for (std::size_t at = 0; at + kLeafPadding < map.words().size();) {
+    const LeafHeader leaf = decode_leaf(map.words()[at]);
+    for (std::size_t i = 1; i <= leaf.count; ++i) {
+      const Surfel s = decode(map.words()[at + i]);
+      const Vector3d center = map.origin_world() + map.resolution() * (Vector3d(leaf.x, leaf.y, leaf.z) +
+                                                   s.center_voxels.cast<double>());
+      const Vector3d local = s.axes.cast<double>().transpose() * (p - center);
+      Vector3d outside;
+      for (int k = 0; k < 3; ++k) {
+        outside[k] = std::max(0.0, std::abs(local[k]) - std::sqrt(3.0) * static_cast<double>(s.s[k]) *
+                                                            map.resolution());
+      }
+      best = std::min(best, outside.norm());
+    }
+    at += leaf.count + 1;
+  }
+  return best;
+}
+
+TEST(Nearest, EqualsBruteForce) {
+  const auto map = map_of(room(), 0.1, 8.0, 0.005);
+  const RandomStream random(3, StreamId::kTest, 0);
+  for (std::uint64_t i = 0; i < 300; ++i) {
+    const Vector3d p(random.uniform(3 * i, -2, 8), random.uniform(3 * i + 1, -2, 7),
+                     random.uniform(3 * i + 2, -2, 5));
+    const double truth = brute_force_distance(*map, p);
+    const auto found = map->nearest(p, 100.0);
+    ASSERT_TRUE(found);
+    EXPECT_NEAR(found->distance, truth, 1e-4) << p.transpose();
+    EXPECT_FALSE(map->nearest(p, truth - 1e-3));
+  }
+}
+
+TEST(MapFile, OpensFromDiskAndVerifies) {
+  const TemporaryFolder folder;
+  ImportOptions options;
+  options.resolution = 0.1;
+  const ImportedMap imported = import_points(cloud_of(room(), 800.0), options);
+  write_map(folder / "a.pfmap", imported.tree, imported.description);
+  const auto map = SurfelMap::open(folder / "a.pfmap");
+  map->verify();
+  EXPECT_EQ(map->surfel_count(), imported.report.surfels);
+  EXPECT_EQ(map->resolution(), 0.1);
+  expect_contains(std::string(map->metadata()), "\"sources\"");
+  EXPECT_LT(static_cast<double>(map->file_size()) / static_cast<double>(map->surfel_count()), 16.0);
+}
+
+TEST(MapFile, DamageIsFoundAndNeverCrashes) {
+  const ImportedMap imported = import_points(cloud_of(room(), 800.0), [] {
+    ImportOptions options;
+    options.resolution = 0.2;
+    return options;
+  }());
+  const auto good = map_bytes(imported.tree, imported.description);
+  const auto open = [](std::vector<std::byte> bytes) {
+    return SurfelMap::from_bytes(bytes, "a.pfmap");
+  };
+  expect_contains(error_of([&] { open({good.begin(), good.begin() + 100}); }), "cut off");
+  expect_contains(error_of([&] { open({good.begin(), good.begin() + 5000}); }), "does not lie inside");
+  auto wrong = good;
+  wrong[0] = std::byte{'X'};
+  expect_contains(error_of([&] { open(wrong); }), "not a .pfmap file");
+  wrong = good;
+  wrong[8] = std::byte{99};
+  expect_contains(error_of([&] { open(wrong); }), "map version 99, this program reads 1");
+  wrong = good;
+  wrong[20] ^= std::byte{1};
+  expect_contains(error_of([&] { open(wrong); }), "header is corrupt");
+  // a damaged body opens, is found by verify, and answers without harm
+  const RandomStream random(5, StreamId::kTest, 0);
+  for (std::uint64_t i = 0; i < 60; ++i) {
+    wrong = good;
+    const auto at = kMapHeaderSize + random.bits(i)[0] % (good.size() - kMapHeaderSize - 64);
+    std::memset(&wrong[at], 0xff, 16);
+    const auto map = open(wrong);
+    if (hash64(wrong) != hash64(good)) {
+      expect_contains(error_of([&] { map->verify(); }), "import the cloud again");
+    }
+    EXPECT_NO_THROW(static_cast<void>(map->nearest({3, 2, 2}, 10.0)));
+    std::size_t count = 0;
+    map->for_each_surfel([&](const Vector3d&, const Vector3d&, double, std::uint32_t) { ++count; });
+    EXPECT_LE(count, good.size());
+  }
+}
+
+}  // namespace
+}  // namespace pointflight

@@ -1,0 +1,70 @@
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "pointflight/core/input_error.hpp"
+#include "pointflight/geometry/shape_scene.hpp"
+#include "pointflight/map/map_builder.hpp"
+#include "pointflight/map/surfel_map.hpp"
+
+namespace pointflight::testing {
+
+/// A folder that goes away with the test.
+class TemporaryFolder {
+ public:
+  TemporaryFolder();
+  ~TemporaryFolder();
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+  [[nodiscard]] std::string operator/(const std::string& name) const {
+    return (path_ / name).string();
+  }
+  [[nodiscard]] std::string path() const { return path_.string(); }
+
+ private:
+  std::filesystem::path path_;
+};
+
+void write_file(const std::string& path, std::string_view bytes);
+std::string read_file(const std::string& path);
+
+/// A map of sampled shapes; `points_per_cell` points a resolution squared of surface.
+std::shared_ptr<const SurfelMap> map_of(const ShapeScene& scene,
+                                        double resolution,
+                                        double points_per_cell = 20.0,
+                                        double noise = 0.0);
+
+/// A map of given points, outliers kept.
+std::shared_ptr<const SurfelMap> map_of(const std::vector<Vector3d>& points, double resolution);
+
+/// The import of given points in memory.
+ImportedMap import_points(const std::vector<CloudPoint>& points, const ImportOptions& options);
+
+/// Path below the shared data, or "" where it is absent (the test is then skipped).
+std::string shared_data(const std::string& relative);
+
+/// The text of the InputError that `action` throws; a test failure where it throws none.
+template <class Action>
+std::string error_of(const Action& action) {
+  try {
+    action();
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  ADD_FAILURE() << "no InputError was thrown";
+  return "";
+}
+
+inline void expect_contains(const std::string& text, const std::string& part) {
+  EXPECT_NE(text.find(part), std::string::npos) << "'" << part << "' is not in: " << text;
+}
+
+#define SKIP_WITHOUT(path)                                                        \
+  if ((path).empty()) GTEST_SKIP() << "the shared data is absent: nothing to check against"
+
+}  // namespace pointflight::testing

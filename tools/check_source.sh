@@ -1,0 +1,52 @@
+#!/bin/sh
+# Rules that no compiler checks. Prints each breach; exit status 1 if there is any.
+cd "$(dirname "$0")/.." || exit 2
+failed=0
+breach() {
+  printf '%s\n' "$1" | sed 's/^/  /'
+  failed=1
+}
+
+# Includes go down the floors only: a folder may use what stands after the colon.
+allowed() {
+  case $1 in
+    core) echo "core" ;;
+    geometry) echo "core geometry" ;;
+    io) echo "core geometry io" ;;
+    map) echo "core geometry io map" ;;
+    render) echo "core geometry map render" ;;
+    lidar) echo "core geometry io map render lidar" ;;
+    vehicle) echo "core geometry vehicle" ;;
+    world) echo "core geometry map world" ;;
+    sim) echo "core geometry io map render lidar vehicle world sim" ;;
+  esac
+}
+for folder in core geometry io map render lidar vehicle world sim; do
+  for used in $(grep -rhoE '#include "(pointflight|apps|tests)/[a-z_]+' "pointflight/$folder" |
+                sed 's/.*"//; s/pointflight\///' | sort -u); do
+    case " $(allowed "$folder") " in
+      *" $used "*) ;;
+      *) breach "pointflight/$folder includes $used: an arrow that goes up (docs/architecture.md)" ;;
+    esac
+  done
+done
+
+# The path from seed to output must give the same bits on every CPU: no libm transcendentals there.
+found=$(grep -rnE '(std::|[^a-zA-Z_:.>])(sin|cos|tan|asin|acos|atan|atan2|exp|exp2|log|log2|log10|pow|sinh|cosh|tanh)f?\(' \
+        pointflight --include='*.cpp' --include='*.hpp' | sed 's,//.*,,' | grep -E '(sin|cos|tan|exp|exp2|log|log2|log10|pow|atan|atan2)f?\(' | grep -vE 'math::|core/math.hpp')
+[ -z "$found" ] || { echo "libm instead of core/math.hpp:"; breach "$found"; }
+found=$(grep -rnE 'AngleAxis|slerp|computeDirect\(|<random>' pointflight --include='*.cpp' --include='*.hpp' |
+        grep -vE ':[0-9]*: *//|//.*(slerp|computeDirect|AngleAxis)')
+[ -z "$found" ] || { echo "calls libm or <random>:"; breach "$found"; }
+
+# The core reads no wall clock and prints nothing.
+found=$(grep -rnE 'system_clock|steady_clock|time\(nullptr|std::(cout|cerr)|fmt::print|printf\(' pointflight \
+        --include='*.cpp' --include='*.hpp')
+[ -z "$found" ] || { echo "wall clock or printing in the library:"; breach "$found"; }
+
+# Public headers: std and Eigen only, so that a user needs no other headers.
+found=$(grep -rnE '#include <(fmt|yaml-cpp|nlohmann|tbb|oneapi|nanoflann|xxhash|lzf|liblzf|assimp|Random123)' \
+        pointflight --include='*.hpp' | grep -v 'io/byte_cursor.hpp')
+[ -z "$found" ] || { echo "third-party headers in public headers:"; breach "$found"; }
+
+exit $failed
