@@ -2,6 +2,7 @@
 
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 namespace pointflight {
 
@@ -11,7 +12,14 @@ namespace pointflight {
 /// The command line prints it and exits with 2. Our own mistakes are assertions, not InputErrors.
 class InputError : public std::runtime_error {
  public:
-  explicit InputError(const std::string& text) : std::runtime_error(text) {}
+  explicit InputError(std::string text) : std::runtime_error(one_line(std::move(text))) {}
+
+ private:
+  /// What is quoted from a file may hold line breaks and escape sequences.
+  static std::string one_line(std::string text) {
+    for (char& c : text) c = static_cast<unsigned char>(c) < ' ' || c == '\x7f' ? '?' : c;
+    return text;
+  }
 };
 
 }  // namespace pointflight

@@ -224,7 +224,7 @@ TEST_F(Program, BadScenariosSayFileAndLine) {
   expect_user_error(check(map_line + "mission:\n  speed: 2 km/h\n"), "plain number in m/s");
   expect_user_error(check(map_line + "vehicle: {model: helicopter}\n"), "quad_330");
   expect_user_error(check(map_line + "lidars:\n  - model: mid3600\n"), "did you mean 'mid360'");
-  expect_user_error(check(map_line + "vehicle:\n  start: [12, 10, 0.0]\n"), "s.yaml:3: vehicle.start");
+  expect_user_error(check(map_line + "vehicle:\n  start: [12, 10, 0.3]\n"), "s.yaml:3: vehicle.start");
   expect_user_error(check(map_line + "vehicle: [\n"), "not valid YAML");
 }
 

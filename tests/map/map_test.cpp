@@ -130,7 +130,7 @@ TEST(Import, OnePointMakesAMapOfOneSurfel) {
 
 TEST(Import, TakesStrayPointsOutAndLeavesEvenlySparseGroundIn) {
   auto points = cloud_of(room(), 800.0, 0.002);
-  // stray points in the room's air, and ground outside with a point every 0.4 m
+  // stray points in the room's air, and ground outside with a point every 0.3 m
   const RandomStream random(1, StreamId::kTest, 0);
   constexpr std::size_t kStray = 40;
   for (std::uint64_t i = 0; i < kStray; ++i) {
@@ -139,7 +139,7 @@ TEST(Import, TakesStrayPointsOutAndLeavesEvenlySparseGroundIn) {
                       0.0f});
   }
   for (int i = 0; i < 30; ++i) {
-    for (int j = 0; j < 30; ++j) points.push_back({{10.0 + 0.4 * i, 0.4 * j, 0.0}, 0.0f});
+    for (int j = 0; j < 30; ++j) points.push_back({{10.0 + 0.3 * i, 0.3 * j, 0.0}, 0.0f});
   }
   ImportOptions options;
   options.resolution = 0.05;

@@ -1,0 +1,100 @@
+// Maps of any bytes: an InputError, or a map that can be asked anything without a read outside it.
+//
+// Most random bytes fail at the header's checksum, so an input whose first byte is even is taken as
+// a list of edits (offset, value) of a good map, whose checksum is then made right.
+#include <cstdint>
+#include <cstring>
+#include <string>
+#include <vector>
+
+#include "pointflight/core/hash.hpp"
+#include "pointflight/core/input_error.hpp"
+#include "pointflight/geometry/shape_scene.hpp"
+#include "pointflight/map/map_builder.hpp"
+#include "pointflight/render/renderer.hpp"
+
+namespace {
+
+using namespace pointflight;
+
+/// Points already in memory as a cloud.
+class MemoryCloud : public CloudReader {
+ public:
+  explicit MemoryCloud(std::vector<CloudPoint> points) : points_(std::move(points)) {}
+  bool read(std::vector<CloudPoint>& batch) override {
+    batch = std::move(points_);
+    points_.clear();
+    return !batch.empty();
+  }
+  [[nodiscard]] bool has_intensity() const override { return true; }
+  [[nodiscard]] double share_read() const override { return 1.0; }
+
+ private:
+  std::vector<CloudPoint> points_;
+};
+
+std::vector<std::byte> good_map() {
+  ShapeScene scene;
+  scene.add_box({-2, -2, -1}, {2, 2, 1});
+  scene.shapes.emplace_back(Sphere{{1, 0, 0}, 0.3});
+  std::vector<CloudPoint> points;
+  scene.sample(400.0, 0.005, 1, [&](const Vector3d& p) {
+    points.push_back({p, static_cast<float>(p.z())});
+  });
+  ImportOptions options;
+  options.resolution = 0.2;
+  const auto open = [&](std::size_t) { return std::make_unique<MemoryCloud>(points); };
+  const ImportedMap map = build_map({"memory"}, open, options, Executor(1));
+  return map_bytes(map.tree, map.description);
+}
+
+std::vector<std::byte> edited(std::vector<std::byte> bytes,
+                              const std::uint8_t* data,
+                              std::size_t size) {
+  constexpr std::size_t kEdit = 3 + 4;
+  for (; size >= kEdit; data += kEdit, size -= kEdit) {
+    std::size_t offset = 0;
+    std::memcpy(&offset, data, 3);
+    std::memcpy(bytes.data() + offset % (bytes.size() - 3), data + 3, 4);
+  }
+  constexpr std::size_t kChecksumAt = kMapHeaderSize - 8;
+  const std::uint64_t checksum = hash64(std::span(bytes).first(kChecksumAt));
+  std::memcpy(bytes.data() + kChecksumAt, &checksum, sizeof checksum);
+  return bytes;
+}
+
+void ask_everything(const SurfelMap& map, const std::shared_ptr<const SurfelMap>& shared) {
+  std::vector<Ray> rays;
+  for (int i = 0; i < 24; ++i) {
+    const Vector3f direction(static_cast<float>(i % 3 - 1), static_cast<float>(i % 5 - 2),
+                             static_cast<float>(i % 7 - 3) + 0.1f);
+    rays.push_back({Vector3d(0.3, 0.1 * i, 0.0), direction.normalized(), 30.0f});
+  }
+  RayBatch batch;
+  batch.rays = rays;
+  batch.range_max = 30.0f;
+  std::vector<Hit> hits(rays.size());
+  make_renderer("beam", Scene{shared})->render(batch, hits, Executor(1));
+  std::size_t surfels = 0;
+  for (const Ray& ray : rays) surfels += map.nearest(ray.origin_world, 3.0) ? 1 : 0;
+  map.for_each_surfel([&](const Vector3d&, const Vector3d&, double, std::uint32_t) { ++surfels; });
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  static const std::vector<std::byte> good = good_map();
+  if (size == 0) return 0;
+  const bool edit = data[0] % 2 == 0;
+  const auto raw = std::as_bytes(std::span(data + 1, size - 1));
+  const std::vector<std::byte> bytes = edit ? edited(good, data + 1, size - 1)
+                                            : std::vector<std::byte>(raw.begin(), raw.end());
+  try {
+    const auto map = SurfelMap::from_bytes(bytes, "input");
+    ask_everything(*map, map);
+    map->verify();
+  } catch (const InputError&) {
+    return 0;
+  }
+  return 0;
+}
