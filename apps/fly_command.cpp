@@ -59,8 +59,11 @@ class FlySink : public SampleSink {
             : fmt::format("warning: collision at {:.3f} s, vehicle at ({:.2f}, {:.2f}, {:.2f}), "
                           "with the map at ({:.2f}, {:.2f}, {:.2f})",
                           to_seconds(event.time),
-                          event.vehicle_world.x(), event.vehicle_world.y(),
-                          event.vehicle_world.z(), event.place_world.x(), event.place_world.y(),
+                          event.vehicle_world.x(),
+                          event.vehicle_world.y(),
+                          event.vehicle_world.z(),
+                          event.place_world.x(),
+                          event.place_world.y(),
                           event.place_world.z()));
   }
 
@@ -111,8 +114,7 @@ void check_folder(const FlyFlags& flags) {
   if (fs::exists(flags.output, error) && !fs::is_directory(flags.output, error)) {
     throw InputError(fmt::format("{}: is a file; give a folder with -o", flags.output));
   }
-  if (!flags.force && fs::is_directory(flags.output, error) &&
-      !fs::is_empty(flags.output, error)) {
+  if (!flags.force && fs::is_directory(flags.output, error) && !fs::is_empty(flags.output, error)) {
     throw InputError(
         fmt::format("{}: is not empty; choose another folder or give --force", flags.output));
   }
@@ -122,8 +124,14 @@ void check_folder(const FlyFlags& flags) {
 void clear_earlier_run(const FlyFlags& flags) {
   std::error_code error;
   fs::remove_all(fs::path(flags.output) / "scans", error);
-  for (const char* name : {"summary.json", "timing.json", "overview.png", "trajectory.csv",
-                           "trajectory.tum", "imu.csv", "events.csv", "scans.csv"}) {
+  for (const char* name : {"summary.json",
+                           "timing.json",
+                           "overview.png",
+                           "trajectory.csv",
+                           "trajectory.tum",
+                           "imu.csv",
+                           "events.csv",
+                           "scans.csv"}) {
     fs::remove(fs::path(flags.output) / name, error);
   }
 }
@@ -142,17 +150,24 @@ void print_result(const FlyFlags& flags, const Simulation& simulation, double wa
   const RunSummary& s = simulation.summary();
   fmt::print("{}\n", flags.output);
   fmt::print("  end               {}\n", to_string(s.end));
-  fmt::print("  flown             {:.1f} m in {:.1f} s, up to {:.2f} m/s\n", s.distance_flown,
-             to_seconds(s.time), s.speed_max);
-  fmt::print("  scans             {}, {} points of {} beams\n", s.scans,
-             short_count(static_cast<double>(s.points)), short_count(static_cast<double>(s.beams)));
+  fmt::print("  flown             {:.1f} m in {:.1f} s, up to {:.2f} m/s\n",
+             s.distance_flown,
+             to_seconds(s.time),
+             s.speed_max);
+  fmt::print("  scans             {}, {} points of {} beams\n",
+             s.scans,
+             short_count(static_cast<double>(s.points)),
+             short_count(static_cast<double>(s.beams)));
   fmt::print("  closest approach  {}\n",
              s.closest_approach ? fmt::format("{:.2f} m at ({:.2f}, {:.2f}, {:.2f})",
-                                              *s.closest_approach, s.closest_place_world.x(),
-                                              s.closest_place_world.y(), s.closest_place_world.z())
+                                              *s.closest_approach,
+                                              s.closest_place_world.x(),
+                                              s.closest_place_world.y(),
+                                              s.closest_place_world.z())
                                 : std::string("over 10 m"));
   fmt::print("  collisions        {}\n", s.collisions);
-  fmt::print("  tracking error    {:.0f} mm RMS, {:.0f} mm at most\n", s.tracking_error_rms * 1e3,
+  fmt::print("  tracking error    {:.0f} mm RMS, {:.0f} mm at most\n",
+             s.tracking_error_rms * 1e3,
              s.tracking_error_max * 1e3);
   fmt::print("  real-time factor  {:.1f}\n", to_seconds(s.time) / wall);
   fmt::print("  picture           {}\n", (fs::path(flags.output) / "overview.png").string());
@@ -160,9 +175,12 @@ void print_result(const FlyFlags& flags, const Simulation& simulation, double wa
 
 int exit_code_of(RunEnd end) {
   switch (end) {
-    case RunEnd::kCompleted: return kDone;
-    case RunEnd::kInterrupted: return kInterrupted;
-    default: return kRanButFailed;
+    case RunEnd::kCompleted:
+      return kDone;
+    case RunEnd::kInterrupted:
+      return kInterrupted;
+    default:
+      return kRanButFailed;
   }
 }
 
@@ -215,7 +233,8 @@ void add_fly_command(CLI::App& parent, int& exit_code) {
   app->add_option("--threads", flags->threads, "0: all cores; results never depend on it")
       ->check(CLI::Range(0, 1024));
   app->add_flag("--force", flags->force, "Write into a folder that is not empty");
-  app->add_flag("--snapshot", flags->snapshot, "All beams of a scan from one pose, as in the paper");
+  app->add_flag(
+      "--snapshot", flags->snapshot, "All beams of a scan from one pose, as in the paper");
   app->callback([flags, &exit_code] { exit_code = fly(*flags); });
 }
 

@@ -20,7 +20,11 @@ void list_lidars() {
   for (const std::string& name : model_names("lidars")) {
     const LidarSettings s = load_lidar(name);
     fmt::print("{:<12}  {:<9} {:>5.1f} Hz  {:>5.1f} m  {}\n",
-               name, s.pattern, s.rate, s.range_max, s.title);
+               name,
+               s.pattern,
+               s.rate,
+               s.range_max,
+               s.title);
   }
 }
 
@@ -46,10 +50,17 @@ void show_lidar(const std::string& name) {
     rings.insert(beam.ring);
     last = std::max(last, beam.time_offset);
   }
-  fmt::print("# {}\n# first scan: {} beams over {:.2f} ms, {} rings or lines; azimuth {:.2f} to "
-             "{:.2f} deg, elevation {:.2f} to {:.2f} deg\n",
-             s.path, beams.size(), to_seconds(last) * 1e3, rings.size(), az_low / kDegree,
-             az_high / kDegree, el_low / kDegree, el_high / kDegree);
+  fmt::print(
+      "# {}\n# first scan: {} beams over {:.2f} ms, {} rings or lines; azimuth {:.2f} to "
+      "{:.2f} deg, elevation {:.2f} to {:.2f} deg\n",
+      s.path,
+      beams.size(),
+      to_seconds(last) * 1e3,
+      rings.size(),
+      az_low / kDegree,
+      az_high / kDegree,
+      el_low / kDegree,
+      el_high / kDegree);
   SettingsWriter writer;
   describe(writer, s);
   fmt::print("{}", writer.text());

@@ -18,9 +18,10 @@ int run(int argc, char** argv) {
   CLI::App app{"pointflight: a LiDAR drone in point-cloud maps of real places", "pointflight"};
   app.set_version_flag("--version", std::string("pointflight ") + pointflight::kVersion);
   app.require_subcommand(1);
-  app.footer("A first tour: pointflight map forest -o forest.pcd\n"
-             "              pointflight map import forest.pcd -o forest.pfmap\n"
-             "              pointflight fly forest.pfmap -o run");
+  app.footer(
+      "A first tour: pointflight map forest -o forest.pcd\n"
+      "              pointflight map import forest.pcd -o forest.pfmap\n"
+      "              pointflight fly forest.pfmap -o run");
   int exit_code = kDone;
   add_map_command(app, exit_code);
   add_scenario_command(app, exit_code);

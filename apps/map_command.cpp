@@ -32,14 +32,13 @@ struct ImportFlags {
 };
 
 void print_report(const ImportReport& r, const ImportOptions& options) {
-  log(fmt::format("points        {} read{}{}",
-                  short_count(static_cast<double>(r.points_read)),
-                  r.points_not_finite > 0
-                      ? fmt::format(", {} NaN or infinite dropped", r.points_not_finite)
-                      : "",
-                  r.points_out_of_reach > 0
-                      ? fmt::format(", {} too far away dropped", r.points_out_of_reach)
-                      : ""));
+  log(fmt::format(
+      "points        {} read{}{}",
+      short_count(static_cast<double>(r.points_read)),
+      r.points_not_finite > 0 ? fmt::format(", {} NaN or infinite dropped", r.points_not_finite)
+                              : "",
+      r.points_out_of_reach > 0 ? fmt::format(", {} too far away dropped", r.points_out_of_reach)
+                                : ""));
   const bool fine = r.spacing > 0.0 && r.resolution < 2.2 * r.spacing;
   log(fmt::format("resolution    {:.4g} m{}; point spacing {:.1f} mm{}",
                   r.resolution,
@@ -74,10 +73,11 @@ void import_map(const ImportFlags& flags) {
   options.outliers.enabled = !flags.keep_outliers;
   options.outliers.neighbours = flags.outlier_neighbours;
   options.outliers.sigmas = flags.outlier_sigmas;
+  OutputFile output(flags.output);  // first: a folder that is not there is said at once
   const Executor executor(flags.threads);
   const ImportedMap map = import_clouds(flags.inputs, options, executor, terminal_progress());
   end_progress();
-  write_map(flags.output, map.tree, map.description);
+  write_map(std::move(output), map.tree, map.description);
   if (!flags.outliers_out.empty()) {
     write_cloud_pcd(flags.outliers_out, map.outliers, map.report.has_intensity);
   }
@@ -90,26 +90,34 @@ void import_map(const ImportFlags& flags) {
 void add_import(CLI::App& parent) {
   auto* app = parent.add_subcommand("import", "Make a .pfmap from clouds or meshes");
   auto flags = std::make_shared<ImportFlags>();
-  app->add_option("inputs", flags->inputs,
-                  "Clouds or meshes: " + known_cloud_formats())->required();
+  app->add_option("inputs", flags->inputs, "Clouds or meshes: " + known_cloud_formats())
+      ->required();
   app->add_option("-o,--output", flags->output, "The .pfmap to write")->required();
-  app->add_option("--resolution", flags->resolution,
+  app->add_option("--resolution",
+                  flags->resolution,
                   "Voxel size r, m; without it the one that the points' spacing supports")
       ->check(CLI::Range(1e-4, 1e4));
   app->add_option("--scale", flags->scale, "Metres per unit of the files")
-      ->check(CLI::Range(1e-9, 1e9))->capture_default_str();
+      ->check(CLI::Range(1e-9, 1e9))
+      ->capture_default_str();
   app->add_option("--up", flags->up, "The files' up axis; y is turned to z")
-      ->check(CLI::IsMember({"y", "z"}))->capture_default_str();
-  app->add_flag("--keep-outliers", flags->keep_outliers,
+      ->check(CLI::IsMember({"y", "z"}))
+      ->capture_default_str();
+  app->add_flag("--keep-outliers",
+                flags->keep_outliers,
                 "No outlier removal (thin wires, very uneven clouds)");
-  app->add_option("--outlier-neighbours", flags->outlier_neighbours,
+  app->add_option("--outlier-neighbours",
+                  flags->outlier_neighbours,
                   "Cells that a cell's distance is measured to")
-      ->check(CLI::Range(1, 100))->capture_default_str();
-  app->add_option("--outlier-sigmas", flags->outlier_sigmas,
+      ->check(CLI::Range(1, 100))
+      ->capture_default_str();
+  app->add_option("--outlier-sigmas",
+                  flags->outlier_sigmas,
                   "A cell goes if it is this many deviations farther than the mean")
-      ->check(CLI::Range(0.0, 1e6))->capture_default_str();
-  app->add_option("--export-outliers", flags->outliers_out,
-                  "Write the dropped cells as a PCD cloud");
+      ->check(CLI::Range(0.0, 1e6))
+      ->capture_default_str();
+  app->add_option(
+      "--export-outliers", flags->outliers_out, "Write the dropped cells as a PCD cloud");
   app->add_option("--threads", flags->threads, "0: all cores")->check(CLI::Range(0, 1024));
   app->callback([flags] { import_map(*flags); });
 }
@@ -159,9 +167,15 @@ void print_info(const SurfelMap& map, const InfoFlags& flags) {
   fmt::print("  surfels     {}, {:.0f} % planar\n", surfels, 100.0 * planar_share);
   fmt::print("  resolution  {:.4g} m\n", map.resolution());
   fmt::print("  extent      {:.2f} x {:.2f} x {:.2f} m, from ({:.2f}, {:.2f}, {:.2f})\n",
-             b.size().x(), b.size().y(), b.size().z(), b.min.x(), b.min.y(), b.min.z());
+             b.size().x(),
+             b.size().y(),
+             b.size().z(),
+             b.min.x(),
+             b.min.y(),
+             b.min.z());
   fmt::print("  size        {:.1f} MB, {:.1f} bytes a surfel\n",
-             static_cast<double>(map.file_size()) * 1e-6, bytes_each);
+             static_cast<double>(map.file_size()) * 1e-6,
+             bytes_each);
   fmt::print("  intensity   {}\n", map.has_intensity() ? "yes" : "no");
   if (flags.verify) fmt::print("  checksums   match\n");
   fmt::print("  made\n");
@@ -216,13 +230,17 @@ void add_forest(CLI::App& parent) {
   app->add_option("--size-x", o.size_x, "m")->check(CLI::Range(5.0, 1000.0))->capture_default_str();
   app->add_option("--size-y", o.size_y, "m")->check(CLI::Range(5.0, 1000.0))->capture_default_str();
   app->add_option("--trees", o.trees_per_hectare, "Trees a hectare")
-      ->check(CLI::Range(0.0, 10000.0))->capture_default_str();
+      ->check(CLI::Range(0.0, 10000.0))
+      ->capture_default_str();
   app->add_option("--spacing", o.min_spacing, "Least distance between trunks, m")
-      ->check(CLI::Range(0.0, 100.0))->capture_default_str();
+      ->check(CLI::Range(0.0, 100.0))
+      ->capture_default_str();
   app->add_option("--density", flags->density, "Points a square metre of surface")
-      ->check(CLI::Range(1.0, 1e6))->capture_default_str();
+      ->check(CLI::Range(1.0, 1e6))
+      ->capture_default_str();
   app->add_option("--noise", flags->noise, "Deviation of the points from the surface, m")
-      ->check(CLI::Range(0.0, 1.0))->capture_default_str();
+      ->check(CLI::Range(0.0, 1.0))
+      ->capture_default_str();
   app->add_option("--seed", o.seed, "Another seed, another forest")->capture_default_str();
   app->callback([flags] { make_forest_cloud(*flags); });
 }

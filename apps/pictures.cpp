@@ -30,8 +30,11 @@ constexpr Color kNight{0.07, 0.07, 0.1};
 
 /// Viridis-like scale from dark blue over green to yellow: equal steps look equal, in grey too.
 Color ramp(double share) {
-  constexpr Color kStops[] = {{0.267, 0.005, 0.329}, {0.231, 0.318, 0.545}, {0.129, 0.569, 0.549},
-                              {0.369, 0.788, 0.384}, {0.993, 0.906, 0.144}};
+  constexpr Color kStops[] = {{0.267, 0.005, 0.329},
+                              {0.231, 0.318, 0.545},
+                              {0.129, 0.569, 0.549},
+                              {0.369, 0.788, 0.384},
+                              {0.993, 0.906, 0.144}};
   const double at = std::clamp(share, 0.0, 1.0) * 4.0;
   const int i = std::min(3, static_cast<int>(at));
   const double f = at - i;
@@ -119,8 +122,7 @@ class Canvas {
     const auto status = cairo_surface_write_to_png_stream(surface_, append, &png);
     if (png.error) std::rethrow_exception(png.error);
     if (status != CAIRO_STATUS_SUCCESS) {
-      throw InputError(
-          fmt::format("{}: cannot draw: {}", path, cairo_status_to_string(status)));
+      throw InputError(fmt::format("{}: cannot draw: {}", path, cairo_status_to_string(status)));
     }
     png.file.commit();
   }
@@ -188,7 +190,7 @@ std::pair<double, double> height_range(const SurfelMap& map) {
 Page lay_out(const SurfelMap& map, double header) {
   constexpr double kMargin = 46.0;
   constexpr double kGap = 44.0;
-  constexpr double kWide = 1100.0;   // most room for the views, pixels
+  constexpr double kWide = 1100.0;  // most room for the views, pixels
   constexpr double kTall = 1100.0;
   const Aabb& bounds = map.bounds_world();
   const Vector3d size = bounds.empty() ? Vector3d(1, 1, 1) : bounds.size().cwiseMax(0.5);
@@ -209,13 +211,12 @@ Page lay_out(const SurfelMap& map, double header) {
 void draw_surfels(Canvas& canvas, const SurfelMap& map, const Page& page, bool pale) {
   std::vector<Vector3d> centers;
   centers.reserve(map.surfel_count());
-  map.for_each_surfel([&](const Vector3d& p, const Vector3d&, double, std::uint32_t) {
-    centers.push_back(p);
-  });
+  map.for_each_surfel(
+      [&](const Vector3d& p, const Vector3d&, double, std::uint32_t) { centers.push_back(p); });
   std::sort(centers.begin(), centers.end(), [](const Vector3d& a, const Vector3d& b) {
     return a.z() < b.z();
   });
-  const int thick = std::max(1, static_cast<int>(map.resolution() * page.top.scale + 0.5));
+  const int thick = std::max(1, static_cast<int>(std::lround(map.resolution() * page.top.scale)));
   canvas.begin_pixels();
   for (const View* view : {&page.top, &page.side}) {
     for (const Vector3d& p : centers) {
@@ -257,18 +258,19 @@ void draw_map(const SurfelMap& map, const std::string& title, const std::string&
   Canvas canvas(page.width, page.height, kPaper);
   canvas.text(page.top.left, 30.0, title, 19.0, kInk);
   const Vector3d size = map.bounds_world().size();
-  canvas.text(page.top.left,
-              52.0,
-              fmt::format("{} surfels at {} m, {:.1f} x {:.1f} x {:.1f} m; height {:.1f} to {:.1f} m",
-                          map.surfel_count(),
-                          map.resolution(),
-                          size.x(),
-                          size.y(),
-                          size.z(),
-                          page.z_low,
-                          page.z_high),
-              13.0,
-              kInk);
+  canvas.text(
+      page.top.left,
+      52.0,
+      fmt::format("{} surfels at {} m, {:.1f} x {:.1f} x {:.1f} m; height {:.1f} to {:.1f} m",
+                  map.surfel_count(),
+                  map.resolution(),
+                  size.x(),
+                  size.y(),
+                  size.z(),
+                  page.z_low,
+                  page.z_high),
+      13.0,
+      kInk);
   for (int i = 0; i < 120; ++i) {
     canvas.box(page.width - 170.0 + i, 22.0, 1.5, 10.0, ramp(i / 119.0));
   }
@@ -306,7 +308,8 @@ void draw_scan(const std::vector<Beam>& beams,
                 kPaper);
   canvas.box(kMargin, kHeader, wide * scale, tall * scale, kNight);
   const double size = std::clamp(
-      0.6 * scale * std::sqrt(wide * tall / static_cast<double>(std::max<std::size_t>(1, beams.size()))),
+      0.6 * scale *
+          std::sqrt(wide * tall / static_cast<double>(std::max<std::size_t>(1, beams.size()))),
       1.0,
       4.0);
 
@@ -326,19 +329,20 @@ void draw_scan(const std::vector<Beam>& beams,
                size,
                ramp(1.0 - share));
   }
-  canvas.text(kMargin,
-              28.0,
-              fmt::format("{}: {} of {} beams returned", lidar.title, scan.points.size(),
-                          beams.size()),
-              16.0,
-              kInk);
-  canvas.text(kMargin,
-              48.0,
-              fmt::format("range {:.2f} m (bright) to {:.2f} m (dark), logarithmic; left is +azimuth",
-                          near_range,
-                          far_range),
-              12.0,
-              kDim);
+  canvas.text(
+      kMargin,
+      28.0,
+      fmt::format("{}: {} of {} beams returned", lidar.title, scan.points.size(), beams.size()),
+      16.0,
+      kInk);
+  canvas.text(
+      kMargin,
+      48.0,
+      fmt::format("range {:.2f} m (bright) to {:.2f} m (dark), logarithmic; left is +azimuth",
+                  near_range,
+                  far_range),
+      12.0,
+      kDim);
   for (int i = 0; i <= 4; ++i) {
     const double az = az_high - wide * i / 4.0;
     const double el = el_high - tall * i / 4.0;
@@ -347,11 +351,17 @@ void draw_scan(const std::vector<Beam>& beams,
                 fmt::format("{:.0f}°", az / kDegree),
                 11.0,
                 kInk);
-    canvas.text(6.0, kHeader + (el_high - el) * scale + 4.0, fmt::format("{:.1f}°", el / kDegree),
-                11.0, kInk);
+    canvas.text(6.0,
+                kHeader + (el_high - el) * scale + 4.0,
+                fmt::format("{:.1f}°", el / kDegree),
+                11.0,
+                kInk);
   }
-  canvas.text(kMargin + wide * scale / 2 - 60.0, kHeader + tall * scale + 36.0,
-              "azimuth; elevation upwards", 11.0, kDim);
+  canvas.text(kMargin + wide * scale / 2 - 60.0,
+              kHeader + tall * scale + 36.0,
+              "azimuth; elevation upwards",
+              11.0,
+              kDim);
   canvas.save(path);
 }
 
@@ -410,14 +420,13 @@ void draw_overview(const SurfelMap& map,
       canvas.line({{x - 7, y + 7}, {x + 7, y - 7}}, 3.0, kPath);
     }
   }
-  canvas.text(page.top.left,
-              30.0,
-              fmt::format("{:.1f} m flown in {:.1f} s, {}",
-                          s.distance_flown,
-                          to_seconds(s.time),
-                          to_string(s.end)),
-              19.0,
-              kInk);
+  canvas.text(
+      page.top.left,
+      30.0,
+      fmt::format(
+          "{:.1f} m flown in {:.1f} s, {}", s.distance_flown, to_seconds(s.time), to_string(s.end)),
+      19.0,
+      kInk);
   canvas.text(page.top.left,
               52.0,
               fmt::format("{} scans, {:.2f} M points; closest approach {}; {} collision{}",

@@ -45,9 +45,9 @@ Pose parse_pose(const std::string& text) {
     numbers.push_back(value);
   }
   if (numbers.size() != 6) {
-    throw InputError(fmt::format(
-        "--pose: {} numbers; six are wanted: x,y,z,roll,pitch,yaw (metres, degrees)",
-        numbers.size()));
+    throw InputError(
+        fmt::format("--pose: {} numbers; six are wanted: x,y,z,roll,pitch,yaw (metres, degrees)",
+                    numbers.size()));
   }
   return {quaternion_from_rpy(numbers[3] * kDegree, numbers[4] * kDegree, numbers[5] * kDegree),
           {numbers[0], numbers[1], numbers[2]}};
@@ -58,9 +58,9 @@ void print_scan(const Scan& scan, const ScanFlags& flags) {
   for (const ScanPoint& point : scan.points) ranges.push_back(point.range);
   std::sort(ranges.begin(), ranges.end());
   const auto at = [&](double share) {
-    return ranges.empty() ? 0.0f
-                          : ranges[static_cast<std::size_t>(share * static_cast<double>(
-                                                                        ranges.size() - 1))];
+    return ranges.empty()
+               ? 0.0f
+               : ranges[static_cast<std::size_t>(share * static_cast<double>(ranges.size() - 1))];
   };
   if (flags.json) {
     nlohmann::ordered_json json;
@@ -77,7 +77,11 @@ void print_scan(const Scan& scan, const ScanFlags& flags) {
     return;
   }
   fmt::print("{} of {} beams returned; range {:.2f} to {:.2f} m, median {:.2f} m\n",
-             scan.points.size(), scan.beams, at(0.0), at(1.0), at(0.5));
+             scan.points.size(),
+             scan.beams,
+             at(0.0),
+             at(1.0),
+             at(0.5));
 }
 
 void take_scan(const ScanFlags& flags) {
@@ -94,7 +98,8 @@ void take_scan(const ScanFlags& flags) {
   const Scan scan = lidar.take(
       request, [&](SimTime) { return pose; }, *renderer, executor);
   if (scan.points.empty()) {
-    log("no beam met anything: is the pose inside the map? (pointflight map info shows its extent)");
+    log("no beam met anything: is the pose inside the map? (pointflight map info shows its "
+        "extent)");
   }
   if (!flags.output.empty()) write_scan_pcd(flags.output, scan);
   if (!flags.png.empty()) draw_scan(lidar.beams(flags.index, executor), scan, settings, flags.png);
@@ -109,15 +114,18 @@ void add_scan_command(CLI::App& parent, int& /*exit_code*/) {
   app->add_option("map", flags->map, "A .pfmap")->required();
   app->add_option("--lidar", flags->lidar, "A shipped sensor or a .yaml file")
       ->capture_default_str();
-  app->add_option("--pose", flags->pose,
-                  "x,y,z,roll,pitch,yaw of the sensor in the world: metres, degrees")->required();
+  app->add_option(
+         "--pose", flags->pose, "x,y,z,roll,pitch,yaw of the sensor in the world: metres, degrees")
+      ->required();
   app->add_option("--renderer", flags->renderer, "How points are made")
-      ->check(CLI::IsMember(renderer_names()))->capture_default_str();
+      ->check(CLI::IsMember(renderer_names()))
+      ->capture_default_str();
   app->add_option("--seed", flags->seed, "Of the noise")->capture_default_str();
   app->add_option("--index", flags->index, "Which scan of a pattern that does not repeat")
       ->check(CLI::Range(0, 1 << 30));
   app->add_flag("--no-noise", flags->no_noise, "Exact ranges");
-  app->add_option("-o,--output", flags->output,
+  app->add_option("-o,--output",
+                  flags->output,
                   "PCD of the points in the sensor frame: x y z intensity range time ring");
   app->add_option("--png", flags->png, "Picture: range over azimuth and elevation");
   app->add_flag("--json", flags->json, "JSON on stdout");

@@ -23,9 +23,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
-double rounded(double value) { return std::round(value * 100.0) / 100.0; }
+double rounded(double value) {
+  return std::round(value * 100.0) / 100.0;
+}
 
-Vector3d rounded(const Vector3d& v) { return {rounded(v.x()), rounded(v.y()), rounded(v.z())}; }
+Vector3d rounded(const Vector3d& v) {
+  return {rounded(v.x()), rounded(v.y()), rounded(v.z())};
+}
 
 struct NewFlags {
   std::string map;
@@ -44,12 +48,15 @@ void new_scenario(const NewFlags& flags) {
   const Scenario scenario = make_scenario(
       flags.map, map_key, flags.lidar, flags.vehicle, flags.length, flags.speed, executor);
   OutputFile file(flags.output);
-  file.write("# A pointflight scenario; every key: docs/scenario.md, or pointflight scenario keys\n" +
-             scenario_yaml(scenario));
+  file.write(
+      "# A pointflight scenario; every key: docs/scenario.md, or pointflight scenario keys\n" +
+      scenario_yaml(scenario));
   file.commit();
   const Mission mission(scenario.vehicle.start, 0.0, scenario.mission);
   log(fmt::format("{} waypoints, {:.0f} m; fly it: pointflight fly {} -o run",
-                  scenario.mission.waypoints.size(), mission.length(), flags.output));
+                  scenario.mission.waypoints.size(),
+                  mission.length(),
+                  flags.output));
   fmt::print("{}\n", flags.output);
 }
 
@@ -59,8 +66,10 @@ void check_scenario(const std::string& path) {
   const Executor executor;
   const Simulation simulation(scenario, map, executor);
   warn_about(scenario, *map);
-  fmt::print("{}: ready: {} waypoints, {:.1f} m, {:.1f} s\n", path,
-             scenario.mission.waypoints.size(), simulation.mission().length(),
+  fmt::print("{}: ready: {} waypoints, {:.1f} m, {:.1f} s\n",
+             path,
+             scenario.mission.waypoints.size(),
+             simulation.mission().length(),
              to_seconds(simulation.end_time()));
 }
 
@@ -90,7 +99,8 @@ Scenario make_scenario(const std::string& map_path,
     throw InputError(fmt::format(
         "{}: no free place for a vehicle of radius {:.2f} m was found; write vehicle.start and "
         "mission.waypoints yourself",
-        map_path, airframe.radius));
+        map_path,
+        airframe.radius));
   }
   Scenario scenario;
   scenario.map = map_key;
@@ -113,9 +123,11 @@ void warn_about(const Scenario& scenario, const SurfelMap& map) {
     const Vector3d& to = scenario.mission.waypoints[i];
     const double free = clearance_along(map, from, to, radius, 1.0);
     if (free <= 0.0) {
-      log(fmt::format("{}: warning: the leg to waypoint {} passes through the map; a collision is "
+      log(
+          fmt::format("{}: warning: the leg to waypoint {} passes through the map; a collision is "
                       "likely",
-                      scenario.place(fmt::format("mission.waypoints[{}]", i)), i + 1));
+                      scenario.place(fmt::format("mission.waypoints[{}]", i)),
+                      i + 1));
     }
     from = to;
   }
@@ -131,8 +143,10 @@ void add_scenario_command(CLI::App& parent, int& /*exit_code*/) {
   make->add_option("--lidar", flags->lidar, "A shipped sensor")->capture_default_str();
   make->add_option("--vehicle", flags->vehicle, "A shipped vehicle")->capture_default_str();
   make->add_option("--length", flags->length, "Of the mission, where the map allows, m")
-      ->check(CLI::Range(1.0, 1e5))->capture_default_str();
-  make->add_option("--speed", flags->speed, "m/s")->check(CLI::Range(0.1, 30.0))
+      ->check(CLI::Range(1.0, 1e5))
+      ->capture_default_str();
+  make->add_option("--speed", flags->speed, "m/s")
+      ->check(CLI::Range(0.1, 30.0))
       ->capture_default_str();
   make->callback([flags] { new_scenario(*flags); });
 

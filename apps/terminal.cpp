@@ -5,6 +5,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <csignal>
 #include <memory>
 
@@ -14,7 +15,9 @@ namespace {
 std::atomic<bool> progress_line_open{false};
 volatile std::sig_atomic_t interrupt_seen = 0;
 
-extern "C" void on_interrupt(int /*signal*/) { interrupt_seen = 1; }
+extern "C" void on_interrupt(int /*signal*/) {
+  interrupt_seen = 1;
+}
 
 }  // namespace
 
@@ -31,7 +34,7 @@ Progress terminal_progress() {
   return [state](std::string_view what, double share) {
     const auto now = Clock::now();
     if (now - state->start < std::chrono::seconds(1)) return;
-    const int percent = static_cast<int>(share * 100.0 + 0.5);
+    const int percent = static_cast<int>(std::lround(share * 100.0));
     if (state->terminal) {
       if (now - state->last < std::chrono::milliseconds(100)) return;
       state->last = now;
@@ -66,6 +69,8 @@ void catch_interrupts() {
   std::signal(SIGTERM, on_interrupt);
 }
 
-bool interrupted() { return interrupt_seen != 0; }
+bool interrupted() {
+  return interrupt_seen != 0;
+}
 
 }  // namespace pointflight::apps

@@ -20,7 +20,6 @@ void log(std::string_view text);
 /// "1.2 M", "34 k", "567".
 std::string short_count(double count);
 
-
 /// True after SIGINT or SIGTERM. `catch_interrupts` installs the handlers.
 void catch_interrupts();
 bool interrupted();

@@ -46,7 +46,7 @@ struct Bench {
     ImportOptions options;
     options.resolution = 0.05;
     const ImportedMap imported = import_clouds({cloud}, options, Executor(threads));
-    write_map(map_path, imported.tree, imported.description);
+    write_map(OutputFile(map_path), imported.tree, imported.description);
   }
 };
 
@@ -71,10 +71,26 @@ void scan(benchmark::State& state, const char* lidar_name, const char* renderer_
   }
   state.SetItemsProcessed(static_cast<std::int64_t>(beams));
 }
-BENCHMARK_CAPTURE(scan, mid360_beam, "mid360", "beam")->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(scan, mid360_paper, "mid360", "paper")->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(scan, grid_beam, "marsim_grid", "beam")->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(scan, grid_paper, "marsim_grid", "paper")->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(scan, mid360_beam, "mid360", "beam")
+    ->Arg(1)
+    ->Arg(2)
+    ->UseRealTime()
+    ->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(scan, mid360_paper, "mid360", "paper")
+    ->Arg(1)
+    ->Arg(2)
+    ->UseRealTime()
+    ->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(scan, grid_beam, "marsim_grid", "beam")
+    ->Arg(1)
+    ->Arg(2)
+    ->UseRealTime()
+    ->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(scan, grid_paper, "marsim_grid", "paper")
+    ->Arg(1)
+    ->Arg(2)
+    ->UseRealTime()
+    ->Unit(benchmark::kMillisecond);
 
 void pattern(benchmark::State& state) {
   const Lidar lidar(load_lidar("mid360"), 0);
@@ -88,7 +104,8 @@ void nearest(benchmark::State& state) {
   const RandomStream random(1, StreamId::kTest, 0);
   std::uint64_t i = 0;
   for (auto _ : state) {
-    const Vector3d p(random.uniform(3 * i, 5, 55), random.uniform(3 * i + 1, 5, 55),
+    const Vector3d p(random.uniform(3 * i, 5, 55),
+                     random.uniform(3 * i + 1, 5, 55),
                      random.uniform(3 * i + 2, 0.5, 4));
     benchmark::DoNotOptimize(bench().map->nearest(p, 10.0));
     ++i;
@@ -107,7 +124,12 @@ void import_cloud(benchmark::State& state) {
   for (auto _ : state) bench().import(static_cast<int>(state.range(0)));
   state.SetItemsProcessed(static_cast<std::int64_t>(bench().points) * state.iterations());
 }
-BENCHMARK(import_cloud)->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond)->Iterations(1);
+BENCHMARK(import_cloud)
+    ->Arg(1)
+    ->Arg(2)
+    ->UseRealTime()
+    ->Unit(benchmark::kMillisecond)
+    ->Iterations(1);
 
 void physics_step(benchmark::State& state) {
   const VehicleSettings settings = load_vehicle("quad_330");

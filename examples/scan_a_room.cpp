@@ -21,13 +21,14 @@ int main() try {
   ImportOptions options;
   options.resolution = 0.05;
   const ImportedMap imported = import_clouds({"room.pcd"}, options, executor);
-  write_map("room.pfmap", imported.tree, imported.description);
+  write_map(OutputFile("room.pfmap"), imported.tree, imported.description);
 
   const auto map = SurfelMap::open("room.pfmap");
   const auto renderer = make_renderer("beam", Scene{map});
   const Lidar lidar(load_lidar("mid360"), 0);
   const Pose pose{Quaterniond::Identity(), {2, 3, 1.5}};
-  const Scan scan = lidar.take(ScanRequest{}, [&](SimTime) { return pose; }, *renderer, executor);
+  const Scan scan = lidar.take(
+      ScanRequest{}, [&](SimTime) { return pose; }, *renderer, executor);
   std::printf("%zu of %zu beams returned\n", scan.points.size(), scan.beams);
   return scan.points.size() > scan.beams * 9 / 10 ? 0 : 1;
 } catch (const std::exception& error) {

@@ -25,8 +25,10 @@ int main() try {
   while (simulation.step(sink)) {
   }
   const RunSummary& summary = simulation.summary();
-  std::printf("%s: %.1f m flown, nearest return %.2f m\n", to_string(summary.end),
-              summary.distance_flown, static_cast<double>(sink.nearest));
+  std::printf("%s: %.1f m flown, nearest return %.2f m\n",
+              to_string(summary.end),
+              summary.distance_flown,
+              static_cast<double>(sink.nearest));
   return summary.end == RunEnd::kCompleted ? 0 : 1;
 } catch (const std::exception& error) {
   std::fprintf(stderr, "%s\n", error.what());

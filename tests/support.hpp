@@ -64,7 +64,7 @@ inline void expect_contains(const std::string& text, const std::string& part) {
   EXPECT_NE(text.find(part), std::string::npos) << "'" << part << "' is not in: " << text;
 }
 
-#define SKIP_WITHOUT(path)                                                        \
+#define SKIP_WITHOUT(path) \
   if ((path).empty()) GTEST_SKIP() << "the shared data is absent: nothing to check against"
 
 }  // namespace pointflight::testing

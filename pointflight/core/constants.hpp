@@ -5,7 +5,8 @@ namespace pointflight {
 inline constexpr double kPi = 3.14159265358979323846;
 inline constexpr double kDegree = kPi / 180.0;  ///< One degree in radians.
 
-/// Standard gravity as the dynamics use it, m/s^2. One value everywhere: dynamics, IMU, controllers.
+/// Standard gravity as the dynamics use it, m/s^2. One value everywhere: dynamics, IMU,
+/// controllers.
 inline constexpr double kGravity = 9.81;
 
 /// Air density at sea level, 15 deg C (ISO 2533), kg/m^3.

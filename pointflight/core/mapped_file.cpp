@@ -15,7 +15,9 @@
 namespace pointflight {
 namespace {
 
-std::string error_text(int error) { return std::generic_category().message(error); }
+std::string error_text(int error) {
+  return std::generic_category().message(error);
+}
 
 }  // namespace
 

@@ -10,15 +10,33 @@
 /// tools/check_source.sh holds it. All within 1.0 ULP.
 namespace pointflight::math {
 
-inline double sin(double x) { return Sleef_cinz_sind1_u10purec(x); }
-inline double cos(double x) { return Sleef_cinz_cosd1_u10purec(x); }
-inline double tan(double x) { return Sleef_cinz_tand1_u10purec(x); }
-inline double asin(double x) { return Sleef_cinz_asind1_u10purec(x); }
-inline double acos(double x) { return Sleef_cinz_acosd1_u10purec(x); }
-inline double atan2(double y, double x) { return Sleef_cinz_atan2d1_u10purec(y, x); }
-inline double exp(double x) { return Sleef_cinz_expd1_u10purec(x); }
-inline double log(double x) { return Sleef_cinz_logd1_u10purec(x); }
-inline double pow(double x, double y) { return Sleef_cinz_powd1_u10purec(x, y); }
+inline double sin(double x) {
+  return Sleef_cinz_sind1_u10purec(x);
+}
+inline double cos(double x) {
+  return Sleef_cinz_cosd1_u10purec(x);
+}
+inline double tan(double x) {
+  return Sleef_cinz_tand1_u10purec(x);
+}
+inline double asin(double x) {
+  return Sleef_cinz_asind1_u10purec(x);
+}
+inline double acos(double x) {
+  return Sleef_cinz_acosd1_u10purec(x);
+}
+inline double atan2(double y, double x) {
+  return Sleef_cinz_atan2d1_u10purec(y, x);
+}
+inline double exp(double x) {
+  return Sleef_cinz_expd1_u10purec(x);
+}
+inline double log(double x) {
+  return Sleef_cinz_logd1_u10purec(x);
+}
+inline double pow(double x, double y) {
+  return Sleef_cinz_powd1_u10purec(x, y);
+}
 
 struct SinCos {
   double sin;

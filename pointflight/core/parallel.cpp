@@ -26,14 +26,11 @@ Executor::Executor(int threads)
     : threads_(threads > 0 ? threads : tbb::info::default_concurrency()),
       arena_(std::make_unique<Arena>(threads_)) {}
 
-void Executor::parallel_for(
-    std::size_t count,
-    std::size_t chunk,
-    const std::function<void(std::size_t, std::size_t)>& body) const {
+void Executor::parallel_for(std::size_t count,
+                            std::size_t chunk,
+                            const std::function<void(std::size_t, std::size_t)>& body) const {
   const std::size_t chunks = (count + chunk - 1) / chunk;
-  const auto run_chunk = [&](std::size_t i) {
-    body(i * chunk, std::min(count, (i + 1) * chunk));
-  };
+  const auto run_chunk = [&](std::size_t i) { body(i * chunk, std::min(count, (i + 1) * chunk)); };
   if (threads_ == 1 || chunks <= 1) {
     for (std::size_t i = 0; i < chunks; ++i) run_chunk(i);
     return;
@@ -49,10 +46,9 @@ Executor::Executor(int threads)
     : threads_(threads > 0 ? threads
                            : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()))) {}
 
-void Executor::parallel_for(
-    std::size_t count,
-    std::size_t chunk,
-    const std::function<void(std::size_t, std::size_t)>& body) const {
+void Executor::parallel_for(std::size_t count,
+                            std::size_t chunk,
+                            const std::function<void(std::size_t, std::size_t)>& body) const {
   const std::size_t chunks = (count + chunk - 1) / chunk;
   std::atomic<std::size_t> next{0};
   std::atomic<bool> failed{false};

@@ -6,7 +6,8 @@
 
 namespace pointflight {
 
-/// Runs loops on a fixed number of threads (oneTBB inside; std::jthread under the thread sanitizer).
+/// Runs loops on a fixed number of threads (oneTBB inside; std::jthread under the thread
+/// sanitizer).
 ///
 /// Chunk boundaries depend on the data only and each chunk writes to its own places, so results
 /// never depend on the number of threads.
@@ -20,8 +21,8 @@ class Executor {
 
   [[nodiscard]] int threads() const { return threads_; }
 
-  /// Calls `body(begin, end)` for the chunks [0, chunk), [chunk, 2 chunk), ... of [0, count), in any
-  /// order and in parallel, and returns when all are done. An exception of a chunk is rethrown.
+  /// Calls `body(begin, end)` for the chunks [0, chunk), [chunk, 2 chunk), ... of [0, count), in
+  /// any order and in parallel, and returns when all are done. An exception of a chunk is rethrown.
   void parallel_for(std::size_t count,
                     std::size_t chunk,
                     const std::function<void(std::size_t begin, std::size_t end)>& body) const;

@@ -8,16 +8,16 @@ namespace pointflight {
 /// What a random draw is for. The list only grows and numbers are never reused: a draw's address is
 /// part of every recorded result.
 enum class StreamId : std::uint32_t {
-  kLidarRangeNoise = 1,   ///< index: scan << 32 | beam
-  kImuGyroNoise = 2,      ///< index: sample * 3 + axis
-  kImuGyroBias = 3,       ///< index: sample * 3 + axis
-  kImuAccelNoise = 4,     ///< index: sample * 3 + axis
-  kImuAccelBias = 5,      ///< index: sample * 3 + axis
-  kForest = 6,            ///< layout of the parametric forest; index: draw number
-  kCloudSampling = 7,     ///< points on analytic shapes; entity: shape, index: point
-  kMissionSearch = 8,     ///< candidate places in `scenario new`; index: candidate
-  kSpacingSample = 9,     ///< which blocks of a cloud measure its point spacing; index: block key
-  kTest = 1000,           ///< inputs of tests and benchmarks
+  kLidarRangeNoise = 1,  ///< index: scan << 32 | beam
+  kImuGyroNoise = 2,     ///< index: sample * 3 + axis
+  kImuGyroBias = 3,      ///< index: sample * 3 + axis
+  kImuAccelNoise = 4,    ///< index: sample * 3 + axis
+  kImuAccelBias = 5,     ///< index: sample * 3 + axis
+  kForest = 6,           ///< layout of the parametric forest; index: draw number
+  kCloudSampling = 7,    ///< points on analytic shapes; entity: shape, index: point
+  kMissionSearch = 8,    ///< candidate places in `scenario new`; index: candidate
+  kSpacingSample = 9,    ///< which blocks of a cloud measure its point spacing; index: block key
+  kTest = 1000,          ///< inputs of tests and benchmarks
 };
 
 /// Random numbers addressed by (seed, stream, entity, index): Philox 4x32-10 as a pure function.

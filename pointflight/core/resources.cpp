@@ -55,12 +55,13 @@ std::string find_model(const std::string& kind,
   if (fs::is_regular_file(path, error)) return path;
   const auto known = model_names(kind);
   const std::string guess = closest_word(name_or_path, known);
-  throw InputError(fmt::format("'{}' is not among the shipped {} ({}){}; give one of them or the "
-                               "path of a .yaml file",
-                               name_or_path,
-                               kind,
-                               fmt::join(known, ", "),
-                               guess.empty() ? "" : fmt::format(", did you mean '{}'?", guess)));
+  throw InputError(
+      fmt::format("'{}' is not among the shipped {} ({}){}; give one of them or the "
+                  "path of a .yaml file",
+                  name_or_path,
+                  kind,
+                  fmt::join(known, ", "),
+                  guess.empty() ? "" : fmt::format(", did you mean '{}'?", guess)));
 }
 
 }  // namespace pointflight

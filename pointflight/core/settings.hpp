@@ -14,7 +14,8 @@
 
 namespace pointflight {
 
-/// One key of a settings file, for the reader, the generated documentation and the written template.
+/// One key of a settings file, for the reader, the generated documentation and the written
+/// template.
 struct Key {
   std::string_view name;
   std::string_view unit;  ///< "m", "deg", "" for pure numbers and text.

@@ -87,10 +87,8 @@ struct SettingsReader::Document {
     try {
       root = YAML::Load(std::string(text));
     } catch (const YAML::Exception& error) {
-      throw InputError(fmt::format("{}:{}: not valid YAML: {}",
-                                   name,
-                                   std::max(0, error.mark.line) + 1,
-                                   error.msg));
+      throw InputError(fmt::format(
+          "{}:{}: not valid YAML: {}", name, std::max(0, error.mark.line) + 1, error.msg));
     }
     if (!root.IsMap()) {
       throw InputError(fmt::format("{}: expected `key: value` lines at the top level", name));
@@ -143,10 +141,8 @@ struct SettingsReader::Document {
     if (parsed < key.min || parsed > key.max) {
       fail(node,
            full_name(key),
-           fmt::format("{} is out of range; give a number{} {}",
-                       text,
-                       unit_text(key),
-                       range_text(key)));
+           fmt::format(
+               "{} is out of range; give a number{} {}", text, unit_text(key), range_text(key)));
     }
     return parsed;
   }
@@ -232,7 +228,9 @@ void SettingsReader::enter_item(std::size_t index) {
   document_->push(item, path + ".");
 }
 
-void SettingsReader::leave_list() { document_->list = YAML::Node(); }
+void SettingsReader::leave_list() {
+  document_->list = YAML::Node();
+}
 
 void SettingsReader::value(const Key& key, double& value) {
   if (const auto node = document_->find(key)) {
@@ -259,9 +257,8 @@ void SettingsReader::value(const Key& key, bool& value) {
   if (!node) return;
   const std::string text = node->IsScalar() ? node->Scalar() : "a list or section";
   if (text != "true" && text != "false") {
-    document_->fail(*node,
-                    document_->full_name(key),
-                    fmt::format("expected true or false, found '{}'", text));
+    document_->fail(
+        *node, document_->full_name(key), fmt::format("expected true or false, found '{}'", text));
   }
   value = text == "true";
 }

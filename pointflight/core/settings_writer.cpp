@@ -41,11 +41,15 @@ void SettingsWriter::line(const Key& key, const std::string& value, const std::s
   text_ += fmt::format("{:<44}  # {}{}{}\n", setting, unit, key.help, extra);
 }
 
-void SettingsWriter::value(const Key& key, double& value) { line(key, fmt::format("{}", value)); }
+void SettingsWriter::value(const Key& key, double& value) {
+  line(key, fmt::format("{}", value));
+}
 void SettingsWriter::value(const Key& key, std::int64_t& value) {
   line(key, fmt::format("{}", value));
 }
-void SettingsWriter::value(const Key& key, bool& value) { line(key, value ? "true" : "false"); }
+void SettingsWriter::value(const Key& key, bool& value) {
+  line(key, value ? "true" : "false");
+}
 void SettingsWriter::value(const Key& key, std::string& value) {
   // double quotes with YAML's escapes keep any path intact
   bool plain = !value.empty() && value.front() != '-' && value.front() != ' ';
@@ -83,7 +87,9 @@ bool SettingsWriter::enter(const Key& key) {
   ++depth_;
   return true;
 }
-void SettingsWriter::leave() { --depth_; }
+void SettingsWriter::leave() {
+  --depth_;
+}
 std::size_t SettingsWriter::enter_list(const Key& key, std::size_t size) {
   if (depth_ == 0) text_ += "\n";
   line(key, size == 0 ? "[]" : "");
@@ -94,7 +100,9 @@ void SettingsWriter::enter_item(std::size_t /*index*/) {
   ++depth_;
   first_of_item_ = true;
 }
-void SettingsWriter::leave_list() { --depth_; }
+void SettingsWriter::leave_list() {
+  --depth_;
+}
 
 // ---- Markdown table ----
 
@@ -105,7 +113,9 @@ void SettingsTable::row(const Key& key, const std::string& value, const std::str
                        path,
                        key.name,
                        key.unit,
-                       key.required ? "**required**" : value.empty() ? "" : "`" + value + "`",
+                       key.required    ? "**required**"
+                       : value.empty() ? ""
+                                       : "`" + value + "`",
                        range,
                        key.help);
 }
@@ -119,7 +129,9 @@ void SettingsTable::value(const Key& key, std::int64_t& value) {
 void SettingsTable::value(const Key& key, bool& value) {
   row(key, value ? "true" : "false", "true, false");
 }
-void SettingsTable::value(const Key& key, std::string& value) { row(key, value, "text"); }
+void SettingsTable::value(const Key& key, std::string& value) {
+  row(key, value, "text");
+}
 void SettingsTable::value(const Key& key, Eigen::Vector3d& value) {
   row(key, vector_text(value), range_text(key));
 }
@@ -140,7 +152,9 @@ bool SettingsTable::enter(const Key& key) {
   path_.emplace_back(key.name);
   return true;
 }
-void SettingsTable::leave() { path_.pop_back(); }
+void SettingsTable::leave() {
+  path_.pop_back();
+}
 std::size_t SettingsTable::enter_list(const Key& key, std::size_t size) {
   text_ += fmt::format("| **{}** | | | a list | {} |\n", key.name, key.help);
   path_.push_back(std::string(key.name) + "[]");
@@ -149,6 +163,8 @@ std::size_t SettingsTable::enter_list(const Key& key, std::size_t size) {
 void SettingsTable::enter_item(std::size_t /*index*/) {
   path_.emplace_back();  // an item adds no name: its keys print as `list[].key`
 }
-void SettingsTable::leave_list() { path_.pop_back(); }
+void SettingsTable::leave_list() {
+  path_.pop_back();
+}
 
 }  // namespace pointflight

@@ -21,17 +21,22 @@ using Duration = std::chrono::nanoseconds;
 /// Instant in integer nanoseconds since the start of the run.
 using SimTime = SimClock::time_point;
 
-/// Seconds, for arithmetic that ends in a physical quantity. Never compare or accumulate the result.
+/// Seconds, for arithmetic that ends in a physical quantity. Never compare or accumulate the
+/// result.
 inline double to_seconds(Duration duration) {
   return static_cast<double>(duration.count()) * 1e-9;
 }
-inline double to_seconds(SimTime time) { return to_seconds(time.time_since_epoch()); }
+inline double to_seconds(SimTime time) {
+  return to_seconds(time.time_since_epoch());
+}
 
 /// The nearest nanosecond to `seconds` (which must be finite and below 292 years).
-inline Duration from_seconds(double seconds) { return Duration(std::llround(seconds * 1e9)); }
+inline Duration from_seconds(double seconds) {
+  return Duration(std::llround(seconds * 1e9));
+}
 
-/// Instants of a periodic activity: `phase + k * period`, each rounded to a nanosecond by itself, so
-/// that a rate that does not divide a second never drifts.
+/// Instants of a periodic activity: `phase + k * period`, each rounded to a nanosecond by itself,
+/// so that a rate that does not divide a second never drifts.
 class Schedule {
  public:
   /// `rate_hz` is kept to a thousandth of a hertz; it must be at least 0.001.

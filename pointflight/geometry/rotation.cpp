@@ -44,6 +44,8 @@ Quaterniond interpolate(const Quaterniond& a, const Quaterniond& b, double share
   return q;
 }
 
-double wrap_angle(double angle) { return angle - 2.0 * kPi * std::ceil(angle / (2.0 * kPi) - 0.5); }
+double wrap_angle(double angle) {
+  return angle - 2.0 * kPi * std::ceil(angle / (2.0 * kPi) - 0.5);
+}
 
 }  // namespace pointflight

@@ -86,9 +86,15 @@ std::optional<double> hit(const Cone& cone, const Vector3d& o, const Vector3d& d
                     within);
 }
 
-double area_of(const Triangle& t) { return 0.5 * (t.b - t.a).cross(t.c - t.a).norm(); }
-double area_of(const Disc& d) { return kPi * d.radius * d.radius; }
-double area_of(const Sphere& s) { return 4.0 * kPi * s.radius * s.radius; }
+double area_of(const Triangle& t) {
+  return 0.5 * (t.b - t.a).cross(t.c - t.a).norm();
+}
+double area_of(const Disc& d) {
+  return kPi * d.radius * d.radius;
+}
+double area_of(const Sphere& s) {
+  return 4.0 * kPi * s.radius * s.radius;
+}
 double area_of(const Cone& c) {
   const double slant = std::hypot((c.to - c.from).norm(), c.radius_to - c.radius_from);
   return kPi * (c.radius_from + c.radius_to) * slant;
@@ -126,8 +132,12 @@ Vector3d point_of(const Cone& cone, double u, double v) {
 Vector3d normal_of(const Triangle& t, const Vector3d& /*p*/) {
   return (t.b - t.a).cross(t.c - t.a).normalized();
 }
-Vector3d normal_of(const Disc& d, const Vector3d& /*p*/) { return d.normal; }
-Vector3d normal_of(const Sphere& s, const Vector3d& p) { return (p - s.center).normalized(); }
+Vector3d normal_of(const Disc& d, const Vector3d& /*p*/) {
+  return d.normal;
+}
+Vector3d normal_of(const Sphere& s, const Vector3d& p) {
+  return (p - s.center).normalized();
+}
 Vector3d normal_of(const Cone& c, const Vector3d& p) {
   const Vector3d axis = (c.to - c.from).normalized();
   const Vector3d m = p - c.from;

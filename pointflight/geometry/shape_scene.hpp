@@ -14,7 +14,7 @@ struct Triangle {
   Vector3d a, b, c;  ///< Two-sided.
 };
 struct Cone {
-  Vector3d from, to;            ///< Axis.
+  Vector3d from, to;              ///< Axis.
   double radius_from, radius_to;  ///< No caps; equal radii make a cylinder.
 };
 struct Disc {
@@ -62,14 +62,14 @@ struct ShapeScene {
 
 /// Parameters of a made-up forest: relief ground, tapered trunks, branches and leaves.
 struct ForestOptions {
-  double size_x = 60.0;          ///< m
-  double size_y = 60.0;          ///< m
+  double size_x = 60.0;  ///< m
+  double size_y = 60.0;  ///< m
   double trees_per_hectare = 600.0;
   double trunk_radius_min = 0.08;
   double trunk_radius_max = 0.25;
   double height_min = 6.0;
   double height_max = 14.0;
-  double min_spacing = 2.0;      ///< Least distance between trunks, m.
+  double min_spacing = 2.0;  ///< Least distance between trunks, m.
   std::uint64_t seed = 1;
 };
 

@@ -44,9 +44,9 @@ struct Aabb {
 
 /// A half-line in the world with an end.
 struct Ray {
-  Vector3d origin_world = Vector3d::Zero();         ///< Metres.
-  Vector3f direction_world = Vector3f::UnitX();     ///< Unit vector.
-  float range_max = 1e9f;                           ///< Metres along the ray.
+  Vector3d origin_world = Vector3d::Zero();      ///< Metres.
+  Vector3f direction_world = Vector3f::UnitX();  ///< Unit vector.
+  float range_max = 1e9f;                        ///< Metres along the ray.
 };
 
 }  // namespace pointflight

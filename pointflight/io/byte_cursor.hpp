@@ -43,7 +43,9 @@ class LineCursor {
     return true;
   }
 
-  [[nodiscard]] std::size_t offset() const { return offset_ < text_.size() ? offset_ : text_.size(); }
+  [[nodiscard]] std::size_t offset() const {
+    return offset_ < text_.size() ? offset_ : text_.size();
+  }
   [[nodiscard]] std::size_t number() const { return number_; }
   [[nodiscard]] double share() const {
     return text_.empty() ? 1.0 : static_cast<double>(offset()) / static_cast<double>(text_.size());

@@ -20,9 +20,18 @@ struct Format {
 
 // every format that `map import` reads
 constexpr Format kFormats[] = {
-    {".pcd", open_pcd},  {".ply", open_ply},  {".xyz", open_xyz},  {".txt", open_xyz},
-    {".csv", open_xyz},  {".asc", open_xyz},  {".pts", open_xyz},  {".las", open_las},
-    {".obj", nullptr},   {".stl", nullptr},   {".dae", nullptr},   {".gltf", nullptr},
+    {".pcd", open_pcd},
+    {".ply", open_ply},
+    {".xyz", open_xyz},
+    {".txt", open_xyz},
+    {".csv", open_xyz},
+    {".asc", open_xyz},
+    {".pts", open_xyz},
+    {".las", open_las},
+    {".obj", nullptr},
+    {".stl", nullptr},
+    {".dae", nullptr},
+    {".gltf", nullptr},
     {".glb", nullptr},
 };
 
@@ -59,8 +68,8 @@ std::unique_ptr<CloudReader> open_cloud(const std::string& path, const MeshSampl
   const std::string extension = extension_of(path);
   if (extension == ".laz") {
     const MappedFile present(path);  // a missing file is the first thing to say
-    throw InputError(fmt::format(
-        "{0}: LAZ is compressed; unpack it first: laszip -i {0} -o cloud.las", path));
+    throw InputError(
+        fmt::format("{0}: LAZ is compressed; unpack it first: laszip -i {0} -o cloud.las", path));
   }
   const Format* format = find_format(extension);
   MappedFile file(path);

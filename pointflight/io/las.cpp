@@ -10,8 +10,8 @@
 namespace pointflight {
 namespace {
 
-constexpr std::size_t kHeaderSize = 227;      // 1.0 - 1.2
-constexpr std::size_t kHeaderSize14 = 375;    // 1.4: 64-bit counts at byte 247
+constexpr std::size_t kHeaderSize = 227;    // 1.0 - 1.2
+constexpr std::size_t kHeaderSize14 = 375;  // 1.4: 64-bit counts at byte 247
 constexpr std::size_t kMinPointSize[] = {20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67};
 
 class LasReader : public CloudReader {
@@ -23,9 +23,10 @@ class LasReader : public CloudReader {
     }
     const auto minor = std::to_integer<unsigned>(bytes[25]);
     if (std::to_integer<unsigned>(bytes[24]) != 1 || minor > 4) {
-      fail(24, fmt::format("LAS version {}.{}; 1.0 to 1.4 are read",
-                           std::to_integer<unsigned>(bytes[24]),
-                           minor));
+      fail(24,
+           fmt::format("LAS version {}.{}; 1.0 to 1.4 are read",
+                       std::to_integer<unsigned>(bytes[24]),
+                       minor));
     }
     read_layout(bytes, minor);
     for (int axis = 0; axis < 3; ++axis) {
@@ -66,18 +67,20 @@ class LasReader : public CloudReader {
   void read_layout(std::span<const std::byte> bytes, unsigned minor) {
     const auto format = std::to_integer<unsigned>(bytes[104]);
     if ((format & 0xc0u) != 0) {
-      fail(104,
-           fmt::format("the points are LAZ-compressed; unpack them first: laszip -i {} -o cloud.las",
-                       file_.path()));
+      fail(
+          104,
+          fmt::format("the points are LAZ-compressed; unpack them first: laszip -i {} -o cloud.las",
+                      file_.path()));
     }
     if (format > 10) fail(104, fmt::format("point format {} is unknown; 0 to 10", format));
     data_ = load<std::uint32_t>(bytes.data() + 96);
     point_size_ = load<std::uint16_t>(bytes.data() + 105);
     if (point_size_ < kMinPointSize[format]) {
-      fail(105, fmt::format("points of {} bytes; format {} needs {}",
-                            point_size_,
-                            format,
-                            kMinPointSize[format]));
+      fail(105,
+           fmt::format("points of {} bytes; format {} needs {}",
+                       point_size_,
+                       format,
+                       kMinPointSize[format]));
     }
     points_ = load<std::uint32_t>(bytes.data() + 107);
     if (minor >= 4 && bytes.size() >= kHeaderSize14) {

@@ -28,12 +28,11 @@ class MeshReader : public CloudReader {
   MeshReader(const std::string& path, const MeshSampling& sampling) : sampling_(sampling) {
     // the file's own axes, whatever its header says of them: --up is the user's word
     importer_.SetPropertyBool(AI_CONFIG_IMPORT_COLLADA_IGNORE_UP_DIRECTION, true);
-    scene_ = importer_.ReadFile(path,
-                                aiProcess_Triangulate | aiProcess_PreTransformVertices |
-                                    aiProcess_SortByPType);
+    scene_ = importer_.ReadFile(
+        path, aiProcess_Triangulate | aiProcess_PreTransformVertices | aiProcess_SortByPType);
     if (scene_ == nullptr) {
-      throw InputError(fmt::format("{}: cannot read as a mesh: {}", path,
-                                   importer_.GetErrorString()));
+      throw InputError(
+          fmt::format("{}: cannot read as a mesh: {}", path, importer_.GetErrorString()));
     }
     for (unsigned m = 0; m < scene_->mNumMeshes; ++m) faces_ += scene_->mMeshes[m]->mNumFaces;
     if (faces_ == 0) throw InputError(fmt::format("{}: the mesh has no faces", path));

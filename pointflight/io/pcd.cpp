@@ -37,9 +37,12 @@ double load_number(const std::byte* p, char type, std::size_t size) {
   if (type == 'F') return size == 8 ? load<double>(p) : static_cast<double>(load<float>(p));
   const bool is_signed = type == 'I';
   switch (size) {
-    case 1: return is_signed ? load<std::int8_t>(p) : load<std::uint8_t>(p);
-    case 2: return is_signed ? load<std::int16_t>(p) : load<std::uint16_t>(p);
-    case 4: return is_signed ? load<std::int32_t>(p) : load<std::uint32_t>(p);
+    case 1:
+      return is_signed ? load<std::int8_t>(p) : load<std::uint8_t>(p);
+    case 2:
+      return is_signed ? load<std::int16_t>(p) : load<std::uint16_t>(p);
+    case 4:
+      return is_signed ? load<std::int32_t>(p) : load<std::uint32_t>(p);
     default:
       return is_signed ? static_cast<double>(load<std::int64_t>(p))
                        : static_cast<double>(load<std::uint64_t>(p));
@@ -141,12 +144,10 @@ class HeaderParser {
         fail(fmt::format("field '{}': a float of {} bytes; 4 or 8", field.name, field.size));
       }
       if (field.size != 1 && field.size != 2 && field.size != 4 && field.size != 8) {
-        fail(fmt::format("field '{}': an integer of {} bytes; 1, 2, 4 or 8",
-                         field.name,
-                         field.size));
+        fail(fmt::format(
+            "field '{}': an integer of {} bytes; 1, 2, 4 or 8", field.name, field.size));
       }
-      field.offset =
-          header_.encoding == Encoding::kAscii ? header_.columns : header_.point_size;
+      field.offset = header_.encoding == Encoding::kAscii ? header_.columns : header_.point_size;
       header_.columns += field.count;
       header_.point_size += field.size * field.count;
     }
@@ -229,8 +230,7 @@ class PcdReader : public CloudReader {
   void decompress() {
     const auto bytes = file_.bytes().subspan(header_.data_offset);
     const auto fail = [&](const std::string& what) {
-      throw InputError(
-          fmt::format("{}: byte {}: {}", file_.path(), header_.data_offset, what));
+      throw InputError(fmt::format("{}: byte {}: {}", file_.path(), header_.data_offset, what));
     };
     if (bytes.size() < 8) fail("cut off before the sizes of the compressed data");
     const std::uint64_t packed = load<std::uint32_t>(bytes.data());
@@ -277,7 +277,8 @@ class PcdReader : public CloudReader {
       for (std::size_t axis = 0; axis < 3; ++axis) {
         batch[i].position[static_cast<int>(axis)] = binary_number(next_ + i, position_[axis]);
       }
-      if (intensity_) batch[i].intensity = static_cast<float>(binary_number(next_ + i, *intensity_));
+      if (intensity_)
+        batch[i].intensity = static_cast<float>(binary_number(next_ + i, *intensity_));
     }
     if (header_.encoding == Encoding::kBinary) {
       file_.release_before(header_.data_offset + (next_ + count) * header_.point_size);
@@ -302,8 +303,8 @@ class PcdReader : public CloudReader {
         words_.push_back(value);
       }
       if (words_.size() != header_.columns) {
-        fail_line(fmt::format("{} numbers where the header has {}", words_.size(),
-                              header_.columns));
+        fail_line(
+            fmt::format("{} numbers where the header has {}", words_.size(), header_.columns));
       }
       CloudPoint& point = batch.emplace_back();
       for (std::size_t axis = 0; axis < 3; ++axis) {

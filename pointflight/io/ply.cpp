@@ -29,24 +29,36 @@ std::optional<Scalar> scalar_type(std::string_view name) {
 std::size_t size_of(Scalar type) {
   switch (type) {
     case Scalar::kInt8:
-    case Scalar::kUint8: return 1;
+    case Scalar::kUint8:
+      return 1;
     case Scalar::kInt16:
-    case Scalar::kUint16: return 2;
-    case Scalar::kDouble: return 8;
-    default: return 4;
+    case Scalar::kUint16:
+      return 2;
+    case Scalar::kDouble:
+      return 8;
+    default:
+      return 4;
   }
 }
 
 double load_scalar(const std::byte* p, Scalar type, bool big) {
   switch (type) {
-    case Scalar::kInt8: return load<std::int8_t>(p);
-    case Scalar::kUint8: return load<std::uint8_t>(p);
-    case Scalar::kInt16: return load<std::int16_t>(p, big);
-    case Scalar::kUint16: return load<std::uint16_t>(p, big);
-    case Scalar::kInt32: return load<std::int32_t>(p, big);
-    case Scalar::kUint32: return load<std::uint32_t>(p, big);
-    case Scalar::kFloat: return static_cast<double>(load<float>(p, big));
-    case Scalar::kDouble: return load<double>(p, big);
+    case Scalar::kInt8:
+      return load<std::int8_t>(p);
+    case Scalar::kUint8:
+      return load<std::uint8_t>(p);
+    case Scalar::kInt16:
+      return load<std::int16_t>(p, big);
+    case Scalar::kUint16:
+      return load<std::uint16_t>(p, big);
+    case Scalar::kInt32:
+      return load<std::int32_t>(p, big);
+    case Scalar::kUint32:
+      return load<std::uint32_t>(p, big);
+    case Scalar::kFloat:
+      return static_cast<double>(load<float>(p, big));
+    case Scalar::kDouble:
+      return load<double>(p, big);
   }
   return 0.0;
 }
@@ -112,9 +124,8 @@ class HeaderParser {
     header_.ascii = word == "ascii";
     header_.big_endian = word == "binary_big_endian";
     if (!header_.ascii && !header_.big_endian && word != "binary_little_endian") {
-      fail(fmt::format(
-          "format '{}' is unknown; ascii, binary_little_endian or binary_big_endian",
-          excerpt(word)));
+      fail(fmt::format("format '{}' is unknown; ascii, binary_little_endian or binary_big_endian",
+                       excerpt(word)));
     }
   }
 
@@ -214,8 +225,7 @@ class PlyReader : public CloudReader {
     }
     for (const std::size_t column : position_) {
       if (column == std::numeric_limits<std::size_t>::max()) {
-        throw InputError(
-            fmt::format("{}: the 'vertex' element lacks x, y or z", file_.path()));
+        throw InputError(fmt::format("{}: the 'vertex' element lacks x, y or z", file_.path()));
       }
     }
   }

@@ -79,7 +79,8 @@ class XyzReader : public CloudReader {
     }
   }
 
-  /// A line of names tells the columns; without one, 4 or 7 columns have an intensity in the fourth.
+  /// A line of names tells the columns; without one, 4 or 7 columns have an intensity in the
+  /// fourth.
   void find_columns() {
     LineCursor ahead(as_text(file_.bytes()));
     std::string_view line;

@@ -14,23 +14,23 @@ struct LidarSettings;
 
 /// One laser shot, in the sensor frame (x forward, y left, z up).
 struct Beam {
-  Vector3f origin_sensor = Vector3f::Zero();  ///< Where it leaves: not zero for Ouster, HDL-64.
+  Vector3f origin_sensor = Vector3f::Zero();      ///< Where it leaves: not zero for Ouster, HDL-64.
   Vector3f direction_sensor = Vector3f::UnitX();  ///< Unit vector.
-  Duration time_offset{0};                    ///< Firing time after the start of the scan.
-  std::uint16_t ring = 0;                     ///< Channel (0 is the lowest) or line.
+  Duration time_offset{0};                        ///< Firing time after the start of the scan.
+  std::uint16_t ring = 0;                         ///< Channel (0 is the lowest) or line.
 };
 
 /// Where and when a LiDAR fires during one scan.
 ///
-/// To add a scan principle: a file in lidar/patterns/ with a class derived from this and its keys in
-/// LidarSettings, one line in the table in beam_pattern.cpp, a test of its data-sheet figures (field
-/// of view, points a second, rings).
+/// To add a scan principle: a file in lidar/patterns/ with a class derived from this and its keys
+/// in LidarSettings, one line in the table in beam_pattern.cpp, a test of its data-sheet figures
+/// (field of view, points a second, rings).
 class BeamPattern {
  public:
   virtual ~BeamPattern() = default;
 
-  /// Beams of one scan, in firing order. Scan k covers [k, k + 1) / rate seconds of the sensor's own
-  /// time. The same for an index always; repeating sensors return the same for all indices.
+  /// Beams of one scan, in firing order. Scan k covers [k, k + 1) / rate seconds of the sensor's
+  /// own time. The same for an index always; repeating sensors return the same for all indices.
   [[nodiscard]] virtual std::vector<Beam> beams(std::uint64_t scan_index,
                                                 const Executor& executor) const = 0;
 };
@@ -47,8 +47,8 @@ struct ShotTrain {
       : shots(shot_rate_hz, phase), scans(scan_rate_hz) {}
 
   struct Range {
-    std::int64_t begin;
-    std::int64_t end;
+    std::int64_t begin = 0;
+    std::int64_t end = 0;
     SimTime scan_start;
   };
   [[nodiscard]] Range in_scan(std::uint64_t scan_index) const;

@@ -27,7 +27,9 @@ float measured_range(float range,
 Lidar::Lidar(const LidarSettings& settings, std::uint32_t sensor)
     : settings_(settings), sensor_(sensor), pattern_(make_pattern(settings)) {}
 
-Duration Lidar::period() const { return from_seconds(1.0 / settings_.rate); }
+Duration Lidar::period() const {
+  return from_seconds(1.0 / settings_.rate);
+}
 
 Scan Lidar::take(const ScanRequest& request,
                  const PoseAt& pose_at,
@@ -75,8 +77,7 @@ Scan Lidar::take(const ScanRequest& request,
     for (std::size_t i = begin; i < end; ++i) {
       ranges[i] = hits[i].range;
       if (!hits[i].is_return() || !request.noise) continue;
-      ranges[i] =
-          measured_range(hits[i].range, settings_.noise, random, request.index << 32 | i);
+      ranges[i] = measured_range(hits[i].range, settings_.noise, random, request.index << 32 | i);
     }
   });
   const auto range_min = static_cast<float>(settings_.range_min);

@@ -16,9 +16,9 @@ using PoseAt = std::function<Pose(SimTime)>;
 
 /// Which scan to take.
 struct ScanRequest {
-  std::uint64_t index = 0;   ///< Scan number: its pattern, and its place in the noise stream.
-  SimTime start;             ///< When it starts in the run.
-  bool snapshot = false;     ///< All beams from the pose at the scan's middle, as in the paper.
+  std::uint64_t index = 0;  ///< Scan number: its pattern, and its place in the noise stream.
+  SimTime start;            ///< When it starts in the run.
+  bool snapshot = false;    ///< All beams from the pose at the scan's middle, as in the paper.
   bool noise = true;
   std::uint64_t seed = 0;
 };

@@ -31,8 +31,7 @@ void describe_rotor(SettingsVisitor& v, RotorSettings& s) {
 void describe_prisms(SettingsVisitor& v, PrismsSettings& s) {
   v.value({"shot_rate", "Hz", "all lines fire together at this rate", 1, 1e7}, s.shot_rate);
   v.value({"shot_phase", "", "of the first shot, in shot periods", 0, 1}, s.shot_phase);
-  v.value({"line_heights", "", "z of each line's unit input direction", -0.7, 0.7},
-          s.line_heights);
+  v.value({"line_heights", "", "z of each line's unit input direction", -0.7, 0.7}, s.line_heights);
   v.list({"wedges", "", "in the order in which light passes them"},
          s.wedges,
          [](SettingsVisitor& w, WedgeSettings& wedge) {

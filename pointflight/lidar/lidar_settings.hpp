@@ -27,7 +27,7 @@ struct RotorSettings {
 struct WedgeSettings {
   double angle_deg = 0.0;
   double index = 1.51;
-  double rate = 0.0;        ///< Turns a second; the sign is the sense.
+  double rate = 0.0;  ///< Turns a second; the sign is the sense.
   double phase_deg = 0.0;
   bool flat_first = false;  ///< Light meets the flat face first ("out"), else the inclined one.
 };
@@ -36,19 +36,20 @@ struct WedgeSettings {
 struct PrismsSettings {
   double shot_rate = 40000.0;  ///< Hz; all lines fire together.
   double shot_phase = 0.0;     ///< Of the first shot, in shot periods.
-  std::vector<double> line_heights = {0.0};  ///< z of each unit input direction (sqrt(1-s^2), 0, s).
+  std::vector<double> line_heights = {
+      0.0};  ///< z of each unit input direction (sqrt(1-s^2), 0, s).
   std::vector<WedgeSettings> wedges;
 };
 
 /// Spinning LiDARs: a table of channels.
 struct RingsSettings {
-  std::string table;             ///< CSV beside the sensor's file.
+  std::string table;  ///< CSV beside the sensor's file.
   std::string convention = "velodyne";
-  double cycle_us = 55.296;      ///< velodyne: from one firing of all channels to the next.
+  double cycle_us = 55.296;          ///< velodyne: from one firing of all channels to the next.
   double channel_interval_us = 0.0;  ///< velodyne: between channels, where the table has no times.
-  std::int64_t columns = 1024;   ///< ouster: a turn.
+  std::int64_t columns = 1024;       ///< ouster: a turn.
   double beam_origin_radius = 0.0;   ///< ouster: distance of the beams' origin from the axis, m.
-  double origin_z = 0.0;         ///< ouster: height of the beams' origin in the sensor frame, m.
+  double origin_z = 0.0;  ///< ouster: height of the beams' origin in the sensor frame, m.
 };
 
 /// Depth cameras and dense angular grids: all beams at the scan's start.
@@ -66,9 +67,9 @@ struct GridSettings {
 
 /// A user's own table of directions, replayed in a loop.
 struct CsvSettings {
-  std::string file;                     ///< Columns azimuth and elevation or zenith, degrees.
+  std::string file;  ///< Columns azimuth and elevation or zenith, degrees.
   double points_per_second = 200000.0;
-  std::int64_t lines = 1;               ///< Ring of row i = i mod lines.
+  std::int64_t lines = 1;  ///< Ring of row i = i mod lines.
 };
 
 /// Standard deviation of the range: sqrt(range_sigma^2 + (range_sigma_per_m2 R^2)^2).
@@ -90,7 +91,7 @@ struct OpticsSettings {
 
 /// A sensor file, `data/lidars/<name>.yaml`.
 struct LidarSettings {
-  std::string path;    ///< Of the file, for messages and for files beside it.
+  std::string path;  ///< Of the file, for messages and for files beside it.
   std::string title;
   std::string source;  ///< Where the figures come from.
   double rate = 10.0;  ///< Scans a second.

@@ -16,7 +16,7 @@ struct ScanPoint {
   float intensity;           ///< Of the map, in its cloud's scale; 0 where it had none.
   Duration time_offset;      ///< After the scan's start.
   std::uint16_t ring;
-  std::uint32_t beam;        ///< Index of the beam in the scan's pattern.
+  std::uint32_t beam;  ///< Index of the beam in the scan's pattern.
 };
 
 /// What a LiDAR delivers for one scan: the returns in firing order.
@@ -25,7 +25,7 @@ struct Scan {
   std::uint32_t sensor = 0;  ///< Number of the LiDAR in the scenario.
   SimTime start;
   SimTime end;
-  std::size_t beams = 0;     ///< Fired, whether they returned or not.
+  std::size_t beams = 0;  ///< Fired, whether they returned or not.
   std::vector<ScanPoint> points;
 };
 

@@ -132,19 +132,18 @@ class Builder {
     assert(first < last);
     const std::uint64_t bit = std::bit_floor(first ^ last);
     const std::uint64_t border = last & ~(bit - 1);
-    const auto at = std::lower_bound(surfels_.begin() + static_cast<std::ptrdiff_t>(range.begin),
-                                     surfels_.begin() + static_cast<std::ptrdiff_t>(range.end),
-                                     border,
-                                     [](const BuildSurfel& s, std::uint64_t key) {
-                                       return s.morton < key;
-                                     });
+    const auto at =
+        std::lower_bound(surfels_.begin() + static_cast<std::ptrdiff_t>(range.begin),
+                         surfels_.begin() + static_cast<std::ptrdiff_t>(range.end),
+                         border,
+                         [](const BuildSurfel& s, std::uint64_t key) { return s.morton < key; });
     return static_cast<std::size_t>(at - surfels_.begin());
   }
 
   Box append_leaf(const Range& range) {
     const Voxel origin = voxel_bounds(range).first;
-    tree_.words.push_back(encode(LeafHeader{
-        origin[0], origin[1], origin[2], static_cast<std::uint32_t>(range.count())}));
+    tree_.words.push_back(encode(
+        LeafHeader{origin[0], origin[1], origin[2], static_cast<std::uint32_t>(range.count())}));
     tree_.intensity.push_back(0);
     Box box;
     for (std::size_t i = range.begin; i < range.end; ++i) {
@@ -176,9 +175,9 @@ class Builder {
         const double part = static_cast<double>(surfel.s[k] * surfel.axes(axis, k)) * r_;
         variance += part * part;
       }
-      const double center =
-          (origin[static_cast<std::size_t>(axis)] + static_cast<double>(surfel.center_voxels[axis])) *
-          r_;
+      const double center = (origin[static_cast<std::size_t>(axis)] +
+                             static_cast<double>(surfel.center_voxels[axis])) *
+                            r_;
       const double half =
           static_cast<double>(kSupport) * std::sqrt(variance) * 1.04 + 0.02 * r_ + center * 0x1p-21;
       box.min[axis] = static_cast<float>(center - half);

@@ -31,18 +31,18 @@ inline constexpr float kSupport = 3.8f;
 
 /// One surfel on its way into the tree.
 struct BuildSurfel {
-  std::uint64_t morton;  ///< Of its voxel; the input is sorted by it and has no equal ones.
+  std::uint64_t morton = 0;  ///< Of its voxel; the input is sorted by it and has no equal ones.
   Vector3f center_in_voxel;  ///< In voxels, each in [0, 1).
   Matrix3f axes;
-  Vector3f s;            ///< Standard deviations in units of r.
+  Vector3f s;  ///< Standard deviations in units of r.
   std::uint8_t intensity = 0;
 };
 
 struct Bvh8 {
   std::vector<Bvh8Node> nodes;
-  std::vector<SurfelWord> words;         ///< Leaf header and surfels, plus kLeafPadding.
-  std::vector<std::uint8_t> intensity;   ///< Beside `words`, one byte a word.
-  Aabb bounds;                           ///< Of the support ellipsoids, metres from the origin.
+  std::vector<SurfelWord> words;        ///< Leaf header and surfels, plus kLeafPadding.
+  std::vector<std::uint8_t> intensity;  ///< Beside `words`, one byte a word.
+  Aabb bounds;                          ///< Of the support ellipsoids, metres from the origin.
 };
 
 /// Builds the hierarchy over surfels sorted by Morton code: a node starts with its range and splits

@@ -72,17 +72,16 @@ class Import {
             ++report.points_not_finite;
           }
         }
-        pointflight::report(progress_,
-                            what,
-                            (static_cast<double>(i) + reader->share_read()) /
-                                static_cast<double>(names_.size()));
+        pointflight::report(
+            progress_,
+            what,
+            (static_cast<double>(i) + reader->share_read()) / static_cast<double>(names_.size()));
       }
     }
     if (report.points_read == 0) throw InputError(fmt::format("{}: no points", names_.front()));
     if (report.points_read == report.points_not_finite) {
-      throw InputError(fmt::format("{}: all {} points are NaN or infinite",
-                                   names_.front(),
-                                   report.points_read));
+      throw InputError(
+          fmt::format("{}: all {} points are NaN or infinite", names_.front(), report.points_read));
     }
   }
 
@@ -93,13 +92,12 @@ class Import {
   }
 
   void choose_resolution() {
-    for_each_point("measuring the point spacing", [this](const Vector3d& p, float) {
-      spacing_.add(p);
-    });
+    for_each_point("measuring the point spacing",
+                   [this](const Vector3d& p, float) { spacing_.add(p); });
     measure_spacing();
     if (map_.report.supported_resolution <= 0.0) {
-      throw InputError(fmt::format(
-          "{}: too few points to tell their spacing; give --resolution", names_.front()));
+      throw InputError(fmt::format("{}: too few points to tell their spacing; give --resolution",
+                                   names_.front()));
     }
   }
 

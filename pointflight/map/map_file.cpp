@@ -8,7 +8,6 @@
 #include "pointflight/core/hash.hpp"
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/core/mapped_file.hpp"
-#include "pointflight/core/output_file.hpp"
 
 namespace pointflight {
 namespace {
@@ -22,7 +21,7 @@ std::size_t aligned(std::size_t offset) {
 struct Layout {
   std::vector<std::byte> header;
   std::array<std::span<const std::byte>, kMapSections> sections;
-  std::array<std::size_t, kMapSections> offsets;
+  std::array<std::size_t, kMapSections> offsets{};
   std::size_t size = 0;
 };
 
@@ -71,9 +70,7 @@ std::span<const T> section_view(std::span<const std::byte> bytes, const MapSecti
 /// A map whose bytes are a mapped file.
 class MappedSurfelMap : public SurfelMap {
  public:
-  explicit MappedSurfelMap(const std::string& path) : file_(path) {
-    attach(file_.bytes(), path);
-  }
+  explicit MappedSurfelMap(const std::string& path) : file_(path) { attach(file_.bytes(), path); }
 
  private:
   MappedFile file_;
@@ -97,9 +94,8 @@ class OwnedSurfelMap : public SurfelMap {
 
 }  // namespace
 
-void write_map(const std::string& path, const Bvh8& tree, const MapDescription& description) {
+void write_map(OutputFile file, const Bvh8& tree, const MapDescription& description) {
   const Layout layout = lay_out(tree, description);
-  OutputFile file(path);
   file.write(layout.header);
   std::size_t written = kMapHeaderSize;
   const std::vector<std::byte> zeros(kMapAlignment);
@@ -135,16 +131,15 @@ std::shared_ptr<const SurfelMap> SurfelMap::from_bytes(std::span<const std::byte
 
 void SurfelMap::attach(std::span<const std::byte> bytes, const std::string& name) {
   const auto fail = [&](std::size_t byte, const std::string& what) {
-    throw InputError(
-        fmt::format("{}: byte {}: {}; import the cloud again", name, byte, what));
+    throw InputError(fmt::format("{}: byte {}: {}; import the cloud again", name, byte, what));
   };
   MapHeader header{};
   if (bytes.size() >= sizeof kMapMagic &&
       std::memcmp(bytes.data(), kMapMagic, sizeof kMapMagic) != 0) {
-    throw InputError(fmt::format(
-        "{}: not a .pfmap file; make one with: pointflight map import {} -o map.pfmap",
-        name,
-        name));
+    throw InputError(
+        fmt::format("{}: not a .pfmap file; make one with: pointflight map import {} -o map.pfmap",
+                    name,
+                    name));
   }
   if (bytes.size() < kMapHeaderSize) fail(bytes.size(), "the map is cut off within its header");
   std::memcpy(&header, bytes.data(), sizeof header);
@@ -184,8 +179,7 @@ void SurfelMap::attach(std::span<const std::byte> bytes, const std::string& name
   intensity_ = section_view<std::uint8_t>(bytes, header.sections[kIntensity]);
   const auto text = section_view<char>(bytes, header.sections[kMetadata]);
   metadata_ = {text.data(), text.size()};
-  if (words_.size() < kLeafPadding ||
-      (!intensity_.empty() && intensity_.size() != words_.size())) {
+  if (words_.size() < kLeafPadding || (!intensity_.empty() && intensity_.size() != words_.size())) {
     fail(kMapHeaderSize, "section lengths do not fit each other");
   }
   name_ = name;

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "pointflight/core/output_file.hpp"
 #include "pointflight/map/bvh8.hpp"
 #include "pointflight/map/surfel_map.hpp"
 
@@ -35,11 +36,11 @@ struct MapHeader {
   char magic[8];
   std::uint32_t version;
   std::uint32_t section_count;
-  double resolution;            ///< m
-  double origin[3];             ///< World position of the corner of voxel (0, 0, 0), m.
-  double bounds_min[3];         ///< Of the surfel centres, world, m.
+  double resolution;     ///< m
+  double origin[3];      ///< World position of the corner of voxel (0, 0, 0), m.
+  double bounds_min[3];  ///< Of the surfel centres, world, m.
   double bounds_max[3];
-  float support, tau, window;   ///< RenderModel.
+  float support, tau, window;  ///< RenderModel.
   float intensity_offset, intensity_step;
   std::uint32_t reserved;
   std::uint64_t surfel_count;
@@ -61,8 +62,8 @@ struct MapDescription {
   std::string metadata;  ///< JSON.
 };
 
-/// Writes a map; it appears under `path` only when complete. Throws InputError.
-void write_map(const std::string& path, const Bvh8& tree, const MapDescription& description);
+/// Writes and commits a map: it appears under its name only when complete. Throws InputError.
+void write_map(OutputFile file, const Bvh8& tree, const MapDescription& description);
 
 /// The same bytes in memory.
 std::vector<std::byte> map_bytes(const Bvh8& tree, const MapDescription& description);

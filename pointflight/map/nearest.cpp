@@ -66,8 +66,7 @@ std::optional<Nearest> SurfelMap::nearest(const Vector3d& point_world, double ma
     if (entry.meta != Bvh8Node::kInner) {
       if (entry.index + entry.meta + kLeafPadding >= words_.size()) continue;
       const LeafHeader leaf = decode_leaf(words_[entry.index]);
-      const Vector3f local =
-          (p - resolution_ * Vector3d(leaf.x, leaf.y, leaf.z)).cast<float>();
+      const Vector3f local = (p - resolution_ * Vector3d(leaf.x, leaf.y, leaf.z)).cast<float>();
       for (std::uint32_t i = 1; i <= entry.meta; ++i) {
         const float d2 = squared_distance(decode(words_[entry.index + i]), local, r);
         if (d2 < best || (d2 == best && !found)) {

@@ -6,7 +6,7 @@
 namespace pointflight {
 namespace {
 
-constexpr double kStandsOut = 2.0;     // times the mean distance of the neighbours
+constexpr double kStandsOut = 2.0;  // times the mean distance of the neighbours
 constexpr double kFarInCells = 10.0;
 
 /// nanoflann's view of the centroids.

@@ -17,9 +17,9 @@ struct OutlierOptions {
 };
 
 /// Indices of the cells that are outliers, ascending: those whose mean distance to the `neighbours`
-/// nearest cell centroids is far above that of the cloud. Evenly sparse surfaces stay (ground that a
-/// scanner only grazed): a cell also has to stand out from its own neighbours, or be more than ten
-/// cells from them. Does not depend on threads.
+/// nearest cell centroids is far above that of the cloud. Evenly sparse surfaces stay (ground that
+/// a scanner only grazed): a cell also has to stand out from its own neighbours, or be more than
+/// ten cells from them. Does not depend on threads.
 std::vector<std::uint32_t> find_outliers(const VoxelGrid& grid,
                                          const OutlierOptions& options,
                                          const Executor& executor);

@@ -16,7 +16,7 @@ class SpacingEstimate {
   [[nodiscard]] double median_spacing() const;
 
  private:
-  static constexpr double kBlock = 2.0;             ///< m: far above any useful spacing.
+  static constexpr double kBlock = 2.0;              ///< m: far above any useful spacing.
   static constexpr std::size_t kMaxPoints = 200000;  ///< Kept; then blocks are thinned by half.
 
   [[nodiscard]] bool is_chosen(const Vector3d& point, std::uint64_t one_in) const;

@@ -48,7 +48,8 @@ std::uint64_t code_of_thickness(float s0) {
   return best;
 }
 
-/// Of the four quaternions that differ by half turns about the body axes, the one with the largest w.
+/// Of the four quaternions that differ by half turns about the body axes, the one with the largest
+/// w.
 Eigen::Quaternionf largest_w(const Matrix3f& axes) {
   Matrix3f right_handed = axes;
   if (right_handed.determinant() < 0.0f) right_handed.col(0) = -right_handed.col(0);

@@ -22,8 +22,8 @@ struct Surfel {
 ///  32-55  qx, qy, qz, int8: k * 0.70711 / 127; qw = sqrt(max(0, 1 - x^2 - y^2 - z^2))
 ///  56-58  s1 / s2 = 0.75^k
 ///  59-63  s2: variance as float bits 0x3b6bedfa + k * 0x288000, times r^2 (0.06 r to 1.8 r)
-/// An ellipsoid is unchanged by half turns about its axes, so one of four equivalent quaternions has
-/// w as its largest part: no index bits are needed.
+/// An ellipsoid is unchanged by half turns about its axes, so one of four equivalent quaternions
+/// has w as its largest part: no index bits are needed.
 using SurfelWord = std::uint64_t;
 
 /// s0 of a planar surfel: its hit lies within 0.005 r of the plane even at grazing angles.
@@ -37,7 +37,9 @@ SurfelWord encode(const Surfel& surfel);
 Surfel decode(SurfelWord word);
 
 /// True for surfels of thickness class 0.
-inline bool is_planar(SurfelWord word) { return ((word >> 30) & 3u) == 0; }
+inline bool is_planar(SurfelWord word) {
+  return ((word >> 30) & 3u) == 0;
+}
 
 /// First word of a leaf: 20-bit voxel coordinates of its origin and the number of surfels (1..8).
 struct LeafHeader {

@@ -24,8 +24,8 @@ Moments Moments::about(const Vector3d& shift) const {
   Moments moved;
   moved.n = n;
   moved.sum = sum - n * shift;
-  moved.products = products - sum * shift.transpose() - shift * sum.transpose() +
-                   n * shift * shift.transpose();
+  moved.products =
+      products - sum * shift.transpose() - shift * sum.transpose() + n * shift * shift.transpose();
   return moved;
 }
 

@@ -32,7 +32,7 @@ struct Moments {
 
 /// One occupied cell, 52 bytes. Sums are relative to the cell's centre, metres.
 struct VoxelCell {
-  std::array<std::int32_t, 3> voxel;  ///< Coordinates in the grid.
+  std::array<std::int32_t, 3> voxel{};  ///< Coordinates in the grid.
   std::uint32_t n = 0;
   std::array<float, 3> sum{};
   std::array<float, 6> products{};  ///< xx, xy, xz, yy, yz, zz.

@@ -48,13 +48,14 @@ struct Entry {
 struct LeafLanes {
   alignas(32) LaneWords low;
   alignas(32) LaneWords high;
-  alignas(32) Lanes x, y, z;     ///< Centre minus the beam's point nearest to the leaf's origin.
-  alignas(32) Lanes variance2;   ///< s2^2
+  alignas(32) Lanes x, y, z;    ///< Centre minus the beam's point nearest to the leaf's origin.
+  alignas(32) Lanes variance2;  ///< s2^2
 };
 
 /// One beam on its way through the tree.
 class Traversal {
  public:
+  // NOLINTNEXTLINE(cppcoreguidelines-pro-type-member-init): the stack is written before it is read
   Traversal(const SurfelMap& map, const Model& model, HitList& hits)
       : nodes_(map.nodes()), words_(map.words()), map_(map), model_(model), hits_(hits) {}
 
@@ -145,7 +146,7 @@ class Traversal {
     const auto vy = static_cast<float>(leaf.y * r - origin_.y());
     const auto vz = static_cast<float>(leaf.z * r - origin_.z());
     const float t_leaf = direction_[0] * vx + direction_[1] * vy + direction_[2] * vz;
-    LeafLanes lanes;
+    LeafLanes lanes;  // NOLINT(cppcoreguidelines-pro-type-member-init): filled by load
     load(entry.index + 1,
          direction_[0] * t_leaf - vx,
          direction_[1] * t_leaf - vy,
@@ -166,7 +167,8 @@ class Traversal {
     const float r_squared = model_.r * model_.r;
     for (std::size_t i = 0; i < kLanes; ++i) {
       const std::uint32_t low = lanes.low[i];
-      lanes.x[i] = (static_cast<float>(static_cast<std::int32_t>(low & 1023u)) + 0.5f) * step - base_x;
+      lanes.x[i] =
+          (static_cast<float>(static_cast<std::int32_t>(low & 1023u)) + 0.5f) * step - base_x;
       lanes.y[i] =
           (static_cast<float>(static_cast<std::int32_t>(low >> 10 & 1023u)) + 0.5f) * step - base_y;
       lanes.z[i] =
@@ -204,9 +206,12 @@ class Traversal {
     for (std::size_t i = 0; i < kLanes; ++i) {
       const std::uint32_t high = lanes.high[i];
       // shift up, then down with the sign
-      const float qx = static_cast<float>(static_cast<std::int32_t>(high << 24) >> 24) * kQuaternionStep;
-      const float qy = static_cast<float>(static_cast<std::int32_t>(high << 16) >> 24) * kQuaternionStep;
-      const float qz = static_cast<float>(static_cast<std::int32_t>(high << 8) >> 24) * kQuaternionStep;
+      const float qx =
+          static_cast<float>(static_cast<std::int32_t>(high << 24) >> 24) * kQuaternionStep;
+      const float qy =
+          static_cast<float>(static_cast<std::int32_t>(high << 16) >> 24) * kQuaternionStep;
+      const float qz =
+          static_cast<float>(static_cast<std::int32_t>(high << 8) >> 24) * kQuaternionStep;
       const float rest = 1.0f - qx * qx - qy * qy - qz * qz;
       const float qw = std::sqrt(rest > 0.0f ? rest : 0.0f);
       // 1 / s_k^2: thickness by class, s1 = s2 * 0.75^k as three selects on the variance

@@ -8,23 +8,21 @@
 
 namespace pointflight {
 
-/// One ray a beam through the map's hierarchy; a return is where the surfels met within half a voxel
-/// of depth cover at least the share tau of the beam (docs/architecture.md, "Hit rule").
+/// One ray a beam through the map's hierarchy; a return is where the surfels met within half a
+/// voxel of depth cover at least the share tau of the beam (docs/architecture.md, "Hit rule").
 ///
 /// Rays longer than `range_max` end there. Uses + - * / and sqrt only: the same bytes everywhere.
 class BeamRenderer : public Renderer {
  public:
   explicit BeamRenderer(const Scene& scene) : map_(scene.map) {}
 
-  void render(const RayBatch& batch,
-              std::span<Hit> hits,
-              const Executor& executor) const override;
+  void render(const RayBatch& batch, std::span<Hit> hits, const Executor& executor) const override;
 
   /// One ray by itself.
   [[nodiscard]] Hit trace(const Ray& ray) const;
 
-  /// Beams whose list of surfels overflowed and lost its farthest entry: there the result may depend
-  /// on the shape of the tree (never on threads).
+  /// Beams whose list of surfels overflowed and lost its farthest entry: there the result may
+  /// depend on the shape of the tree (never on threads).
   [[nodiscard]] std::uint64_t overflow_count() const { return overflows_; }
 
  private:

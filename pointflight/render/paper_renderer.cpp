@@ -86,8 +86,13 @@ class PaperRenderer::Image {
   }
 
   /// Fills the pixels of rows [row_begin, row_end) within theta_max of the point.
-  void splat(const Vector3d& p, const Vector3d& normal, bool planar, float intensity, double radius,
-             int row_begin, int row_end) {
+  void splat(const Vector3d& p,
+             const Vector3d& normal,
+             bool planar,
+             float intensity,
+             double radius,
+             int row_begin,
+             int row_end) {
     const double distance = p.norm();
     if (distance > range_max_ + radius || distance < 1e-6) return;
     const double theta_max = distance > radius ? math::asin(radius / distance) : kPi / 2;
@@ -97,13 +102,22 @@ class PaperRenderer::Image {
     const int first = std::max(row_begin, static_cast<int>(std::ceil(row_at - reach)));
     const int last = std::min(row_end - 1, static_cast<int>(std::floor(row_at + reach)));
     const Vector3d axis = p / distance;
-    const double cos_max = std::sqrt(std::max(0.0, 1.0 - std::min(1.0, radius * radius /
-                                                                  (distance * distance))));
+    const double cos_max =
+        std::sqrt(std::max(0.0, 1.0 - std::min(1.0, radius * radius / (distance * distance))));
     const double plane_offset = normal.dot(p);
     bool touched = false;
     for (int row = first; row <= last; ++row) {
-      touched = fill_row(row, a, theta_max, axis, cos_max, normal, plane_offset, planar,
-                         distance, intensity) || touched;
+      touched = fill_row(row,
+                         a,
+                         theta_max,
+                         axis,
+                         cos_max,
+                         normal,
+                         plane_offset,
+                         planar,
+                         distance,
+                         intensity) ||
+                touched;
     }
     // smaller than a pixel: the pixel it projects to
     const int nearest_row = static_cast<int>(std::lround(row_at));
@@ -135,8 +149,15 @@ class PaperRenderer::Image {
     return column >= 0 && column < columns_ ? column : -1;
   }
 
-  bool fill_row(int row, const Angles& a, double theta_max, const Vector3d& axis, double cos_max,
-                const Vector3d& normal, double plane_offset, bool planar, double distance,
+  bool fill_row(int row,
+                const Angles& a,
+                double theta_max,
+                const Vector3d& axis,
+                double cos_max,
+                const Vector3d& normal,
+                double plane_offset,
+                bool planar,
+                double distance,
                 float intensity) {
     const math::SinCos elevation = row_rays_[static_cast<std::size_t>(row)];
     const double half = elevation.cos > 1e-3 ? theta_max / elevation.cos * 1.2 : 2.0 * kPi;
@@ -196,20 +217,20 @@ PaperRenderer::PaperRenderer(const Scene& scene, const PaperOptions& options)
   const double l = options_.voxel_length;
   std::map<std::array<std::int64_t, 3>, std::size_t> index;
   const double gamma_max = options_.gamma_threshold * map_->resolution();
-  map_->for_each_surfel([&](const Vector3d& center, const Vector3d& normal, double thickness,
-                            std::uint32_t word) {
-    const Vector3d cell = (center / l).array().floor();
-    const std::array<std::int64_t, 3> key = {static_cast<std::int64_t>(cell.x()),
-                                             static_cast<std::int64_t>(cell.y()),
-                                             static_cast<std::int64_t>(cell.z())};
-    const auto [at, is_new] = index.try_emplace(key, voxels_.size());
-    if (is_new) voxels_.push_back({cell * l, {}});
-    Voxel& voxel = voxels_[at->second];
-    voxel.points.push_back({(center - voxel.corner_world).cast<float>(),
-                            normal.cast<float>(),
-                            map_->intensity(word),
-                            thickness < gamma_max});
-  });
+  map_->for_each_surfel(
+      [&](const Vector3d& center, const Vector3d& normal, double thickness, std::uint32_t word) {
+        const Vector3d cell = (center / l).array().floor();
+        const std::array<std::int64_t, 3> key = {static_cast<std::int64_t>(cell.x()),
+                                                 static_cast<std::int64_t>(cell.y()),
+                                                 static_cast<std::int64_t>(cell.z())};
+        const auto [at, is_new] = index.try_emplace(key, voxels_.size());
+        if (is_new) voxels_.push_back({cell * l, {}});
+        Voxel& voxel = voxels_[at->second];
+        voxel.points.push_back({(center - voxel.corner_world).cast<float>(),
+                                normal.cast<float>(),
+                                map_->intensity(word),
+                                thickness < gamma_max});
+      });
 }
 
 void PaperRenderer::render(const RayBatch& batch,
@@ -220,8 +241,7 @@ void PaperRenderer::render(const RayBatch& batch,
   std::vector<Angles> angles(batch.rays.size());
   executor.parallel_for(angles.size(), 4096, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
-      angles[i] = angles_of(T_sensor_world.rotation *
-                            batch.rays[i].direction_world.cast<double>());
+      angles[i] = angles_of(T_sensor_world.rotation * batch.rays[i].direction_world.cast<double>());
     }
   });
   const double radius = std::sqrt(3.0) / 2.0 * map_->resolution();
@@ -243,7 +263,12 @@ void PaperRenderer::render(const RayBatch& batch,
           for (const Point& point : voxel.points) {
             const Vector3d p = corner + T_sensor_world.rotation * point.position.cast<double>();
             const Vector3d n = T_sensor_world.rotation * point.normal.cast<double>();
-            image.splat(p, n, point.planar, point.intensity, radius, static_cast<int>(begin),
+            image.splat(p,
+                        n,
+                        point.planar,
+                        point.intensity,
+                        radius,
+                        static_cast<int>(begin),
                         static_cast<int>(end));
           }
         }

@@ -8,14 +8,14 @@
 namespace pointflight {
 
 struct PaperOptions {
-  double voxel_length = 2.0;        ///< l: edge of the screening voxels, m.
-  double gamma_threshold = 0.06;    ///< Planes thinner than this share of r are corrected.
+  double voxel_length = 2.0;      ///< l: edge of the screening voxels, m.
+  double gamma_threshold = 0.06;  ///< Planes thinner than this share of r are corrected.
 };
 
 /// The renderer of the MARSIM paper, section IV.A: map points in voxels that meet the field of view
-/// are projected into a depth image of angular resolution theta_res (azimuth by elevation, laid over
-/// the rays of the batch); each fills the pixels within theta_max = asin(sqrt(3)/2 r / d) (eq. 1), a
-/// point on a plane with the depth at which the pixel's ray meets that plane; pixels keep the
+/// are projected into a depth image of angular resolution theta_res (azimuth by elevation, laid
+/// over the rays of the batch); each fills the pixels within theta_max = asin(sqrt(3)/2 r / d) (eq.
+/// 1), a point on a plane with the depth at which the pixel's ray meets that plane; pixels keep the
 /// smallest depth. A ray returns the depth of its pixel.
 ///
 /// All rays start at the sensor's pose, as in the paper: no rolling scan.
@@ -23,9 +23,7 @@ class PaperRenderer : public Renderer {
  public:
   PaperRenderer(const Scene& scene, const PaperOptions& options);
 
-  void render(const RayBatch& batch,
-              std::span<Hit> hits,
-              const Executor& executor) const override;
+  void render(const RayBatch& batch, std::span<Hit> hits, const Executor& executor) const override;
 
   [[nodiscard]] bool is_snapshot() const override { return true; }
 
@@ -34,7 +32,7 @@ class PaperRenderer : public Renderer {
     Vector3f position;  ///< From the voxel's corner, m.
     Vector3f normal;
     float intensity;
-    bool planar;        ///< gamma is below the threshold.
+    bool planar;  ///< gamma is below the threshold.
   };
   struct Voxel {
     Vector3d corner_world;

@@ -23,15 +23,15 @@ struct RayBatch {
   /// Where the sensor is and how it is turned: middle of the scan for a moving one. Renderers that
   /// trace single rays ignore it.
   Pose T_world_sensor;
-  float range_max = 100.0f;               ///< Longest range of any ray, m.
+  float range_max = 100.0f;                               ///< Longest range of any ray, m.
   double image_resolution = 0.2 * 0.0174532925199432958;  ///< theta_res of image renderers, rad.
 };
 
 /// What a ray met.
 struct Hit {
-  float range = -1.0f;          ///< Metres along the ray; negative where it met nothing.
-  float cos_incidence = 0.0f;   ///< |cos| of the angle between the ray and the surface normal.
-  float intensity = 0.0f;       ///< The cloud's own scale; 0 where it had none.
+  float range = -1.0f;         ///< Metres along the ray; negative where it met nothing.
+  float cos_incidence = 0.0f;  ///< |cos| of the angle between the ray and the surface normal.
+  float intensity = 0.0f;      ///< The cloud's own scale; 0 where it had none.
   [[nodiscard]] bool is_return() const { return range >= 0.0f; }
 };
 

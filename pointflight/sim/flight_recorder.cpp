@@ -31,7 +31,9 @@ std::string seconds(SimTime time) {
   return fmt::format("{}.{:09}", ns / 1'000'000'000, ns % 1'000'000'000);
 }
 
-std::string csv(const Vector3d& v) { return fmt::format("{},{},{}", v.x(), v.y(), v.z()); }
+std::string csv(const Vector3d& v) {
+  return fmt::format("{},{},{}", v.x(), v.y(), v.z());
+}
 
 nlohmann::ordered_json json_of(const Vector3d& v) {
   return nlohmann::ordered_json::array({v.x(), v.y(), v.z()});

@@ -16,8 +16,9 @@ struct MotionLimits {
   double jerk = 4.0;
 };
 
-/// Rest-to-rest move over a distance with limited speed, acceleration and jerk: the double-S profile
-/// of seven phases (Biagiotti, Melchiorri, Trajectory Planning for Automatic Machines, 2008, 3.4).
+/// Rest-to-rest move over a distance with limited speed, acceleration and jerk: the double-S
+/// profile of seven phases (Biagiotti, Melchiorri, Trajectory Planning for Automatic Machines,
+/// 2008, 3.4).
 class SmoothMove {
  public:
   SmoothMove() = default;
@@ -61,11 +62,11 @@ class Mission {
 
  private:
   struct Leg {
-    double start;      ///< s
+    double start = 0.0;  ///< s
     Vector3d from;
     Vector3d direction;
-    double yaw_from;
-    double yaw_sign;
+    double yaw_from = 0.0;
+    double yaw_sign = 1.0;
     SmoothMove turn;
     SmoothMove travel;
   };

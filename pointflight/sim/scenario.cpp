@@ -71,20 +71,20 @@ void describe(SettingsVisitor& v, Scenario& s) {
   v.value({"seed", "", "of everything random", 0, 9e15}, s.seed);
   v.value({"duration", "s", "0: as long as the mission takes", 0, 1e6}, s.duration);
   v.value({"physics_step", "s", "of the integrator", 0.0001, 0.005}, s.physics_step);
-  v.section({"vehicle", "", "what flies"}, [&](SettingsVisitor& w) {
-    describe_vehicle(w, s.vehicle);
-  });
+  v.section({"vehicle", "", "what flies"},
+            [&](SettingsVisitor& w) { describe_vehicle(w, s.vehicle); });
   v.list({"lidars", "", "what it carries"}, s.lidars, [](SettingsVisitor& w, LidarMount& mount) {
     describe_lidar(w, mount);
   });
   v.section({"mission", "", "where it flies; without waypoints it hovers"},
             [&](SettingsVisitor& w) { describe_mission(w, s.mission); });
-  v.section({"output", "", "what is written"}, [&](SettingsVisitor& w) {
-    describe_output(w, s.output);
-  });
+  v.section({"output", "", "what is written"},
+            [&](SettingsVisitor& w) { describe_output(w, s.output); });
 }
 
-std::string Scenario::folder() const { return std::filesystem::path(path).parent_path().string(); }
+std::string Scenario::folder() const {
+  return std::filesystem::path(path).parent_path().string();
+}
 
 std::string Scenario::place(const std::string& key) const {
   const auto line = lines.find(key);

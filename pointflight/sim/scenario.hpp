@@ -13,11 +13,11 @@
 namespace pointflight {
 
 struct LidarMount {
-  std::string model = "mid360";                   ///< Name or path of a sensor file.
-  Vector3d position = Vector3d(0.0, 0.0, 0.1);    ///< m, body frame.
-  Vector3d rotation_rpy_deg = Vector3d::Zero();   ///< Of the sensor's axes in the body.
+  std::string model = "mid360";                  ///< Name or path of a sensor file.
+  Vector3d position = Vector3d(0.0, 0.0, 0.1);   ///< m, body frame.
+  Vector3d rotation_rpy_deg = Vector3d::Zero();  ///< Of the sensor's axes in the body.
   std::string renderer = "beam";
-  bool snapshot = false;                          ///< One pose a scan, as in the paper.
+  bool snapshot = false;  ///< One pose a scan, as in the paper.
   bool noise = true;
 };
 
@@ -25,23 +25,23 @@ struct VehicleSetup {
   std::string model = "quad_330";
   Vector3d start = Vector3d::Zero();
   double start_yaw_deg = 0.0;
-  std::string on_collision = "report";            ///< or "stop"
+  std::string on_collision = "report";  ///< or "stop"
 };
 
 struct OutputSetup {
-  double trajectory_rate = 200.0;                 ///< Hz
+  double trajectory_rate = 200.0;  ///< Hz
   bool scans = true;
   bool imu = true;
 };
 
 /// A run: what a scenario file says.
 struct Scenario {
-  std::string path;                ///< Of the file; relative paths in it are taken from its folder.
+  std::string path;  ///< Of the file; relative paths in it are taken from its folder.
   std::map<std::string, int> lines;  ///< Line of each key, for messages.
   std::string map;
   std::int64_t seed = 1;
-  double duration = 0.0;           ///< s; 0: as long as the mission takes.
-  double physics_step = 0.001;     ///< s
+  double duration = 0.0;        ///< s; 0: as long as the mission takes.
+  double physics_step = 0.001;  ///< s
   VehicleSetup vehicle;
   std::vector<LidarMount> lidars = {LidarMount{}};
   MissionSettings mission;

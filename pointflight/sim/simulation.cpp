@@ -13,9 +13,9 @@
 namespace pointflight {
 namespace {
 
-constexpr double kSettleTime = 1.0;       // s after the mission's last instant
-constexpr double kHoverDuration = 10.0;   // s, without a mission
-constexpr double kGoalTolerance = 0.5;    // m
+constexpr double kSettleTime = 1.0;      // s after the mission's last instant
+constexpr double kHoverDuration = 10.0;  // s, without a mission
+constexpr double kGoalTolerance = 0.5;   // m
 
 }  // namespace
 
@@ -32,11 +32,16 @@ struct Simulation::MountedLidar {
 
 const char* to_string(RunEnd end) {
   switch (end) {
-    case RunEnd::kRunning: return "running";
-    case RunEnd::kCompleted: return "completed";
-    case RunEnd::kMissionUnfinished: return "mission unfinished";
-    case RunEnd::kCollision: return "collision";
-    case RunEnd::kInterrupted: return "interrupted";
+    case RunEnd::kRunning:
+      return "running";
+    case RunEnd::kCompleted:
+      return "completed";
+    case RunEnd::kMissionUnfinished:
+      return "mission unfinished";
+    case RunEnd::kCollision:
+      return "collision";
+    case RunEnd::kInterrupted:
+      return "interrupted";
   }
   return "";
 }
@@ -76,8 +81,8 @@ Simulation::Simulation(const Scenario& scenario,
 Simulation::~Simulation() = default;
 
 void Simulation::check_start() {
-  const auto here = clearance(
-      *map_, state_.body.p_world, dynamics_.settings().radius, kClearanceReach);
+  const auto here =
+      clearance(*map_, state_.body.p_world, dynamics_.settings().radius, kClearanceReach);
   if (here && here->distance < 0.0) {
     const Vector3d& p = scenario_.vehicle.start;
     throw InputError(fmt::format(
@@ -132,7 +137,9 @@ bool Simulation::step(SampleSink& sink) {
   return true;
 }
 
-void Simulation::interrupt() { finish(RunEnd::kInterrupted); }
+void Simulation::interrupt() {
+  finish(RunEnd::kInterrupted);
+}
 
 void Simulation::finish(RunEnd end) {
   summary_.end = end;
@@ -184,8 +191,8 @@ void Simulation::sample_until(SimTime end, SampleSink& sink) {
       ++summary_.states;
     }
     if (imu_time == next) {
-      sink.on_imu(imu_.sample(
-          next_imu_, next, state.body, dynamics_.acceleration(state, rotor_commands_)));
+      sink.on_imu(
+          imu_.sample(next_imu_, next, state.body, dynamics_.acceleration(state, rotor_commands_)));
       ++next_imu_;
       ++summary_.imu_samples;
     }

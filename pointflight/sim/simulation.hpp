@@ -53,8 +53,8 @@ const char* to_string(RunEnd end);
 struct RunSummary {
   RunEnd end = RunEnd::kRunning;
   SimTime time;
-  double distance_flown = 0.0;    ///< m
-  double speed_max = 0.0;         ///< m/s
+  double distance_flown = 0.0;      ///< m
+  double speed_max = 0.0;           ///< m/s
   double tracking_error_rms = 0.0;  ///< Of the position against its command, m.
   double tracking_error_max = 0.0;
   std::uint64_t states = 0;

@@ -20,8 +20,10 @@ Pose StateHistory::at(SimTime time) const {
   assert(!records_.empty());
   if (time <= records_.front().time) return records_.front().pose;
   if (time >= records_.back().time) return records_.back().pose;
-  const auto after = std::upper_bound(
-      records_.begin(), records_.end(), time, [](SimTime t, const Record& r) { return t < r.time; });
+  const auto after =
+      std::upper_bound(records_.begin(), records_.end(), time, [](SimTime t, const Record& r) {
+        return t < r.time;
+      });
   const Record& a = *(after - 1);
   const Record& b = *after;
   const double share = to_seconds(time - a.time) / to_seconds(b.time - a.time);

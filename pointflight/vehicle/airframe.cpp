@@ -32,8 +32,7 @@ void describe_rotor(SettingsVisitor& v, RotorModel& r) {
 }
 
 void describe_loop(SettingsVisitor& v, LoopDesign& loop) {
-  v.value({"natural_frequency", "rad/s", "of the closed loop", 0.01, 1000},
-          loop.natural_frequency);
+  v.value({"natural_frequency", "rad/s", "of the closed loop", 0.01, 1000}, loop.natural_frequency);
   v.value({"damping", "", "of the closed loop", 0.1, 10}, loop.damping);
   v.value({"integral", "", "integral gain in units of natural_frequency^3", 0, 1}, loop.integral);
 }
@@ -65,8 +64,7 @@ void describe_imu(SettingsVisitor& v, ImuSettings& i) {
   v.value({"gyro_noise_density", "rad/s/sqrt(Hz)", "white noise", 0, 1}, i.gyro_noise_density);
   v.value({"gyro_bias_walk", "rad/s^2/sqrt(Hz)", "random walk of the bias", 0, 1},
           i.gyro_bias_walk);
-  v.value({"accel_noise_density", "m/s^2/sqrt(Hz)", "white noise", 0, 10},
-          i.accel_noise_density);
+  v.value({"accel_noise_density", "m/s^2/sqrt(Hz)", "white noise", 0, 10}, i.accel_noise_density);
   v.value({"accel_bias_walk", "m/s^3/sqrt(Hz)", "random walk of the bias", 0, 10},
           i.accel_bias_walk);
 }
@@ -78,11 +76,8 @@ VehicleSettings read(SettingsReader& reader, const std::string& path) {
   settings.path = path;
   const auto fail = [&](const char* key, const std::string& what) {
     const auto line = reader.lines().find(key);
-    throw InputError(fmt::format("{}:{}: {}: {}",
-                                 path,
-                                 line == reader.lines().end() ? 1 : line->second,
-                                 key,
-                                 what));
+    throw InputError(fmt::format(
+        "{}:{}: {}: {}", path, line == reader.lines().end() ? 1 : line->second, key, what));
   };
   if (settings.rotors.size() < 4) {
     fail("rotors", fmt::format("{} rotors; at least 4 are needed", settings.rotors.size()));

@@ -17,13 +17,13 @@ struct RotorPlacement {
 
 /// Rotors are alike; their placement differs.
 struct RotorModel {
-  double thrust_coefficient = 0.0;   ///< k_f: thrust = k_f w^2, N s^2.
-  double torque_coefficient = 0.0;   ///< k_m: reaction torque = k_m w^2, N m s^2.
-  double inertia = 0.0;              ///< J_r about its axis, kg m^2: gyroscopic and spin-up torque.
-  double drag_coefficient = 0.0;     ///< Linear rotor drag: force = -c w v_perp, N s^2 / m.
-  double speed_min = 0.0;            ///< rad/s
-  double speed_max = 0.0;            ///< rad/s
-  double natural_frequency = 0.0;    ///< Of the speed's second-order response, rad/s; 0: ideal.
+  double thrust_coefficient = 0.0;  ///< k_f: thrust = k_f w^2, N s^2.
+  double torque_coefficient = 0.0;  ///< k_m: reaction torque = k_m w^2, N m s^2.
+  double inertia = 0.0;             ///< J_r about its axis, kg m^2: gyroscopic and spin-up torque.
+  double drag_coefficient = 0.0;    ///< Linear rotor drag: force = -c w v_perp, N s^2 / m.
+  double speed_min = 0.0;           ///< rad/s
+  double speed_max = 0.0;           ///< rad/s
+  double natural_frequency = 0.0;   ///< Of the speed's second-order response, rad/s; 0: ideal.
   double damping = 1.0;
 };
 
@@ -42,19 +42,19 @@ struct ControllerSettings {
   double tilt_max_deg = 35.0;
   double acceleration_max = 10.0;  ///< Of the position loop, horizontal, m/s^2.
   double climb_acceleration_max = 10.0;
-  double error_max = 5.0;          ///< Position errors count no more than this, m.
-  double integral_max = 2.0;       ///< Acceleration that the integral may ask for, m/s^2.
-  double body_rate_max = 10.0;     ///< Demanded rates, rad/s.
+  double error_max = 5.0;       ///< Position errors count no more than this, m.
+  double integral_max = 2.0;    ///< Acceleration that the integral may ask for, m/s^2.
+  double body_rate_max = 10.0;  ///< Demanded rates, rad/s.
 };
 
 struct ImuSettings {
-  double rate = 200.0;                      ///< Hz
-  Vector3d position = Vector3d::Zero();     ///< m, body frame.
+  double rate = 200.0;                   ///< Hz
+  Vector3d position = Vector3d::Zero();  ///< m, body frame.
   Vector3d rotation_rpy_deg = Vector3d::Zero();
-  double gyro_noise_density = 0.0;          ///< rad/s/sqrt(Hz)
-  double gyro_bias_walk = 0.0;              ///< rad/s^2/sqrt(Hz)
-  double accel_noise_density = 0.0;         ///< m/s^2/sqrt(Hz)
-  double accel_bias_walk = 0.0;             ///< m/s^3/sqrt(Hz)
+  double gyro_noise_density = 0.0;   ///< rad/s/sqrt(Hz)
+  double gyro_bias_walk = 0.0;       ///< rad/s^2/sqrt(Hz)
+  double accel_noise_density = 0.0;  ///< m/s^2/sqrt(Hz)
+  double accel_bias_walk = 0.0;      ///< m/s^3/sqrt(Hz)
 };
 
 /// A vehicle file, `data/vehicles/<name>.yaml`.
@@ -62,16 +62,16 @@ struct VehicleSettings {
   std::string path;
   std::string title;
   std::string source;
-  double mass = 1.0;                              ///< kg
-  Vector3d inertia_diagonal = Vector3d::Ones();   ///< kg m^2
-  double radius = 0.3;                            ///< Of the sphere that must stay free, m.
-  Vector3d drag_area = Vector3d::Zero();          ///< c_d A along each body axis, m^2.
+  double mass = 1.0;                             ///< kg
+  Vector3d inertia_diagonal = Vector3d::Ones();  ///< kg m^2
+  double radius = 0.3;                           ///< Of the sphere that must stay free, m.
+  Vector3d drag_area = Vector3d::Zero();         ///< c_d A along each body axis, m^2.
   RotorModel rotor;
   std::vector<RotorPlacement> rotors;
   ControllerSettings controller;
   ImuSettings imu;
 
-  [[nodiscard]] double hover_speed() const;       ///< rad/s of each rotor.
+  [[nodiscard]] double hover_speed() const;  ///< rad/s of each rotor.
   [[nodiscard]] double thrust_to_weight() const;
 };
 

@@ -40,9 +40,8 @@ ImuSample Imu::sample(std::int64_t index,
   sample.time = time;
   sample.gyro = q_imu_body * w + gyro_bias_ +
                 settings_.gyro_noise_density / std::sqrt(dt) * normals(StreamId::kImuGyroNoise);
-  sample.accel =
-      q_imu_body * force + accel_bias_ +
-      settings_.accel_noise_density / std::sqrt(dt) * normals(StreamId::kImuAccelNoise);
+  sample.accel = q_imu_body * force + accel_bias_ +
+                 settings_.accel_noise_density / std::sqrt(dt) * normals(StreamId::kImuAccelNoise);
   return sample;
 }
 

@@ -18,8 +18,10 @@ double feasible_share(const Eigen::VectorXd& base,
                       double max) {
   double share = 1.0;
   for (Eigen::Index i = 0; i < base.size(); ++i) {
-    if (base[i] + part[i] > max && part[i] > 0.0) share = std::min(share, (max - base[i]) / part[i]);
-    if (base[i] + part[i] < min && part[i] < 0.0) share = std::min(share, (min - base[i]) / part[i]);
+    if (base[i] + part[i] > max && part[i] > 0.0)
+      share = std::min(share, (max - base[i]) / part[i]);
+    if (base[i] + part[i] < min && part[i] < 0.0)
+      share = std::min(share, (min - base[i]) / part[i]);
   }
   return std::max(0.0, share);
 }
@@ -42,8 +44,9 @@ Mixer::Mixer(const VehicleSettings& settings)
   const Eigen::Matrix4d square = allocation_ * allocation_.transpose();
   const Eigen::FullPivLU<Eigen::Matrix4d> lu(square);
   if (lu.rank() < 4) {
-    throw InputError(fmt::format(
-        "{}: rotors: this layout cannot make thrust, roll, pitch and yaw by itself", settings.path));
+    throw InputError(
+        fmt::format("{}: rotors: this layout cannot make thrust, roll, pitch and yaw by itself",
+                    settings.path));
   }
   inverse_ = allocation_.transpose() * lu.inverse();
 }
@@ -68,13 +71,11 @@ std::vector<double> Mixer::speeds(const Wrench& wrench) const {
   }
   // yaw takes what is left
   const Eigen::VectorXd base = lift + tilt;
-  const Eigen::VectorXd thrusts =
-      base + feasible_share(base, yaw, thrust_min_, thrust_max_) * yaw;
+  const Eigen::VectorXd thrusts = base + feasible_share(base, yaw, thrust_min_, thrust_max_) * yaw;
   std::vector<double> speeds(static_cast<std::size_t>(thrusts.size()));
   for (std::size_t i = 0; i < speeds.size(); ++i) {
     const double thrust = thrusts[static_cast<Eigen::Index>(i)];
-    speeds[i] =
-        std::sqrt(std::clamp(thrust, thrust_min_, thrust_max_) / thrust_coefficient_);
+    speeds[i] = std::sqrt(std::clamp(thrust, thrust_min_, thrust_max_) / thrust_coefficient_);
   }
   return speeds;
 }

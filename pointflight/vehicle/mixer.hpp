@@ -9,8 +9,8 @@ namespace pointflight {
 
 /// Thrust and torque that a controller asks for, body frame.
 struct Wrench {
-  double thrust = 0.0;                    ///< N along body +z.
-  Vector3d torque = Vector3d::Zero();     ///< N m
+  double thrust = 0.0;                 ///< N along body +z.
+  Vector3d torque = Vector3d::Zero();  ///< N m
 };
 
 /// Turns a wrench into rotor speeds: the (pseudo-)inverse of the rotors' geometry, any layout.

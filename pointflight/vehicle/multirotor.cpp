@@ -66,12 +66,11 @@ Multirotor::Rate Multirotor::rate(const VehicleState& state,
     }
   }
   // quadratic drag of the body along its axes
-  force -= 0.5 * kAirDensity *
-           settings_.drag_area.cwiseProduct(v_body.cwiseAbs().cwiseProduct(v_body));
+  force -=
+      0.5 * kAirDensity * settings_.drag_area.cwiseProduct(v_body.cwiseAbs().cwiseProduct(v_body));
 
   rate.v_world = body.v_world;
-  rate.a_world =
-      body.q_world_body * force / settings_.mass - Vector3d(0, 0, kGravity);
+  rate.a_world = body.q_world_body * force / settings_.mass - Vector3d(0, 0, kGravity);
   const Vector3d spin = settings_.inertia_diagonal.cwiseProduct(body.omega_body);
   rate.alpha_body =
       (torque - body.omega_body.cross(spin)).cwiseQuotient(settings_.inertia_diagonal);
@@ -113,10 +112,11 @@ void Multirotor::step(VehicleState& state, std::span<const double> commands, dou
   body.omega_body += mean(k1.alpha_body, k2.alpha_body, k3.alpha_body, k4.alpha_body);
   for (std::size_t i = 0; i < state.rotors.size(); ++i) {
     RotorState& r = state.rotors[i];
-    r.speed += mean(k1.rotors[i].speed, k2.rotors[i].speed, k3.rotors[i].speed,
-                    k4.rotors[i].speed);
-    r.acceleration += mean(k1.rotors[i].acceleration, k2.rotors[i].acceleration,
-                           k3.rotors[i].acceleration, k4.rotors[i].acceleration);
+    r.speed += mean(k1.rotors[i].speed, k2.rotors[i].speed, k3.rotors[i].speed, k4.rotors[i].speed);
+    r.acceleration += mean(k1.rotors[i].acceleration,
+                           k2.rotors[i].acceleration,
+                           k3.rotors[i].acceleration,
+                           k4.rotors[i].acceleration);
     if (r.speed < 0.0) r = {0.0, std::max(0.0, r.acceleration)};
   }
   body.q_world_body.normalize();

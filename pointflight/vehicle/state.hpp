@@ -6,8 +6,8 @@
 
 namespace pointflight {
 
-/// Where a vehicle is and how it moves. World: ENU, z up. Body: x forward, y left, z up, origin at the
-/// centre of mass.
+/// Where a vehicle is and how it moves. World: ENU, z up. Body: x forward, y left, z up, origin at
+/// the centre of mass.
 struct RigidBodyState {
   Vector3d p_world = Vector3d::Zero();
   Vector3d v_world = Vector3d::Zero();
@@ -30,8 +30,8 @@ struct VehicleState {
 
 /// Accelerations that belong to a state: what an IMU feels.
 struct BodyAcceleration {
-  Vector3d a_world = Vector3d::Zero();      ///< Of the centre of mass.
-  Vector3d alpha_body = Vector3d::Zero();   ///< rad/s^2
+  Vector3d a_world = Vector3d::Zero();     ///< Of the centre of mass.
+  Vector3d alpha_body = Vector3d::Zero();  ///< rad/s^2
 };
 
 }  // namespace pointflight

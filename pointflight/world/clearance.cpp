@@ -23,7 +23,8 @@ double clearance_along(const SurfelMap& map,
   double least = reach;
   // within half of what a point is clear by, nothing can come closer than the other half
   for (double s = 0.0;;) {
-    const Vector3d p = length > 0.0 ? Vector3d(a_world + (s / length) * (b_world - a_world)) : a_world;
+    const Vector3d p =
+        length > 0.0 ? Vector3d(a_world + (s / length) * (b_world - a_world)) : a_world;
     const auto found = clearance(map, p, radius, reach);
     const double here = found ? found->distance : reach;
     least = std::min(least, here);

@@ -10,8 +10,8 @@ namespace pointflight {
 
 /// What a spherical vehicle is to the map.
 struct Clearance {
-  double distance;      ///< From the vehicle's sphere to the nearest surfel, m; negative inside.
-  Vector3d place_world; ///< Centre of that surfel.
+  double distance;       ///< From the vehicle's sphere to the nearest surfel, m; negative inside.
+  Vector3d place_world;  ///< Centre of that surfel.
 };
 
 /// Distances from a sphere of `radius` to the map; nothing where all is farther than `reach`.

@@ -11,9 +11,9 @@
 namespace pointflight {
 namespace {
 
-constexpr double kCellMin = 0.5;          // m
+constexpr double kCellMin = 0.5;  // m
 constexpr double kCellsMax = 400000.0;
-constexpr double kGroundMin = 0.8;        // m above the ground, preferred
+constexpr double kGroundMin = 0.8;  // m above the ground, preferred
 constexpr double kGroundMax = 3.5;
 
 using Index3 = std::array<int, 3>;
@@ -119,10 +119,14 @@ class FreeSpaceGrid {
   void look_around() {
     ground_.assign(count(), -1.0f);
     sides_.assign(count(), 0);
-    constexpr std::array<Index3, 8> kDirections = {Index3{1, 0, 0}, Index3{-1, 0, 0},
-                                                   Index3{0, 1, 0}, Index3{0, -1, 0},
-                                                   Index3{1, 1, 0}, Index3{-1, -1, 0},
-                                                   Index3{1, -1, 0}, Index3{-1, 1, 0}};
+    constexpr std::array<Index3, 8> kDirections = {Index3{1, 0, 0},
+                                                   Index3{-1, 0, 0},
+                                                   Index3{0, 1, 0},
+                                                   Index3{0, -1, 0},
+                                                   Index3{1, 1, 0},
+                                                   Index3{-1, -1, 0},
+                                                   Index3{1, -1, 0},
+                                                   Index3{-1, 1, 0}};
     for (std::size_t at = 0; at < count(); ++at) {
       Index3 i = index3(at);
       for (int steps = 0; i[2] >= 0; --i[2], ++steps) {

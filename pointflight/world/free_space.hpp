@@ -11,9 +11,9 @@
 namespace pointflight {
 
 struct TourOptions {
-  double radius = 0.3;        ///< Of the vehicle, m.
-  double margin = 0.4;        ///< Kept free beyond it, m.
-  double length_min = 60.0;   ///< m
+  double radius = 0.3;            ///< Of the vehicle, m.
+  double margin = 0.4;            ///< Kept free beyond it, m.
+  double length_min = 60.0;       ///< m
   std::optional<Vector3d> start;  ///< Else one is found.
 };
 

@@ -1,9 +1,10 @@
+#include "pointflight/core/settings.hpp"
+
 #include <gtest/gtest.h>
 
 #include <array>
 
 #include "pointflight/core/resources.hpp"
-#include "pointflight/core/settings.hpp"
 #include "tests/support.hpp"
 
 namespace pointflight {

@@ -1,10 +1,11 @@
 // Any text as a table of beam angles: numbers, or an InputError of one line.
+#include "pointflight/lidar/patterns/csv_table.hpp"
+
 #include <cstdint>
 #include <string>
 #include <string_view>
 
 #include "pointflight/core/input_error.hpp"
-#include "pointflight/lidar/patterns/csv_table.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::string_view text(reinterpret_cast<const char*>(data), size);

@@ -66,7 +66,8 @@ std::vector<std::byte> edited(std::vector<std::byte> bytes,
 void ask_everything(const SurfelMap& map, const std::shared_ptr<const SurfelMap>& shared) {
   std::vector<Ray> rays;
   for (int i = 0; i < 24; ++i) {
-    const Vector3f direction(static_cast<float>(i % 3 - 1), static_cast<float>(i % 5 - 2),
+    const Vector3f direction(static_cast<float>(i % 3 - 1),
+                             static_cast<float>(i % 5 - 2),
                              static_cast<float>(i % 7 - 3) + 0.1f);
     rays.push_back({Vector3d(0.3, 0.1 * i, 0.0), direction.normalized(), 30.0f});
   }
@@ -87,8 +88,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (size == 0) return 0;
   const bool edit = data[0] % 2 == 0;
   const auto raw = std::as_bytes(std::span(data + 1, size - 1));
-  const std::vector<std::byte> bytes = edit ? edited(good, data + 1, size - 1)
-                                            : std::vector<std::byte>(raw.begin(), raw.end());
+  const std::vector<std::byte> bytes =
+      edit ? edited(good, data + 1, size - 1) : std::vector<std::byte>(raw.begin(), raw.end());
   try {
     const auto map = SurfelMap::from_bytes(bytes, "input");
     ask_everything(*map, map);

@@ -13,19 +13,20 @@ namespace {
 
 TEST(Rotation, RollPitchYawTurnTheAxesInOrder) {
   // yaw 90 deg: the body's x axis points to world y; pitch 90 deg: x points down
-  EXPECT_TRUE((quaternion_from_rpy(0, 0, kPi / 2) * Vector3d::UnitX())
-                  .isApprox(Vector3d::UnitY(), 1e-15));
-  EXPECT_TRUE((quaternion_from_rpy(0, kPi / 2, 0) * Vector3d::UnitX())
-                  .isApprox(-Vector3d::UnitZ(), 1e-15));
-  EXPECT_TRUE((quaternion_from_rpy(kPi / 2, 0, 0) * Vector3d::UnitY())
-                  .isApprox(Vector3d::UnitZ(), 1e-15));
+  EXPECT_TRUE(
+      (quaternion_from_rpy(0, 0, kPi / 2) * Vector3d::UnitX()).isApprox(Vector3d::UnitY(), 1e-15));
+  EXPECT_TRUE(
+      (quaternion_from_rpy(0, kPi / 2, 0) * Vector3d::UnitX()).isApprox(-Vector3d::UnitZ(), 1e-15));
+  EXPECT_TRUE(
+      (quaternion_from_rpy(kPi / 2, 0, 0) * Vector3d::UnitY()).isApprox(Vector3d::UnitZ(), 1e-15));
 }
 
 TEST(Rotation, VectorAndQuaternionAreInverse) {
   const RandomStream random(1, StreamId::kTest, 0);
   for (std::uint64_t i = 0; i < 500; ++i) {
     SCOPED_TRACE(i);
-    Vector3d v(random.uniform(3 * i, -1, 1), random.uniform(3 * i + 1, -1, 1),
+    Vector3d v(random.uniform(3 * i, -1, 1),
+               random.uniform(3 * i + 1, -1, 1),
                random.uniform(3 * i + 2, -1, 1));
     v *= 3.1 / std::max(1.0, v.norm());
     v *= std::pow(10.0, -static_cast<double>(i % 14));  // down to nothing

@@ -38,14 +38,17 @@ std::string bytes_of(const std::string& folder) {
 TEST(Flight, TheSameBytesWhateverTheThreadsAndTheProcessor) {
   const TemporaryFolder folder;
   const std::string map = folder / "m.pfmap";
-  ASSERT_EQ(run(fmt::format("map forest --size-x 24 --size-y 20 --density 300 -o {}", folder / "m.pcd")), 0);
+  ASSERT_EQ(
+      run(fmt::format("map forest --size-x 24 --size-y 20 --density 300 -o {}", folder / "m.pcd")),
+      0);
   ASSERT_EQ(run(fmt::format("map import {} -o {} --resolution 0.1", folder / "m.pcd", map)), 0);
   ASSERT_EQ(run(fmt::format("scenario new {} -o {} --length 6", map, folder / "s.yaml")), 0);
   const auto fly = [&](const std::string& name, int threads, const std::string& environment) {
-    EXPECT_EQ(run(fmt::format("fly {} -o {} --threads {} --seed 7", folder / "s.yaml", folder / name,
-                              threads),
-                  environment),
-              0);
+    EXPECT_EQ(
+        run(fmt::format(
+                "fly {} -o {} --threads {} --seed 7", folder / "s.yaml", folder / name, threads),
+            environment),
+        0);
     return bytes_of(folder / name);
   };
   const std::string reference = fly("one", 1, "");
@@ -54,10 +57,12 @@ TEST(Flight, TheSameBytesWhateverTheThreadsAndTheProcessor) {
   EXPECT_TRUE(reference == fly("eight", 8, ""));
   // glibc picks other code for sin, exp, ... without FMA and AVX2
   EXPECT_TRUE(reference ==
-              fly("masked", 2,
+              fly("masked",
+                  2,
                   "GLIBC_TUNABLES=glibc.cpu.hwcaps=-FMA,-AVX2,-FMA4,-AVX2_Usable,-FMA_Usable"));
   // and the map itself
-  EXPECT_EQ(run(fmt::format("map import {} -o {} --resolution 0.1 --threads 1", folder / "m.pcd",
+  EXPECT_EQ(run(fmt::format("map import {} -o {} --resolution 0.1 --threads 1",
+                            folder / "m.pcd",
                             folder / "n.pfmap"),
                 "GLIBC_TUNABLES=glibc.cpu.hwcaps=-FMA,-AVX2,-FMA4,-AVX2_Usable,-FMA_Usable"),
             0);
@@ -86,14 +91,18 @@ TEST_P(RealFlight, ImportsScansAndFliesFortyMetresWithoutACollision) {
   EXPECT_EQ(summary["collisions"], 0);
   EXPECT_GT(summary["closest_approach"].get<double>(), 0.1);
   const double factor = timing["real_time_factor"].get<double>();
-  std::printf("%s: %.1f m, closest %.2f m, real-time factor %.1f (this build)\n", GetParam().name,
-              summary["distance_flown"].get<double>(), summary["closest_approach"].get<double>(),
+  std::printf("%s: %.1f m, closest %.2f m, real-time factor %.1f (this build)\n",
+              GetParam().name,
+              summary["distance_flown"].get<double>(),
+              summary["closest_approach"].get<double>(),
               factor);
 }
 
-INSTANTIATE_TEST_SUITE_P(Maps, RealFlight,
+INSTANTIATE_TEST_SUITE_P(Maps,
+                         RealFlight,
                          ::testing::Values(RealMap{"drone_hall", "--resolution 0.05"},
-                                           RealMap{"garage", ""}, RealMap{"forest_tls", ""},
+                                           RealMap{"garage", ""},
+                                           RealMap{"forest_tls", ""},
                                            RealMap{"catec_testbed", ""}),
                          [](const auto& info) { return std::string(info.param.name); });
 

@@ -26,9 +26,12 @@ struct Result {
 
 Result run(const std::string& arguments, const std::string& before = "") {
   const TemporaryFolder folder;
-  const std::string command =
-      fmt::format("{} '{}' {} >'{}' 2>'{}'", before, POINTFLIGHT_PROGRAM, arguments, folder / "out",
-                  folder / "err");
+  const std::string command = fmt::format("{} '{}' {} >'{}' 2>'{}'",
+                                          before,
+                                          POINTFLIGHT_PROGRAM,
+                                          arguments,
+                                          folder / "out",
+                                          folder / "err");
   const int status = std::system(command.c_str());  // NOLINT(concurrency-mt-unsafe)
   Result result;
   result.code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
@@ -50,8 +53,9 @@ class Program : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
     folder_ = new TemporaryFolder;
-    ASSERT_EQ(run(fmt::format("map forest --size-x 24 --size-y 20 --density 300 -o {}", cloud())).code,
-              0);
+    ASSERT_EQ(
+        run(fmt::format("map forest --size-x 24 --size-y 20 --density 300 -o {}", cloud())).code,
+        0);
     ASSERT_EQ(run(fmt::format("map import {} -o {} --resolution 0.1", cloud(), map())).code, 0);
   }
   static void TearDownTestSuite() { delete folder_; }
@@ -63,8 +67,17 @@ TemporaryFolder* Program::folder_ = nullptr;
 
 TEST_F(Program, HelpAndVersionEverywhere) {
   expect_contains(run("--version").out, "pointflight 0.");
-  for (const char* command : {"", "map", "map import", "map info", "map forest", "scan", "fly",
-                              "scenario new", "scenario check", "lidar list", "lidar show"}) {
+  for (const char* command : {"",
+                              "map",
+                              "map import",
+                              "map info",
+                              "map forest",
+                              "scan",
+                              "fly",
+                              "scenario new",
+                              "scenario check",
+                              "lidar list",
+                              "lidar show"}) {
     const Result result = run(fmt::format("{} --help", command));
     EXPECT_EQ(result.code, 0) << command;
     expect_contains(result.out, "-h,--help");
@@ -75,7 +88,8 @@ TEST_F(Program, WrongFlagsAreWrongInput) {
   expect_user_error(run(""), "subcommand is required");
   expect_user_error(run("fly"), "scenario is required");
   expect_user_error(run("fly x.yaml -o /tmp/x --rate fast"), "--rate: 'fast'");
-  expect_user_error(run(fmt::format("map import {} -o /tmp/x --resolution -1", cloud())), "resolution");
+  expect_user_error(run(fmt::format("map import {} -o /tmp/x --resolution -1", cloud())),
+                    "resolution");
   expect_user_error(run(fmt::format("scan {} --pose 1,2,3", map())), "six are wanted");
   expect_user_error(run(fmt::format("scan {} --pose 1,2,3,4,5,x", map())), "'x' is no number");
   expect_user_error(run(fmt::format("scan {} --lidar mid36 --pose 1,2,3,0,0,0", map())),
@@ -106,11 +120,16 @@ TEST_F(Program, ScansWithEverySensorAndBothRenderers) {
       const Result result =
           run(fmt::format("scan {} --lidar {} --renderer {} --pose 12,10,1.5,0,10,45 --json -o {} "
                           "--png {}",
-                          map(), lidar, renderer, folder / "s.pcd", folder / "s.png"));
+                          map(),
+                          lidar,
+                          renderer,
+                          folder / "s.pcd",
+                          folder / "s.png"));
       ASSERT_EQ(result.code, 0) << result.err;
       const auto json = nlohmann::json::parse(result.out);
       EXPECT_GT(json["points"].get<double>(), 0.05 * json["beams"].get<double>());
-      expect_contains(read_file(folder / "s.pcd").substr(0, 400), "x y z intensity range time ring");
+      expect_contains(read_file(folder / "s.pcd").substr(0, 400),
+                      "x y z intensity range time ring");
       EXPECT_EQ(read_file(folder / "s.png").substr(1, 3), "PNG");
     }
   }
@@ -120,8 +139,8 @@ TEST_F(Program, TheSameScanForTheSameSeed) {
   const TemporaryFolder folder;
   const auto scan = [&](int seed, int threads) {
     const std::string path = folder / "s.pcd";
-    run(fmt::format("scan {} --pose 12,10,1.5,0,0,0 --seed {} --threads {} -o {}", map(), seed,
-                    threads, path));
+    run(fmt::format(
+        "scan {} --pose 12,10,1.5,0,0,0 --seed {} --threads {} -o {}", map(), seed, threads, path));
     return read_file(path);
   };
   const std::string first = scan(1, 1);
@@ -135,7 +154,8 @@ TEST_F(Program, ImportsEveryBadCloudWithOneLine) {
   const TemporaryFolder folder;
   const auto import = [&](const std::string& name, const std::string& bytes) {
     if (name != "absent.pcd") write_file(folder / name, bytes);
-    const Result result = run(fmt::format("map import {} -o {}", folder / name, folder / "o.pfmap"));
+    const Result result =
+        run(fmt::format("map import {} -o {}", folder / name, folder / "o.pfmap"));
     EXPECT_FALSE(std::filesystem::exists(folder / "o.pfmap"));
     EXPECT_FALSE(std::filesystem::exists(folder / "o.pfmap.partial"));
     return result;
@@ -178,8 +198,9 @@ TEST_F(Program, NothingIsLeftWhereAFileCannotBeWritten) {
   expect_user_error(run(fmt::format("map import {} -o /nowhere/x.pfmap --resolution 0.1", cloud())),
                     "/nowhere/x.pfmap: cannot write");
   // a file-size limit of 512 kB stands for a full disk
-  const Result full = run(fmt::format("map import {} -o {} --resolution 0.1", cloud(), folder / "x.pfmap"),
-                          "ulimit -f 512;");
+  const Result full =
+      run(fmt::format("map import {} -o {} --resolution 0.1", cloud(), folder / "x.pfmap"),
+          "ulimit -f 512;");
   expect_contains(full.err, "x.pfmap: cannot write: File too large");
   EXPECT_EQ(full.code, 2);
   EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
@@ -196,8 +217,15 @@ TEST_F(Program, ScenarioNewCheckAndFly) {
   const Result fly = run(fmt::format("fly {} -o {}", yaml, folder / "run"));
   ASSERT_EQ(fly.code, 0) << fly.err;
   expect_contains(fly.out, "closest approach");
-  for (const char* name : {"trajectory.csv", "trajectory.tum", "imu.csv", "events.csv", "scans.csv",
-                           "summary.json", "timing.json", "overview.png", "scans/0_000000.pcd"}) {
+  for (const char* name : {"trajectory.csv",
+                           "trajectory.tum",
+                           "imu.csv",
+                           "events.csv",
+                           "scans.csv",
+                           "summary.json",
+                           "timing.json",
+                           "overview.png",
+                           "scans/0_000000.pcd"}) {
     EXPECT_FALSE(read_file(folder / (std::string("run/") + name)).empty()) << name;
   }
   const auto summary = nlohmann::json::parse(read_file(folder / "run/summary.json"));
@@ -219,12 +247,15 @@ TEST_F(Program, BadScenariosSayFileAndLine) {
   const std::string map_line = fmt::format("map: {}\n", map());
   expect_user_error(check("seed: 1\n"), "map: missing");
   expect_user_error(check("map: absent.pfmap\n"), "absent.pfmap: cannot open");
-  expect_user_error(check(map_line + "sede: 1\n"), "s.yaml:2: sede: unknown key; did you mean 'seed'");
-  expect_user_error(check(map_line + "output:\n  trajectory_rate: -5\n"), "s.yaml:3: output.trajectory_rate");
+  expect_user_error(check(map_line + "sede: 1\n"),
+                    "s.yaml:2: sede: unknown key; did you mean 'seed'");
+  expect_user_error(check(map_line + "output:\n  trajectory_rate: -5\n"),
+                    "s.yaml:3: output.trajectory_rate");
   expect_user_error(check(map_line + "mission:\n  speed: 2 km/h\n"), "plain number in m/s");
   expect_user_error(check(map_line + "vehicle: {model: helicopter}\n"), "quad_330");
   expect_user_error(check(map_line + "lidars:\n  - model: mid3600\n"), "did you mean 'mid360'");
-  expect_user_error(check(map_line + "vehicle:\n  start: [12, 10, 0.3]\n"), "s.yaml:3: vehicle.start");
+  expect_user_error(check(map_line + "vehicle:\n  start: [12, 10, 0.3]\n"),
+                    "s.yaml:3: vehicle.start");
   expect_user_error(check(map_line + "vehicle: [\n"), "not valid YAML");
 }
 
@@ -236,10 +267,11 @@ TEST_F(Program, EndsOneForAMissionCutShortAndForACollisionUnderStop) {
                          map()));
   EXPECT_EQ(run(fmt::format("fly {} -o {}", folder / "s.yaml", folder / "a")).code, 1);
   // into the ground
-  write_file(folder / "t.yaml",
-             fmt::format("map: {}\nlidars: []\nvehicle:\n  start: [12, 10, 3]\n  on_collision: stop\n"
-                         "mission:\n  waypoints:\n    - [12, 10, -3]\n",
-                         map()));
+  write_file(
+      folder / "t.yaml",
+      fmt::format("map: {}\nlidars: []\nvehicle:\n  start: [12, 10, 3]\n  on_collision: stop\n"
+                  "mission:\n  waypoints:\n    - [12, 10, -3]\n",
+                  map()));
   const Result crash = run(fmt::format("fly {} -o {}", folder / "t.yaml", folder / "b"));
   EXPECT_EQ(crash.code, 1);
   expect_contains(crash.err, "t.yaml:8: warning: the leg to waypoint 1 passes through the map");
@@ -252,7 +284,8 @@ TEST_F(Program, AFullDiskWhileFlyingIsSaid) {
   const TemporaryFolder folder;
   write_file(folder / "s.yaml",
              fmt::format("map: {}\nduration: 3\nvehicle:\n  start: [12, 10, 4]\n", map()));
-  const Result full = run(fmt::format("fly {} -o {}", folder / "s.yaml", folder / "run"), "ulimit -f 64;");
+  const Result full =
+      run(fmt::format("fly {} -o {}", folder / "s.yaml", folder / "run"), "ulimit -f 64;");
   EXPECT_EQ(full.code, 2);
   expect_contains(full.err, "cannot write: File too large");
   EXPECT_FALSE(std::filesystem::exists(folder / "run/summary.json"));
@@ -260,15 +293,17 @@ TEST_F(Program, AFullDiskWhileFlyingIsSaid) {
   for (const auto& entry : std::filesystem::recursive_directory_iterator(folder / "run")) {
     EXPECT_NE(entry.path().extension(), ".partial") << entry.path();
   }
-  expect_user_error(run(fmt::format("fly {} -o /proc/nowhere", folder / "s.yaml")), "/proc/nowhere");
+  expect_user_error(run(fmt::format("fly {} -o /proc/nowhere", folder / "s.yaml")),
+                    "/proc/nowhere");
 }
 
 TEST_F(Program, AnInterruptClosesTheFilesAndEnds130) {
   const TemporaryFolder folder;
   write_file(folder / "s.yaml",
              fmt::format("map: {}\nduration: 100\nvehicle:\n  start: [12, 10, 4]\n", map()));
-  const Result result = run(fmt::format("fly {} -o {} --rate 1.0", folder / "s.yaml", folder / "run"),
-                            "timeout --preserve-status -s INT 2");
+  const Result result =
+      run(fmt::format("fly {} -o {} --rate 1.0", folder / "s.yaml", folder / "run"),
+          "timeout --preserve-status -s INT 2");
   EXPECT_EQ(result.code, 130) << result.err;
   const auto summary = nlohmann::json::parse(read_file(folder / "run/summary.json"));
   EXPECT_EQ(summary["end"], "interrupted");

@@ -50,20 +50,25 @@ void expect_points(const std::vector<CloudPoint>& got, bool intensity) {
   }
 }
 
-std::string pcd_header(const char* fields, const char* sizes, const char* types, const char* data,
-                       int points = 3) {
+std::string pcd_header(
+    const char* fields, const char* sizes, const char* types, const char* data, int points = 3) {
   return fmt::format(
       "# .PCD v0.7\nVERSION 0.7\nFIELDS {}\nSIZE {}\nTYPE {}\nWIDTH {}\nHEIGHT 1\n"
       "VIEWPOINT 0 0 0 1 0 0 0\nPOINTS {}\nDATA {}\n",
-      fields, sizes, types, points, points, data);
+      fields,
+      sizes,
+      types,
+      points,
+      points,
+      data);
 }
 
 TEST(Pcd, AsciiWithFieldsInAnyOrder) {
   const TemporaryFolder folder;
   std::string text = pcd_header("intensity z y x label", "4 4 4 4 4", "F F F F U", "ascii");
   for (const CloudPoint& p : kPoints) {
-    text += fmt::format("{} {} {} {} 7\n", p.intensity, p.position.z(), p.position.y(),
-                        p.position.x());
+    text +=
+        fmt::format("{} {} {} {} 7\n", p.intensity, p.position.z(), p.position.y(), p.position.x());
   }
   write_file(folder / "a.pcd", text);
   expect_points(read_all(folder / "a.pcd"), true);
@@ -91,8 +96,10 @@ std::string compressed_pcd() {
   for (const CloudPoint& p : kPoints) put(columns, p.position.z());
   for (const CloudPoint& p : kPoints) put(columns, p.intensity);
   std::string packed(columns.size() * 2 + 16, '\0');
-  const unsigned size = lzf_compress(columns.data(), static_cast<unsigned>(columns.size()),
-                                     packed.data(), static_cast<unsigned>(packed.size()));
+  const unsigned size = lzf_compress(columns.data(),
+                                     static_cast<unsigned>(columns.size()),
+                                     packed.data(),
+                                     static_cast<unsigned>(packed.size()));
   std::string bytes = pcd_header("x y z intensity", "4 4 8 4", "F F F F", "binary_compressed");
   put(bytes, size);
   put(bytes, static_cast<std::uint32_t>(columns.size()));
@@ -138,9 +145,11 @@ TEST(Pcd, BadFilesSayWhereAndWhat) {
       {pcd_header("x y z", "4 4 3", "F F F", "ascii"), "a float of 3 bytes"},
       {pcd_header("x y z", "4 4 -4", "F F F", "ascii"), "SIZE wants a whole number"},
       {pcd_header("x y z", "4 4 4", "F F F", "zipped"), "DATA 'zipped' is unknown"},
-      {pcd_header("x y z", "4 4 4", "F F F", "ascii") + "1 2 3\n1 two 3\n", ":12: 'two' is no number"},
+      {pcd_header("x y z", "4 4 4", "F F F", "ascii") + "1 2 3\n1 two 3\n",
+       ":12: 'two' is no number"},
       {pcd_header("x y z", "4 4 4", "F F F", "ascii") + "1 2 3\n1 2\n", ":12: 2 numbers"},
-      {pcd_header("x y z", "4 4 4", "F F F", "ascii") + "1 2 3\n", "promises 3 points, the file has 1"},
+      {pcd_header("x y z", "4 4 4", "F F F", "ascii") + "1 2 3\n",
+       "promises 3 points, the file has 1"},
       {cut, "promises 3 points of 12 bytes, the file has 1"},
       {pcd_header("x y z", "4 4 4", "F F F", "binary", 1000000000), "promises 1000000000 points"},
       {bad_lzf, "cut off"},
@@ -167,8 +176,8 @@ TEST(Ply, AsciiAfterAnotherElement) {
   const TemporaryFolder folder;
   std::string text = ply_header("ascii") + "2 5 6 1.5\n";
   for (const CloudPoint& p : kPoints) {
-    text += fmt::format("255 {} {} {} {}\n", p.position.x(), p.position.y(), p.position.z(),
-                        p.intensity);
+    text += fmt::format(
+        "255 {} {} {} {}\n", p.position.x(), p.position.y(), p.position.z(), p.intensity);
   }
   write_file(folder / "a.ply", text);
   expect_points(read_all(folder / "a.ply"), true);
@@ -205,15 +214,18 @@ TEST(Ply, BadFilesSayWhereAndWhat) {
   };
   const Case cases[] = {
       {"plx\n", "not 'ply'"},
-      {"ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n1\n", "lacks x, y or z"},
+      {"ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n1\n",
+       "lacks x, y or z"},
       {"ply\nformat octal 1.0\nend_header\n", "format 'octal' is unknown"},
       {"ply\nformat ascii 1.0\nend_header\n", "no 'vertex' element"},
       {"ply\nformat ascii 1.0\nelement vertex 1\n", "no end_header"},
       {"ply\nformat ascii 1.0\nelement vertex 2\nproperty quad x\n", "type 'quad' is unknown"},
-      {"ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float "
+      {"ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty "
+       "float "
        "z\nend_header\n1 2 3\n4 5\n",
        ":9: too few numbers"},
-      {"ply\nformat binary_little_endian 1.0\nelement vertex 1000000000\nproperty float x\nproperty "
+      {"ply\nformat binary_little_endian 1.0\nelement vertex 1000000000\nproperty float "
+       "x\nproperty "
        "float y\nproperty float z\nend_header\nabc",
        "promises 1000000000 vertices"},
   };
@@ -256,7 +268,9 @@ std::string las(unsigned minor, unsigned format) {
   const std::size_t header = minor >= 4 ? 375 : 227;
   const std::size_t point = format == 6 ? 30 : 20;
   std::string bytes(header, '\0');
-  const auto set = [&](std::size_t at, auto value) { std::memcpy(&bytes[at], &value, sizeof value); };
+  const auto set = [&](std::size_t at, auto value) {
+    std::memcpy(&bytes[at], &value, sizeof value);
+  };
   std::memcpy(bytes.data(), "LASF", 4);
   bytes[24] = 1;
   bytes[25] = static_cast<char>(minor);
@@ -357,10 +371,11 @@ TEST(Mesh, IsSampledEvenlyByArea) {
 
 TEST(Mesh, APlyWithFacesIsAMesh) {
   const TemporaryFolder folder;
-  write_file(folder / "a.ply",
-             "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
-             "property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n"
-             "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n");
+  write_file(
+      folder / "a.ply",
+      "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+      "property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n"
+      "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n");
   EXPECT_TRUE(is_mesh(folder / "a.ply"));
 }
 

@@ -36,8 +36,10 @@ TEST(Lidar, AScanTakenWhileFlyingUsesThePoseOfEachBeam) {
   const Scan scan = lidar.take(request, moving, *renderer, executor);
   EXPECT_GT(scan.points.size(), 19000u);
   const auto off_wall = [](const Vector3d& p) {
-    return std::min({std::abs(std::abs(p.x()) - 6), std::abs(std::abs(p.y()) - 6),
-                     std::abs(p.z() + 2), std::abs(p.z() - 4)});
+    return std::min({std::abs(std::abs(p.x()) - 6),
+                     std::abs(std::abs(p.y()) - 6),
+                     std::abs(p.z() + 2),
+                     std::abs(p.z() - 4)});
   };
   double worst = 0.0;
   double mean_own = 0.0;

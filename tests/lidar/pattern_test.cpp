@@ -75,8 +75,8 @@ TEST(Mid360, MatchesThePublishedTable) {
   std::size_t row = 0;
   for (std::uint64_t scan = 0; scan < 20; ++scan) {
     for (const Beam& beam : pattern->beams(scan, executor)) {
-      const Vector3d truth = direction_of(table[2 * row] * 0.01 * kDegree,
-                                          table[2 * row + 1] * 0.01 * kDegree);
+      const Vector3d truth =
+          direction_of(table[2 * row] * 0.01 * kDegree, table[2 * row + 1] * 0.01 * kDegree);
       const double error = angle_between_deg(truth, beam.direction_sensor.cast<double>());
       worst = std::max(worst, error);
       sum += error;
@@ -173,9 +173,14 @@ TEST(Prisms, Mid40AndMid70MatchTheirTables) {
     const std::string yaml = fmt::format(
         "range_max: 90\npattern: prisms\nprisms:\n  shot_rate: 100000\n  shot_phase: 1\n"
         "  line_heights: [0]\n  wedges:\n"
-        "    - {{angle_deg: 18, index: {0}, rate: 121.5666666666666667, phase_deg: {1}, flat_first: {2}}}\n"
-        "    - {{angle_deg: 18, index: {0}, rate: -77.7333333333333333, phase_deg: {1}, flat_first: {3}}}\n",
-        c.index, c.phase, c.first_flat, !c.first_flat);
+        "    - {{angle_deg: 18, index: {0}, rate: 121.5666666666666667, phase_deg: {1}, "
+        "flat_first: {2}}}\n"
+        "    - {{angle_deg: 18, index: {0}, rate: -77.7333333333333333, phase_deg: {1}, "
+        "flat_first: {3}}}\n",
+        c.index,
+        c.phase,
+        c.first_flat,
+        !c.first_flat);
     const auto pattern = make_pattern(parse_lidar(yaml, "mid.yaml"));
     const Executor executor(2);
     const auto beams = pattern->beams(0, executor);
@@ -205,7 +210,9 @@ TEST(Vlp32c, FiresItsChannelsAtTheirTimesAndAngles) {
   EXPECT_NEAR(low, -25.0, 1e-4);
   EXPECT_NEAR(high, 15.0, 1e-4);
   // the head turns clockwise seen from above, 36 deg in 10 ms
-  const auto ring0_azimuth = [&](std::size_t cycle) { return angles_of(beams[cycle * 32]).azimuth_deg; };
+  const auto ring0_azimuth = [&](std::size_t cycle) {
+    return angles_of(beams[cycle * 32]).azimuth_deg;
+  };
   EXPECT_NEAR(ring0_azimuth(0), -1.4, 1e-3);  // rot_correction -1.4: clockwise by 1.4
   EXPECT_NEAR(ring0_azimuth(181) - ring0_azimuth(0), -3600.0 * 181 * 55.296e-6, 1e-3);
   // a pair of channels fires every 2.304 us
@@ -245,7 +252,7 @@ TEST(Ouster, ColumnsShareATimeAndBeamsLeaveTheRing) {
 TEST(Grids, MarsimGridAndDepthCamera) {
   const auto grid = scan_of("marsim_grid");
   ASSERT_EQ(grid.size(), 385u * 350u);
-  EXPECT_NEAR(angles_of(grid.front()).azimuth_deg, 38.4, 1e-3);   // half a cell inside 77 deg
+  EXPECT_NEAR(angles_of(grid.front()).azimuth_deg, 38.4, 1e-3);  // half a cell inside 77 deg
   EXPECT_NEAR(angles_of(grid.front()).elevation_deg, 34.9, 1e-3);
   EXPECT_NEAR(angles_of(grid.back()).azimuth_deg, -38.4, 1e-3);
   const auto camera = scan_of("d455");
@@ -289,8 +296,10 @@ TEST(LidarSettings, BadFilesSayWhereAndWhat) {
   expect_contains(error("range_max: 10\nrate: 10 Hz\npattern: rotor\n"), "plain number in Hz");
   expect_contains(error("range_max: 10\nrange_min: 20\npattern: rotor\n"), "x.yaml:2: range_min");
   expect_contains(error("range_max: 10\npattern: rings\n"), "name the CSV");
-  expect_contains(error("range_max: 10\npattern: rings\nrings: {table: absent.csv}\n"), "absent.csv");
-  expect_contains(error("range_max: 10\npattern: grid\ngrid: {projection: pinhole}\n"), "fx and fy");
+  expect_contains(error("range_max: 10\npattern: rings\nrings: {table: absent.csv}\n"),
+                  "absent.csv");
+  expect_contains(error("range_max: 10\npattern: grid\ngrid: {projection: pinhole}\n"),
+                  "fx and fy");
 }
 
 }  // namespace

@@ -113,8 +113,8 @@ TEST(Import, EmptyAndAllNanCloudsAreErrors) {
 TEST(Import, TooWideForTheResolutionIsAnError) {
   ImportOptions options;
   options.resolution = 0.001;
-  const std::vector<CloudPoint> points = {{{0, 0, 0}, 0}, {{5000, 0, 0}, 0}, {{5001, 0, 0}, 0},
-                                          {{5002, 0, 0}, 0}};
+  const std::vector<CloudPoint> points = {
+      {{0, 0, 0}, 0}, {{5000, 0, 0}, 0}, {{5001, 0, 0}, 0}, {{5002, 0, 0}, 0}};
   expect_contains(error_of([&] { import_points(points, options); }), "coarser --resolution");
 }
 
@@ -134,7 +134,8 @@ TEST(Import, TakesStrayPointsOutAndLeavesEvenlySparseGroundIn) {
   const RandomStream random(1, StreamId::kTest, 0);
   constexpr std::size_t kStray = 40;
   for (std::uint64_t i = 0; i < kStray; ++i) {
-    points.push_back({{random.uniform(3 * i, 1.0, 5.0), random.uniform(3 * i + 1, 1.0, 4.0),
+    points.push_back({{random.uniform(3 * i, 1.0, 5.0),
+                       random.uniform(3 * i + 1, 1.0, 4.0),
                        random.uniform(3 * i + 2, 1.9, 2.4)},
                       0.0f});
   }
@@ -180,7 +181,7 @@ TEST(Import, KeepsIntensities) {
   options.resolution = 0.1;
   const Executor executor(1);
   const ImportedMap imported = import_clouds({folder / "a.pcd"}, options, executor);
-  write_map(folder / "a.pfmap", imported.tree, imported.description);
+  write_map(OutputFile(folder / "a.pfmap"), imported.tree, imported.description);
   const auto map = SurfelMap::open(folder / "a.pfmap");
   ASSERT_TRUE(map->has_intensity());
   EXPECT_NEAR(map->intensity(map->nearest({3, 2, 2.95}, 1.0)->word), 200.0f, 1.0f);
@@ -225,13 +226,15 @@ double brute_force_distance(const SurfelMap& map, const Vector3d& p) {
     const LeafHeader leaf = decode_leaf(map.words()[at]);
     for (std::size_t i = 1; i <= leaf.count; ++i) {
       const Surfel s = decode(map.words()[at + i]);
-      const Vector3d center = map.origin_world() + map.resolution() * (Vector3d(leaf.x, leaf.y, leaf.z) +
-                                                   s.center_voxels.cast<double>());
+      const Vector3d center =
+          map.origin_world() +
+          map.resolution() * (Vector3d(leaf.x, leaf.y, leaf.z) + s.center_voxels.cast<double>());
       const Vector3d local = s.axes.cast<double>().transpose() * (p - center);
       Vector3d outside;
       for (int k = 0; k < 3; ++k) {
-        outside[k] = std::max(0.0, std::abs(local[k]) - std::sqrt(3.0) * static_cast<double>(s.s[k]) *
-                                                            map.resolution());
+        outside[k] = std::max(
+            0.0,
+            std::abs(local[k]) - std::sqrt(3.0) * static_cast<double>(s.s[k]) * map.resolution());
       }
       best = std::min(best, outside.norm());
     }
@@ -244,7 +247,8 @@ TEST(Nearest, EqualsBruteForce) {
   const auto map = map_of(room(), 0.1, 8.0, 0.005);
   const RandomStream random(3, StreamId::kTest, 0);
   for (std::uint64_t i = 0; i < 300; ++i) {
-    const Vector3d p(random.uniform(3 * i, -2, 8), random.uniform(3 * i + 1, -2, 7),
+    const Vector3d p(random.uniform(3 * i, -2, 8),
+                     random.uniform(3 * i + 1, -2, 7),
                      random.uniform(3 * i + 2, -2, 5));
     const double truth = brute_force_distance(*map, p);
     const auto found = map->nearest(p, 100.0);
@@ -259,7 +263,7 @@ TEST(MapFile, OpensFromDiskAndVerifies) {
   ImportOptions options;
   options.resolution = 0.1;
   const ImportedMap imported = import_points(cloud_of(room(), 800.0), options);
-  write_map(folder / "a.pfmap", imported.tree, imported.description);
+  write_map(OutputFile(folder / "a.pfmap"), imported.tree, imported.description);
   const auto map = SurfelMap::open(folder / "a.pfmap");
   map->verify();
   EXPECT_EQ(map->surfel_count(), imported.report.surfels);
@@ -279,7 +283,10 @@ TEST(MapFile, DamageIsFoundAndNeverCrashes) {
     return SurfelMap::from_bytes(bytes, "a.pfmap");
   };
   expect_contains(error_of([&] { open({good.begin(), good.begin() + 100}); }), "cut off");
-  expect_contains(error_of([&] { open({good.begin(), good.begin() + 5000}); }), "does not lie inside");
+  expect_contains(error_of([&] {
+                    open({good.begin(), good.begin() + 5000});
+                  }),
+                  "does not lie inside");
   auto wrong = good;
   wrong[0] = std::byte{'X'};
   expect_contains(error_of([&] { open(wrong); }), "not a .pfmap file");

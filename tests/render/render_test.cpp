@@ -19,14 +19,17 @@ namespace {
 using testing::map_of;
 
 /// A grid of rays from one origin, `step_deg` apart.
-std::vector<Ray> fan(const Vector3d& origin, double half_width_deg, double half_height_deg,
-                     double step_deg, float range_max = 50.0f, double yaw_deg = 0.0) {
+std::vector<Ray> fan(const Vector3d& origin,
+                     double half_width_deg,
+                     double half_height_deg,
+                     double step_deg,
+                     float range_max = 50.0f,
+                     double yaw_deg = 0.0) {
   std::vector<Ray> rays;
   for (double el = -half_height_deg; el <= half_height_deg; el += step_deg) {
     for (double az = -half_width_deg; az <= half_width_deg; az += step_deg) {
-      rays.push_back({origin,
-                      direction_of((az + yaw_deg) * kDegree, el * kDegree).cast<float>(),
-                      range_max});
+      rays.push_back(
+          {origin, direction_of((az + yaw_deg) * kDegree, el * kDegree).cast<float>(), range_max});
     }
   }
   return rays;
@@ -46,12 +49,14 @@ std::vector<Hit> render(const Renderer& renderer, const std::vector<Ray>& rays, 
 struct Errors {
   double median = 0.0;
   double p95 = 0.0;
-  double early = 0.0;   ///< Share of rays with a true return, more than 0.1 m too near.
-  double leak = 0.0;    ///< Too far by 0.1 m, or missed.
+  double early = 0.0;  ///< Share of rays with a true return, more than 0.1 m too near.
+  double leak = 0.0;   ///< Too far by 0.1 m, or missed.
   double false_returns = 0.0;
 };
 
-Errors compare(const ShapeScene& scene, const std::vector<Ray>& rays, const std::vector<Hit>& hits) {
+Errors compare(const ShapeScene& scene,
+               const std::vector<Ray>& rays,
+               const std::vector<Hit>& hits) {
   std::vector<double> errors;
   Errors result;
   double truths = 0.0;
@@ -152,8 +157,8 @@ TEST(BeamRenderer, ReportsTheAngleOfIncidence) {
   scene.add_rectangle({5, -10, -10}, {0, 20, 0}, {0, 0, 20});
   const BeamRenderer renderer(Scene{map_of(scene, 0.05)});
   for (const double az_deg : {0.0, 20.0, 45.0, 60.0}) {
-    const Hit hit = renderer.trace(
-        {{0, 0, 0}, direction_of(az_deg * kDegree, 0).cast<float>(), 50.0f});
+    const Hit hit =
+        renderer.trace({{0, 0, 0}, direction_of(az_deg * kDegree, 0).cast<float>(), 50.0f});
     ASSERT_TRUE(hit.is_return());
     EXPECT_NEAR(hit.cos_incidence, std::cos(az_deg * kDegree), 0.02);
   }
@@ -182,7 +187,8 @@ TEST(BeamRenderer, EndsAtItsRange) {
 /// The measurement model without a tree: every surfel is tested, in double precision.
 Hit brute_force(const SurfelMap& map, const Ray& ray) {
   const double r = map.resolution();
-  const double m2_max = static_cast<double>(map.model().support) * static_cast<double>(map.model().support);
+  const double m2_max =
+      static_cast<double>(map.model().support) * static_cast<double>(map.model().support);
   const double c = 36.0 / (kPi * m2_max);
   const Vector3d d = ray.direction_world.cast<double>();
   HitList list;
@@ -190,18 +196,20 @@ Hit brute_force(const SurfelMap& map, const Ray& ray) {
     const LeafHeader leaf = decode_leaf(map.words()[at]);
     for (std::size_t i = 1; i <= leaf.count; ++i) {
       const Surfel s = decode(map.words()[at + i]);
-      const Vector3d center =
-          map.origin_world() + r * (Vector3d(leaf.x, leaf.y, leaf.z) + s.center_voxels.cast<double>());
+      const Vector3d center = map.origin_world() + r * (Vector3d(leaf.x, leaf.y, leaf.z) +
+                                                        s.center_voxels.cast<double>());
       const Vector3d inverse = (r * s.s.cast<double>()).cwiseInverse();
-      const Vector3d u = inverse.cwiseProduct(s.axes.cast<double>().transpose() *
-                                              (center - ray.origin_world));
+      const Vector3d u =
+          inverse.cwiseProduct(s.axes.cast<double>().transpose() * (center - ray.origin_world));
       const Vector3d v = inverse.cwiseProduct(s.axes.cast<double>().transpose() * d);
       const double t = u.dot(v) / v.squaredNorm();
       const double m2 = (u - t * v).squaredNorm();
       if (m2 >= m2_max || t < 0.0 || t > static_cast<double>(ray.range_max)) continue;
       const double share = 1.0 - m2 / m2_max;
       if (list.full()) list.drop_farthest();
-      list.add({static_cast<float>(t), static_cast<float>(c * share * share), map.words()[at + i],
+      list.add({static_cast<float>(t),
+                static_cast<float>(c * share * share),
+                map.words()[at + i],
                 static_cast<std::uint32_t>(at + i)});
     }
     at += leaf.count + 1;
@@ -224,7 +232,8 @@ TEST(BeamRenderer, EqualsTheModelWithoutATree) {
   int differing = 0;
   for (std::uint64_t i = 0; i < 1500; ++i) {
     Ray ray;
-    ray.origin_world = {random.uniform(8 * i, 0.2, 5.8), random.uniform(8 * i + 1, 0.2, 4.8),
+    ray.origin_world = {random.uniform(8 * i, 0.2, 5.8),
+                        random.uniform(8 * i + 1, 0.2, 4.8),
                         random.uniform(8 * i + 2, 0.2, 2.8)};
     ray.direction_world =
         direction_of(random.uniform(8 * i + 3, -kPi, kPi), random.uniform(8 * i + 4, -1.5, 1.5))
@@ -311,7 +320,7 @@ class PaperAgainstBeam : public ::testing::Test {
   /// Median difference where both return, and the shares of rays where only one does.
   struct Agreement {
     double median;
-    double within;     ///< 0.1 m, of the rays where both return.
+    double within;  ///< 0.1 m, of the rays where both return.
     double only_beam;
     double only_paper;
   };

@@ -34,7 +34,8 @@ TEST(SmoothMove, KeepsItsLimitsAndArrives) {
       EXPECT_LE(s.speed, limits.speed * (1 + 1e-9));
       EXPECT_LE(std::abs(s.acceleration), limits.acceleration * (1 + 1e-9));
       EXPECT_LE(std::abs(s.acceleration - last_acceleration), limits.jerk * h * (1 + 1e-6));
-      EXPECT_NEAR(s.speed - last_speed, h * 0.5 * (s.acceleration + last_acceleration),
+      EXPECT_NEAR(s.speed - last_speed,
+                  h * 0.5 * (s.acceleration + last_acceleration),
                   limits.jerk * h * h);
       last_speed = s.speed;
       last_acceleration = s.acceleration;
@@ -157,8 +158,10 @@ Scenario short_flight() {
   return scenario;
 }
 
-RunSummary run(const Scenario& scenario, const std::shared_ptr<const SurfelMap>& map,
-               SampleSink& sink, int threads = 2) {
+RunSummary run(const Scenario& scenario,
+               const std::shared_ptr<const SurfelMap>& map,
+               SampleSink& sink,
+               int threads = 2) {
   const Executor executor(threads);
   Simulation simulation(scenario, map, executor);
   while (simulation.step(sink)) {
@@ -254,8 +257,8 @@ TEST(Simulation, AMissionCutShortIsUnfinished) {
 }
 
 TEST(Simulation, AStartInsideTheMapIsAnError) {
-  Scenario scenario = parse_scenario(
-      "map: a.pfmap\nvehicle:\n  model: quad_330\n  start: [8, 5.1, 1]\n", "s.yaml");
+  Scenario scenario =
+      parse_scenario("map: a.pfmap\nvehicle:\n  model: quad_330\n  start: [8, 5.1, 1]\n", "s.yaml");
   const auto map = hall();
   const std::string error = error_of([&] { Simulation(scenario, map, Executor(1)); });
   expect_contains(error, "s.yaml:4: vehicle.start");

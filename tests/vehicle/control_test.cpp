@@ -13,7 +13,7 @@ namespace {
 struct Response {
   double rise_time = 0.0;  ///< 10 % to 90 %.
   double overshoot = 0.0;
-  double settling = 0.0;   ///< Last time outside 5 %.
+  double settling = 0.0;  ///< Last time outside 5 %.
 };
 
 Response measure(const std::vector<double>& y, double dt) {
@@ -52,8 +52,7 @@ std::vector<double> linear_horizontal_step(const VehicleSettings& v, double dura
       const double acceleration = wn * wn * e - 2 * p.damping * wn * dx + integral;
       integral += p.integral * wn * wn * wn * e * h;
       const double wa = a.natural_frequency;
-      const double command =
-          wa * wa * (acceleration / kGravity - th) - 2 * a.damping * wa * dth;
+      const double command = wa * wa * (acceleration / kGravity - th) - 2 * a.damping * wa * dth;
       if (ideal) {
         u = command;
       } else {
@@ -98,7 +97,8 @@ std::vector<double> linear_vertical_step(const VehicleSettings& v, double durati
   return y;
 }
 
-std::vector<double> simulated_step(const VehicleSettings& settings, const Vector3d& direction,
+std::vector<double> simulated_step(const VehicleSettings& settings,
+                                   const Vector3d& direction,
                                    double duration) {
   const Multirotor vehicle(settings);
   const auto controller = make_controller(settings);
@@ -148,7 +148,8 @@ TEST_P(StepResponse, VerticalFollowsTheLinearLoop) {
                measure(linear_vertical_step(settings, 12.0, 1e-3), 1e-3));
 }
 
-INSTANTIATE_TEST_SUITE_P(Vehicles, StepResponse,
+INSTANTIATE_TEST_SUITE_P(Vehicles,
+                         StepResponse,
                          ::testing::Values("quad_330", "lee2010", "marsim_quad"));
 
 /// RMS distance from a circle of 3 m radius in steady flight, with feed-forward.
@@ -186,7 +187,8 @@ TEST(CascadedPid, TracksACircleBetterThanTheReleasedController) {
   settings.rotor.damping = 1.0;
   const double lagged = circle_error(settings, 3.0, 3.0);
   std::printf("circle r 3 m at 3 m/s: %.2f mm RMS with ideal motors, %.2f mm with 20 ms of lag\n",
-              ideal * 1e3, lagged * 1e3);
+              ideal * 1e3,
+              lagged * 1e3);
   EXPECT_LT(ideal, 0.022);
   EXPECT_LT(lagged, 0.022);
 }

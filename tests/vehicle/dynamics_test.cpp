@@ -93,7 +93,8 @@ TEST(Multirotor, HoversAtTheAnalyticRotorSpeed) {
   for (const char* name : {"lee2010", "marsim_quad", "quad_330"}) {
     SCOPED_TRACE(name);
     const VehicleSettings settings = load_vehicle(name);
-    const double w = std::sqrt(settings.mass * kGravity / (4.0 * settings.rotor.thrust_coefficient));
+    const double w =
+        std::sqrt(settings.mass * kGravity / (4.0 * settings.rotor.thrust_coefficient));
     EXPECT_NEAR(settings.hover_speed(), w, 1e-9);
     const Multirotor vehicle(settings);
     VehicleState state = vehicle.hover_at({0, 0, 5}, 0.0);

@@ -53,8 +53,8 @@ TEST(FreeSpace, FindsATourInsideTheRoomAndAroundItsWall) {
   }
   EXPECT_TRUE(left && right);
   for (std::size_t i = 1; i < tour->points_world.size(); ++i) {
-    EXPECT_GE(clearance_along(*map, tour->points_world[i - 1], tour->points_world[i],
-                              options.radius, 1.0),
+    EXPECT_GE(clearance_along(
+                  *map, tour->points_world[i - 1], tour->points_world[i], options.radius, 1.0),
               options.margin - 0.01);
   }
   const auto again = find_tour(*map, options, Executor(1));

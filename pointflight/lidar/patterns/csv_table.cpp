@@ -35,7 +35,9 @@ CsvTable::CsvTable(const std::string& path) : name_(path) {
   parse(as_text(file.bytes()));
 }
 
-CsvTable::CsvTable(std::string_view text, const std::string& name) : name_(name) { parse(text); }
+CsvTable::CsvTable(std::string_view text, const std::string& name) : name_(name) {
+  parse(text);
+}
 
 void CsvTable::parse(std::string_view text) {
   LineCursor lines(text);

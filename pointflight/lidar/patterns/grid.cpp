@@ -16,17 +16,17 @@ class GridPattern : public BeamPattern {
     const GridSettings& s = settings.grid;
     const bool pinhole = s.projection == "pinhole";
     if (pinhole && (s.fx <= 0.0 || s.fy <= 0.0)) {
-      throw InputError(fmt::format("{}: grid: a pinhole projection needs fx and fy", settings.path));
+      throw InputError(
+          fmt::format("{}: grid: a pinhole projection needs fx and fy", settings.path));
     }
     for (std::int64_t row = 0; row < s.rows; ++row) {
       for (std::int64_t column = 0; column < s.columns; ++column) {
         const auto u = static_cast<double>(column);
         const auto v = static_cast<double>(row);
         const Vector3d direction =
-            pinhole
-                ? Vector3d(1.0, -(u - s.cx) / s.fx, -(v - s.cy) / s.fy).normalized()
-                : direction_of(cell_angle(column, s.columns, s.fov_horizontal_deg),
-                               cell_angle(row, s.rows, s.fov_vertical_deg));
+            pinhole ? Vector3d(1.0, -(u - s.cx) / s.fx, -(v - s.cy) / s.fy).normalized()
+                    : direction_of(cell_angle(column, s.columns, s.fov_horizontal_deg),
+                                   cell_angle(row, s.rows, s.fov_vertical_deg));
         beams_.push_back({Vector3f::Zero(),
                           direction.cast<float>(),
                           Duration{0},

@@ -17,8 +17,8 @@ namespace {
 
 CsvTable load_table(const LidarSettings& settings) {
   if (settings.rings.table.empty()) {
-    throw InputError(fmt::format("{}: rings.table: missing; name the CSV of channels",
-                                 settings.path));
+    throw InputError(
+        fmt::format("{}: rings.table: missing; name the CSV of channels", settings.path));
   }
   const std::string folder = std::filesystem::path(settings.path).parent_path().string();
   return CsvTable(resolve_path(settings.rings.table, folder));
@@ -30,8 +30,7 @@ CsvTable load_table(const LidarSettings& settings) {
 class VelodynePattern : public BeamPattern {
  public:
   explicit VelodynePattern(const LidarSettings& settings)
-      : rate_(settings.rate),
-        train_(1e6 / settings.rings.cycle_us, Duration{0}, settings.rate) {
+      : rate_(settings.rate), train_(1e6 / settings.rings.cycle_us, Duration{0}, settings.rate) {
     const CsvTable table = load_table(settings);
     const int ring = table.require("ring");
     const int elevation = table.require("elevation_deg");
@@ -40,7 +39,7 @@ class VelodynePattern : public BeamPattern {
     const int vertical = table.find("vert_offset_mm");
     const int horizontal = table.find("horiz_offset_mm");
     for (std::size_t row = 0; row < table.rows(); ++row) {
-      Channel channel;
+      Channel channel{};
       channel.elevation = math::sincos(table.at(row, elevation) * kDegree);
       channel.azimuth = table.at(row, azimuth) * kDegree;
       double time_us = fire_time < 0 ? std::nan("") : table.at(row, fire_time);
@@ -82,7 +81,7 @@ class VelodynePattern : public BeamPattern {
  private:
   struct Channel {
     math::SinCos elevation;
-    double azimuth;     ///< rot_correction, rad
+    double azimuth;  ///< rot_correction, rad
     Duration fire_time;
     double vertical;    ///< m
     double horizontal;  ///< m
@@ -92,8 +91,7 @@ class VelodynePattern : public BeamPattern {
   [[nodiscard]] Beam fire(const Channel& c, SimTime time, SimTime scan_start) const {
     const double turns = rate_ * to_seconds(time);
     const auto a = math::sincos(2.0 * kPi * (turns - std::floor(turns)) - c.azimuth);
-    const Vector3d direction(
-        c.elevation.cos * a.cos, -c.elevation.cos * a.sin, c.elevation.sin);
+    const Vector3d direction(c.elevation.cos * a.cos, -c.elevation.cos * a.sin, c.elevation.sin);
     const Vector3d origin(-c.vertical * c.elevation.sin * a.cos + c.horizontal * a.sin,
                           c.vertical * c.elevation.sin * a.sin + c.horizontal * a.cos,
                           c.vertical * c.elevation.cos);

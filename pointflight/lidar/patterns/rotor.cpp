@@ -8,7 +8,8 @@
 namespace pointflight {
 namespace {
 
-/// Livox Mid-360 (constants fitted to the maker's published table; mean error 0.005 deg, max 0.015).
+/// Livox Mid-360 (constants fitted to the maker's published table; mean error 0.005 deg, max
+/// 0.015).
 ///
 /// In the rotor's frame (T tangential, R radial, K along the shaft) the lasers are fixed in the
 /// housing; light passes a slow wedge, then the rotor's prism and mirror.
@@ -40,8 +41,7 @@ class RotorPattern : public BeamPattern {
   void fire(double t, Duration offset, Beam* beams) const {
     const auto theta = math::sincos(angle_at(s_.rotor_rpm / 60.0, t));
     const double phi = angle_at(s_.wedge_rpm / 60.0, t);
-    const auto psi =
-        math::sincos(phi + s_.wedge_wobble * math::sin(2.0 * phi) + s_.wedge_phase);
+    const auto psi = math::sincos(phi + s_.wedge_wobble * math::sin(2.0 * phi) + s_.wedge_phase);
     const auto wedge = math::sincos(s_.wedge_angle_deg * kDegree);
     const auto mirror = math::sincos(s_.mirror_angle_deg * kDegree);
     const Vector3d inclined(-wedge.sin * psi.sin, -wedge.sin * psi.cos, wedge.cos);
@@ -56,8 +56,7 @@ class RotorPattern : public BeamPattern {
       const double z = mirror.cos * air.y() +
                        mirror.sin * std::sqrt(std::max(0.0, n2 - x * x - air.y() * air.y()));
       const double y = -std::sqrt(std::max(0.0, 1.0 - x * x - z * z));
-      const Vector3d direction(
-          x * theta.cos + y * theta.sin, -x * theta.sin + y * theta.cos, z);
+      const Vector3d direction(x * theta.cos + y * theta.sin, -x * theta.sin + y * theta.cos, z);
       beams[line] = {Vector3f::Zero(),
                      direction.normalized().cast<float>(),
                      offset,

@@ -30,8 +30,7 @@ Matrix3d attitude_from(const Vector3d& b3, double yaw) {
 
 }  // namespace
 
-CascadedPid::CascadedPid(const VehicleSettings& settings)
-    : settings_(settings), mixer_(settings) {}
+CascadedPid::CascadedPid(const VehicleSettings& settings) : settings_(settings), mixer_(settings) {}
 
 void CascadedPid::reset() {
   position_integral_.setZero();
@@ -50,9 +49,8 @@ Vector3d CascadedPid::demanded_acceleration(const RigidBodyState& state,
                                             const PositionCommand& command,
                                             double dt) {
   const ControllerSettings& c = settings_.controller;
-  const Vector3d wn(c.horizontal.natural_frequency,
-                    c.horizontal.natural_frequency,
-                    c.vertical.natural_frequency);
+  const Vector3d wn(
+      c.horizontal.natural_frequency, c.horizontal.natural_frequency, c.vertical.natural_frequency);
   const Vector3d z(c.horizontal.damping, c.horizontal.damping, c.vertical.damping);
   const Vector3d ki = Vector3d(c.horizontal.integral, c.horizontal.integral, c.vertical.integral)
                           .cwiseProduct(wn.cwiseProduct(wn).cwiseProduct(wn));
@@ -70,9 +68,8 @@ Vector3d CascadedPid::demanded_acceleration(const RigidBodyState& state,
   for (int axis = 0; axis < 3; ++axis) {
     const bool cut = std::abs(a[axis] - allowed[axis]) > 1e-9;
     if (cut || std::abs(e_p[axis]) > kIntegralZone) continue;
-    position_integral_[axis] = std::clamp(position_integral_[axis] + ki[axis] * e_p[axis] * dt,
-                                          -c.integral_max,
-                                          c.integral_max);
+    position_integral_[axis] = std::clamp(
+        position_integral_[axis] + ki[axis] * e_p[axis] * dt, -c.integral_max, c.integral_max);
   }
   return allowed;
 }
@@ -93,7 +90,8 @@ CascadedPid::AttitudeDemand CascadedPid::demanded_attitude(const RigidBodyState&
   const Vector3d b3 = f / specific_thrust;
   const Matrix3d rotation = attitude_from(b3, command.yaw);
 
-  // rates that follow the jerk: h = (jerk - (b3 . jerk) b3) / |f|, w = (-h.b2, h.b1, yaw rate on b3)
+  // rates that follow the jerk: h = (jerk - (b3 . jerk) b3) / |f|, w = (-h.b2, h.b1, yaw rate on
+  // b3)
   const Vector3d h = (command.jerk_world - b3.dot(command.jerk_world) * b3) / specific_thrust;
   Vector3d omega(-h.dot(rotation.col(1)), h.dot(rotation.col(0)), command.yaw_rate * b3.z());
   omega = omega.cwiseMax(-c.body_rate_max).cwiseMin(c.body_rate_max);

@@ -5,8 +5,8 @@
 
 namespace pointflight {
 
-/// Cascaded PID (the paper, section IV.C): an outer position loop and an inner attitude loop, each of
-/// second order with a chosen natural frequency wn and damping z, plus an integral:
+/// Cascaded PID (the paper, section IV.C): an outer position loop and an inner attitude loop, each
+/// of second order with a chosen natural frequency wn and damping z, plus an integral:
 ///
 ///   a = a_ff + wn^2 e_p + 2 z wn e_v + ki integral(e_p),        thrust = m (a + g) along body z
 ///   torque = J (wn^2 e_R + 2 z wn e_w + ki integral(e_R)) + w x J w
@@ -26,7 +26,7 @@ class CascadedPid : public Controller {
   struct AttitudeDemand {
     Quaterniond q_world_body;
     Vector3d omega_body;
-    double thrust;
+    double thrust = 0.0;
   };
   [[nodiscard]] Vector3d demanded_acceleration(const RigidBodyState& state,
                                                const PositionCommand& command,
