@@ -1,10 +1,15 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <chrono>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "pointflight/map/surfel_map.hpp"
 #include "tests/support.hpp"
 
 // Whole flights: the same bytes everywhere, and real maps where they are present.
@@ -42,7 +47,7 @@ TEST(Flight, TheSameBytesWhateverTheThreadsAndTheProcessor) {
       run(fmt::format("map forest --size-x 24 --size-y 20 --density 300 -o {}", folder / "m.pcd")),
       0);
   ASSERT_EQ(run(fmt::format("map import {} -o {} --resolution 0.1", folder / "m.pcd", map)), 0);
-  ASSERT_EQ(run(fmt::format("scenario new {} -o {} --length 6", map, folder / "s.yaml")), 0);
+  ASSERT_EQ(run(fmt::format("scenario new {} -o {} --length 3", map, folder / "s.yaml")), 0);
   const auto fly = [&](const std::string& name, int threads, const std::string& environment) {
     EXPECT_EQ(
         run(fmt::format(
@@ -69,42 +74,75 @@ TEST(Flight, TheSameBytesWhateverTheThreadsAndTheProcessor) {
   EXPECT_TRUE(read_file(map) == read_file(folder / "n.pfmap"));
 }
 
+/// Runs the program and returns its peak resident memory in MB; negative where it failed.
+double peak_memory_of(const std::string& arguments) {
+  const std::string command =
+      fmt::format("exec '{}' {} >/dev/null 2>&1", POINTFLIGHT_PROGRAM, arguments);
+  const pid_t child = fork();
+  if (child == 0) {
+    execl("/bin/sh", "sh", "-c", command.c_str(), nullptr);
+    _exit(127);
+  }
+  int status = 0;
+  rusage usage{};
+  wait4(child, &status, 0, &usage);
+  if (!WIFEXITED(status) || WEXITSTATUS(status) != 0) return -1.0;
+  return static_cast<double>(usage.ru_maxrss) * 1024.0 * 1e-6;
+}
+
 struct RealMap {
-  const char* name;
-  const char* flags;
+  std::string name;
+  std::string flags;
+  double length;  ///< Of the flight, m.
 };
 
 class RealFlight : public ::testing::TestWithParam<RealMap> {};
 
-TEST_P(RealFlight, ImportsScansAndFliesFortyMetresWithoutACollision) {
-  const std::string cloud = shared_data(fmt::format("maps/{}.pcd", GetParam().name));
+TEST_P(RealFlight, ImportsScansAndFliesWithoutACollision) {
+  const RealMap& param = GetParam();
+  const std::string cloud = shared_data(fmt::format("maps/{}.pcd", param.name));
   SKIP_WITHOUT(cloud);
   const TemporaryFolder folder;
   const std::string map = folder / "m.pfmap";
-  ASSERT_EQ(run(fmt::format("map import {} -o {} {}", cloud, map, GetParam().flags)), 0);
+  ASSERT_EQ(run(fmt::format("map import {} -o {} {}", cloud, map, param.flags)), 0);
   ASSERT_EQ(run(fmt::format("map info {} --verify", map)), 0);
-  ASSERT_EQ(run(fmt::format("scenario new {} -o {} --length 42", map, folder / "s.yaml")), 0);
-  ASSERT_EQ(run(fmt::format("fly {} -o {}", folder / "s.yaml", folder / "run")), 0);
+  ASSERT_EQ(run(fmt::format(
+                "scenario new {} -o {} --length {}", map, folder / "s.yaml", param.length + 2.0)),
+            0);
+
+  const auto start = std::chrono::steady_clock::now();
+  const auto opened = SurfelMap::open(map);
+  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
+  EXPECT_LT(took.count(), 0.020);
+  EXPECT_GT(opened->surfel_count(), 0u);
+
+  const double memory =
+      peak_memory_of(fmt::format("fly {} -o {}", folder / "s.yaml", folder / "run"));
+  ASSERT_GE(memory, 0.0);
   const auto summary = nlohmann::json::parse(read_file(folder / "run/summary.json"));
   const auto timing = nlohmann::json::parse(read_file(folder / "run/timing.json"));
-  EXPECT_GE(summary["distance_flown"].get<double>(), 40.0);
+  EXPECT_GE(summary["distance_flown"].get<double>(), param.length);
   EXPECT_EQ(summary["collisions"], 0);
   EXPECT_GT(summary["closest_approach"].get<double>(), 0.1);
-  const double factor = timing["real_time_factor"].get<double>();
-  std::printf("%s: %.1f m, closest %.2f m, real-time factor %.1f (this build)\n",
-              GetParam().name,
-              summary["distance_flown"].get<double>(),
-              summary["closest_approach"].get<double>(),
-              factor);
+  EXPECT_LT(memory, 80.0);
+  std::printf(
+      "%s: opened in %.2f ms; %.1f m, closest %.2f m, %.0f MB at most, real-time factor "
+      "%.1f (this build)\n",
+      param.name.c_str(),
+      1e3 * took.count(),
+      summary["distance_flown"].get<double>(),
+      summary["closest_approach"].get<double>(),
+      memory,
+      timing["real_time_factor"].get<double>());
 }
 
 INSTANTIATE_TEST_SUITE_P(Maps,
                          RealFlight,
-                         ::testing::Values(RealMap{"drone_hall", "--resolution 0.05"},
-                                           RealMap{"garage", ""},
-                                           RealMap{"forest_tls", ""},
-                                           RealMap{"catec_testbed", ""}),
-                         [](const auto& info) { return std::string(info.param.name); });
+                         ::testing::Values(RealMap{"drone_hall", "--resolution 0.05", 40.0},
+                                           RealMap{"garage", "", 15.0},
+                                           RealMap{"forest_tls", "", 15.0},
+                                           RealMap{"catec_testbed", "", 15.0}),
+                         [](const auto& info) { return info.param.name; });
 
 }  // namespace
 }  // namespace pointflight

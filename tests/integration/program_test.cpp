@@ -209,7 +209,7 @@ TEST_F(Program, NothingIsLeftWhereAFileCannotBeWritten) {
 TEST_F(Program, ScenarioNewCheckAndFly) {
   const TemporaryFolder folder;
   const std::string yaml = folder / "s.yaml";
-  ASSERT_EQ(run(fmt::format("scenario new {} -o {} --length 10", map(), yaml)).code, 0);
+  ASSERT_EQ(run(fmt::format("scenario new {} -o {} --length 5", map(), yaml)).code, 0);
   expect_contains(read_file(yaml), "# [m/s] greatest speed");
   const Result check = run(fmt::format("scenario check {}", yaml));
   EXPECT_EQ(check.code, 0) << check.err;

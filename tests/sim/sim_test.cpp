@@ -188,6 +188,7 @@ TEST(Simulation, FliesItsMissionAndCountsWhatItDid) {
 TEST(Simulation, TheSameBytesWithOneTwoAndEightThreads) {
   const auto map = hall();
   Scenario scenario = short_flight();
+  scenario.duration = 0.6;
   scenario.lidars.push_back(LidarMount{"avia", {0.1, 0, 0}, {0, 20, 0}, "paper", true, true});
   std::uint64_t first = 0;
   for (const int threads : {1, 2, 8}) {
