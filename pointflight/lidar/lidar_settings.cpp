@@ -128,16 +128,23 @@ void describe(SettingsVisitor& v, LidarSettings& s) {
   Key pattern{"pattern", "", "scan principle; its figures stand in the section of this name"};
   pattern.required = true;
   v.choice(pattern, s.pattern, kPatterns);
-  v.section({"rotor", "", "prism, mirror and wedge on one shaft (Mid-360)"},
-            [&](SettingsVisitor& w) { describe_rotor(w, s.rotor); });
-  v.section({"prisms", "", "refracting wedges on one axis (Avia, Mid-40, Mid-70)"},
-            [&](SettingsVisitor& w) { describe_prisms(w, s.prisms); });
-  v.section({"rings", "", "spinning channels (Velodyne, Ouster)"},
-            [&](SettingsVisitor& w) { describe_rings(w, s.rings); });
-  v.section({"grid", "", "depth camera or dense angular grid"},
-            [&](SettingsVisitor& w) { describe_grid(w, s.grid); });
-  v.section({"csv", "", "a table of directions of your own"},
-            [&](SettingsVisitor& w) { describe_csv(w, s.csv); });
+  // one section, of the pattern's name: another one in the file is a mistake
+  if (s.pattern == "rotor") {
+    v.section({"rotor", "", "prism, mirror and wedge on one shaft (Mid-360)"},
+              [&](SettingsVisitor& w) { describe_rotor(w, s.rotor); });
+  } else if (s.pattern == "prisms") {
+    v.section({"prisms", "", "refracting wedges on one axis (Avia, Mid-40, Mid-70)"},
+              [&](SettingsVisitor& w) { describe_prisms(w, s.prisms); });
+  } else if (s.pattern == "rings") {
+    v.section({"rings", "", "spinning channels (Velodyne, Ouster)"},
+              [&](SettingsVisitor& w) { describe_rings(w, s.rings); });
+  } else if (s.pattern == "grid") {
+    v.section({"grid", "", "depth camera or dense angular grid"},
+              [&](SettingsVisitor& w) { describe_grid(w, s.grid); });
+  } else if (s.pattern == "csv") {
+    v.section({"csv", "", "a table of directions of your own"},
+              [&](SettingsVisitor& w) { describe_csv(w, s.csv); });
+  }
 }
 
 LidarSettings load_lidar(const std::string& name_or_path, const std::string& base) {
