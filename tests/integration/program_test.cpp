@@ -150,6 +150,106 @@ TEST_F(Program, TheSameScanForTheSameSeed) {
   EXPECT_NE(first, scan(2, 1));
 }
 
+/// Little-endian bytes of numbers.
+template <class... T>
+std::string bytes_of(T... values) {
+  std::string bytes;
+  (bytes.append(reinterpret_cast<const char*>(&values), sizeof values), ...);
+  return bytes;
+}
+
+TEST_F(Program, ImportsEveryFormatToTheSameMap) {
+  // a wall of millimetre-exact points in each format
+  const TemporaryFolder folder;
+  std::string xyz;
+  std::string ply;
+  std::string las(227, '\0');
+  std::uint32_t count = 0;
+  for (std::int32_t j = 0; j < 60; ++j) {
+    for (std::int32_t k = 0; k < 40; ++k, ++count) {
+      xyz += fmt::format("3 {:.3f} {:.3f}\n", 0.025 * j, 0.025 * k);
+      ply += bytes_of(3.0, 0.025 * j, 0.025 * k);
+      las += bytes_of(std::int32_t{3000}, 25 * j, 25 * k) + std::string(8, '\0');
+    }
+  }
+  las.replace(0, 4, "LASF");
+  las.replace(24, 2, bytes_of(std::uint8_t{1}, std::uint8_t{2}));
+  las.replace(94,
+              17,
+              bytes_of(std::uint16_t{227},
+                       std::uint32_t{227},
+                       std::uint32_t{0},
+                       std::uint8_t{0},
+                       std::uint16_t{20},
+                       count));
+  las.replace(131, 24, bytes_of(0.001, 0.001, 0.001));
+  write_file(folder / "a.xyz", xyz);
+  write_file(folder / "a.ply",
+             fmt::format("ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty double "
+                         "x\nproperty double y\nproperty double z\nend_header\n",
+                         count) +
+                 ply);
+  write_file(folder / "a.las", las);
+  write_file(folder / "a.pcd",
+             fmt::format("VERSION .7\nFIELDS x y z\nSIZE 8 8 8\nTYPE F F F\nCOUNT 1 1 1\nWIDTH "
+                         "{0}\nHEIGHT 1\nPOINTS {0}\nDATA binary\n",
+                         count) +
+                 ply);
+  std::vector<nlohmann::json> infos;
+  for (const char* name : {"a.xyz", "a.ply", "a.las", "a.pcd"}) {
+    SCOPED_TRACE(name);
+    const std::string map = folder / (std::string(name) + ".pfmap");
+    const Result import =
+        run(fmt::format("map import {} -o {} --resolution 0.1", folder / name, map));
+    ASSERT_EQ(import.code, 0) << import.err;
+    infos.push_back(nlohmann::json::parse(run(fmt::format("map info {} --json", map)).out));
+    EXPECT_EQ(infos.back()["made"]["points_read"], count);
+    const Result scan = run(
+        fmt::format("scan {} --lidar marsim_grid --pose 2,0.75,0.5,0,0,0 --no-noise --json", map));
+    EXPECT_EQ(scan.code, 0) << scan.err;
+    EXPECT_EQ(infos.back()["surfels"], infos.front()["surfels"]);
+  }
+}
+
+TEST_F(Program, TurnsYUpAndScales) {
+  const TemporaryFolder folder;
+  std::string text;
+  for (int i = 0; i < 50; ++i) {
+    for (int j = 0; j < 20; ++j) text += fmt::format("{} {} 0\n", 100 * i, 50 * j);  // mm, y up
+  }
+  write_file(folder / "a.xyz", text);
+  const std::string map = folder / "a.pfmap";
+  ASSERT_EQ(
+      run(fmt::format("map import {} -o {} --scale 0.001 --up y", folder / "a.xyz", map)).code, 0);
+  const auto info = nlohmann::json::parse(run(fmt::format("map info {} --json", map)).out);
+  EXPECT_NEAR(info["max"][0].get<double>() - info["min"][0].get<double>(), 4.9, 0.2);
+  EXPECT_NEAR(info["max"][1].get<double>() - info["min"][1].get<double>(), 0.0, 0.2);
+  EXPECT_NEAR(info["max"][2].get<double>() - info["min"][2].get<double>(), 0.95, 0.2);
+}
+
+TEST_F(Program, ExportsTheOutliersThatItDropped) {
+  const TemporaryFolder folder;
+  const Result import = run(
+      fmt::format("map import {} -o {} --resolution 0.1 --export-outliers {} --outlier-sigmas 1",
+                  cloud(),
+                  folder / "a.pfmap",
+                  folder / "dropped.pcd"));
+  ASSERT_EQ(import.code, 0) << import.err;
+  const auto info =
+      nlohmann::json::parse(run(fmt::format("map info {} --json", folder / "a.pfmap")).out);
+  const auto dropped = info["made"]["outlier_removal"]["cells_dropped"].get<int>();
+  EXPECT_GT(dropped, 0);
+  expect_contains(read_file(folder / "dropped.pcd"), fmt::format("POINTS {}\n", dropped));
+}
+
+TEST_F(Program, FliesAMapWithoutAScenario) {
+  const TemporaryFolder folder;
+  const Result fly = run(fmt::format("fly {} -o {}", map(), folder / "run"),
+                         "timeout --preserve-status -s INT 1.5");
+  EXPECT_TRUE(fly.code == 0 || fly.code == 130) << fly.err;
+  EXPECT_FALSE(read_file(folder / "run/summary.json").empty());
+}
+
 TEST_F(Program, ImportsEveryBadCloudWithOneLine) {
   const TemporaryFolder folder;
   const auto import = [&](const std::string& name, const std::string& bytes) {
