@@ -123,7 +123,14 @@ void check_folder(const FlyFlags& flags) {
 /// Removes what an earlier run left, so that `--force` never mixes two runs.
 void clear_earlier_run(const FlyFlags& flags) {
   std::error_code error;
-  fs::remove_all(fs::path(flags.output) / "scans", error);
+  const auto is_scan = [](const std::string& name) {
+    return name.ends_with(".pcd") && name.find('_') != std::string::npos &&
+           name.find_first_not_of("0123456789_") == name.size() - 4;
+  };
+  // what others have put there stays
+  for (const auto& entry : fs::directory_iterator(fs::path(flags.output) / "scans", error)) {
+    if (is_scan(entry.path().filename().string())) fs::remove(entry.path(), error);
+  }
   for (const char* name : {"summary.json",
                            "timing.json",
                            "overview.png",
@@ -142,7 +149,7 @@ void write_timing(const FlyFlags& flags, const Simulation& simulation, double wa
   json["real_time_factor"] = to_seconds(simulation.time()) / wall;
   json["threads"] = threads;
   OutputFile file((fs::path(flags.output) / "timing.json").string());
-  file.write(json.dump(2) + "\n");
+  file.write(json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
   file.commit();
 }
 
@@ -191,7 +198,7 @@ int fly(const FlyFlags& flags) {
   Scenario scenario = load_input(flags, executor);
   if (flags.seed >= 0) scenario.seed = flags.seed;
   for (LidarMount& mount : scenario.lidars) mount.snapshot = mount.snapshot || flags.snapshot;
-  const auto map = SurfelMap::open(resolve_path(scenario.map, scenario.folder()));
+  const auto map = scenario.open_map();
   Simulation simulation(scenario, map, executor);
   warn_about(scenario, *map);
   if (flags.force) clear_earlier_run(flags);

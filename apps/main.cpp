@@ -4,10 +4,12 @@
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
 #include <csignal>
+#include <cstdio>
 #include <exception>
 #include <new>
 
 #include "apps/commands.hpp"
+#include "apps/terminal.hpp"
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/core/version.hpp"
 
@@ -32,7 +34,7 @@ int run(int argc, char** argv) {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return app.exit(error);  // --help, --version
-    fmt::print(stderr, "pointflight: {}; see pointflight --help\n", error.what());
+    say(fmt::format("pointflight: {}; see pointflight --help\n", error.what()));
     return kWrongInput;
   }
   return exit_code;
@@ -44,14 +46,25 @@ int main(int argc, char** argv) {
   // a full file-size limit or a closed pipe is an error of a write, not the end of the process
   std::signal(SIGXFSZ, SIG_IGN);
   std::signal(SIGPIPE, SIG_IGN);
+  using pointflight::apps::end_progress;
+  using pointflight::apps::say;
   try {
-    return run(argc, argv);
+    const int code = run(argc, argv);
+    if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return code;
+    say("pointflight: standard output: cannot write; is the disk full?\n");
+  } catch (const pointflight::apps::Interrupted&) {
+    end_progress();
+    say("pointflight: interrupted\n");
+    return pointflight::apps::kInterrupted;
   } catch (const pointflight::InputError& error) {
-    fmt::print(stderr, "pointflight: {}\n", error.what());
+    end_progress();
+    say(fmt::format("pointflight: {}\n", error.what()));
   } catch (const std::bad_alloc&) {
-    fmt::print(stderr, "pointflight: out of memory; give a coarser --resolution\n");
+    end_progress();
+    say("pointflight: out of memory; give a coarser --resolution\n");
   } catch (const std::exception& error) {
-    fmt::print(stderr, "pointflight: {}\n", error.what());
+    end_progress();
+    say(fmt::format("pointflight: {}\n", error.what()));
   }
   return pointflight::apps::kWrongInput;
 }

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/commands.hpp"
+#include "apps/flags.hpp"
 #include "apps/pictures.hpp"
 #include "apps/terminal.hpp"
 #include "pointflight/core/input_error.hpp"
@@ -73,14 +74,19 @@ void import_map(const ImportFlags& flags) {
   options.outliers.enabled = !flags.keep_outliers;
   options.outliers.neighbours = flags.outlier_neighbours;
   options.outliers.sigmas = flags.outlier_sigmas;
+  for (const std::string& input : flags.inputs) refuse_same_file(flags.output, input);
+  std::optional<OutputFile> outliers;
+  if (!flags.outliers_out.empty()) {
+    refuse_same_file(flags.outliers_out, flags.output);
+    for (const std::string& input : flags.inputs) refuse_same_file(flags.outliers_out, input);
+    outliers.emplace(flags.outliers_out);
+  }
   OutputFile output(flags.output);  // first: a folder that is not there is said at once
   const Executor executor(flags.threads);
-  const ImportedMap map = import_clouds(flags.inputs, options, executor, terminal_progress());
+  const ImportedMap map = import_clouds(flags.inputs, options, executor, interruptible_progress());
   end_progress();
+  if (outliers) write_cloud_pcd(std::move(*outliers), map.outliers, map.report.has_intensity);
   write_map(std::move(output), map.tree, map.description);
-  if (!flags.outliers_out.empty()) {
-    write_cloud_pcd(flags.outliers_out, map.outliers, map.report.has_intensity);
-  }
   print_report(map.report, options);
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
   log(fmt::format("took          {:.1f} s", took.count()));
@@ -96,9 +102,9 @@ void add_import(CLI::App& parent) {
   app->add_option("--resolution",
                   flags->resolution,
                   "Voxel size r, m; without it the one that the points' spacing supports")
-      ->check(CLI::Range(1e-4, 1e4));
+      ->check(within(1e-4, 1e4));
   app->add_option("--scale", flags->scale, "Metres per unit of the files")
-      ->check(CLI::Range(1e-9, 1e9))
+      ->check(within(1e-9, 1e9))
       ->capture_default_str();
   app->add_option("--up", flags->up, "The files' up axis; y is turned to z")
       ->check(CLI::IsMember({"y", "z"}))
@@ -114,7 +120,7 @@ void add_import(CLI::App& parent) {
   app->add_option("--outlier-sigmas",
                   flags->outlier_sigmas,
                   "A cell goes if it is this many deviations farther than the mean")
-      ->check(CLI::Range(0.0, 1e6))
+      ->check(within(0.0, 1e6))
       ->capture_default_str();
   app->add_option(
       "--export-outliers", flags->outliers_out, "Write the dropped cells as a PCD cloud");
@@ -160,7 +166,7 @@ void print_info(const SurfelMap& map, const InfoFlags& flags) {
     json["has_intensity"] = map.has_intensity();
     json["verified"] = flags.verify;
     json["made"] = metadata;
-    fmt::print("{}\n", json.dump(2));
+    fmt::print("{}\n", json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
     return;
   }
   fmt::print("{}\n", flags.map);
@@ -179,7 +185,9 @@ void print_info(const SurfelMap& map, const InfoFlags& flags) {
   fmt::print("  intensity   {}\n", map.has_intensity() ? "yes" : "no");
   if (flags.verify) fmt::print("  checksums   match\n");
   fmt::print("  made\n");
-  for (const auto& [key, value] : metadata.items()) fmt::print("    {} {}\n", key, value.dump());
+  for (const auto& [key, value] : metadata.items())
+    fmt::print(
+        "    {} {}\n", key, value.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
 }
 
 void show_info(const InfoFlags& flags) {
@@ -215,7 +223,7 @@ void make_forest_cloud(const ForestFlags& flags) {
   scene.sample(flags.density, flags.noise, flags.options.seed, [&](const Vector3d& p) {
     points.push_back({p, 0.0f});
   });
-  write_cloud_pcd(flags.output, points, false);
+  write_cloud_pcd(OutputFile(flags.output), points, false);
   log(fmt::format("{} points on {} shapes",
                   short_count(static_cast<double>(points.size())),
                   short_count(static_cast<double>(scene.shapes.size()))));
@@ -227,21 +235,23 @@ void add_forest(CLI::App& parent) {
   auto flags = std::make_shared<ForestFlags>();
   ForestOptions& o = flags->options;
   app->add_option("-o,--output", flags->output, "The .pcd to write")->required();
-  app->add_option("--size-x", o.size_x, "m")->check(CLI::Range(5.0, 1000.0))->capture_default_str();
-  app->add_option("--size-y", o.size_y, "m")->check(CLI::Range(5.0, 1000.0))->capture_default_str();
+  app->add_option("--size-x", o.size_x, "m")->check(within(5.0, 1000.0))->capture_default_str();
+  app->add_option("--size-y", o.size_y, "m")->check(within(5.0, 1000.0))->capture_default_str();
   app->add_option("--trees", o.trees_per_hectare, "Trees a hectare")
-      ->check(CLI::Range(0.0, 10000.0))
+      ->check(within(0.0, 10000.0))
       ->capture_default_str();
   app->add_option("--spacing", o.min_spacing, "Least distance between trunks, m")
-      ->check(CLI::Range(0.0, 100.0))
+      ->check(within(0.0, 100.0))
       ->capture_default_str();
   app->add_option("--density", flags->density, "Points a square metre of surface")
-      ->check(CLI::Range(1.0, 1e6))
+      ->check(within(1.0, 1e6))
       ->capture_default_str();
   app->add_option("--noise", flags->noise, "Deviation of the points from the surface, m")
-      ->check(CLI::Range(0.0, 1.0))
+      ->check(within(0.0, 1.0))
       ->capture_default_str();
-  app->add_option("--seed", o.seed, "Another seed, another forest")->capture_default_str();
+  app->add_option("--seed", o.seed, "Another seed, another forest")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
   app->callback([flags] { make_forest_cloud(*flags); });
 }
 

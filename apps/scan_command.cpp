@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/commands.hpp"
+#include "apps/flags.hpp"
 #include "apps/pictures.hpp"
 #include "apps/terminal.hpp"
 #include "pointflight/core/constants.hpp"
@@ -73,7 +74,7 @@ void print_scan(const Scan& scan, const ScanFlags& flags) {
     json["range_median"] = at(0.5);
     json["range_max"] = at(1.0);
     if (!flags.output.empty()) json["file"] = flags.output;
-    fmt::print("{}\n", json.dump(2));
+    fmt::print("{}\n", json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
     return;
   }
   fmt::print("{} of {} beams returned; range {:.2f} to {:.2f} m, median {:.2f} m\n",
@@ -86,6 +87,8 @@ void print_scan(const Scan& scan, const ScanFlags& flags) {
 
 void take_scan(const ScanFlags& flags) {
   const Pose pose = parse_pose(flags.pose);
+  refuse_same_file(flags.output, flags.map);
+  refuse_same_file(flags.png, flags.map);
   const auto map = SurfelMap::open(flags.map);
   const LidarSettings settings = load_lidar(flags.lidar);
   const Lidar lidar(settings, 0);
@@ -120,7 +123,9 @@ void add_scan_command(CLI::App& parent, int& /*exit_code*/) {
   app->add_option("--renderer", flags->renderer, "How points are made")
       ->check(CLI::IsMember(renderer_names()))
       ->capture_default_str();
-  app->add_option("--seed", flags->seed, "Of the noise")->capture_default_str();
+  app->add_option("--seed", flags->seed, "Of the noise")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
   app->add_option("--index", flags->index, "Which scan of a pattern that does not repeat")
       ->check(CLI::Range(0, 1 << 30));
   app->add_flag("--no-noise", flags->no_noise, "Exact ranges");

@@ -10,6 +10,7 @@
 #include <memory>
 
 #include "apps/commands.hpp"
+#include "apps/flags.hpp"
 #include "apps/terminal.hpp"
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/input_error.hpp"
@@ -42,11 +43,24 @@ struct NewFlags {
 
 void new_scenario(const NewFlags& flags) {
   const Executor executor;
-  // the scenario finds its map from its own folder
-  const fs::path folder = fs::absolute(flags.output).parent_path();
-  const std::string map_key = fs::absolute(flags.map).lexically_relative(folder).string();
-  const Scenario scenario = make_scenario(
-      flags.map, map_key, flags.lidar, flags.vehicle, flags.length, flags.speed, executor);
+  refuse_same_file(flags.output, flags.map);
+  // the scenario finds its files from its own folder
+  const fs::path folder = fs::weakly_canonical(fs::absolute(flags.output).parent_path());
+  const auto from_folder = [&](const std::string& path) {
+    const fs::path absolute = fs::weakly_canonical(fs::absolute(path));
+    const fs::path relative = absolute.lexically_relative(folder);
+    return relative.empty() ? absolute.string() : relative.string();
+  };
+  Scenario scenario = make_scenario(flags.map,
+                                    from_folder(flags.map),
+                                    flags.lidar,
+                                    flags.vehicle,
+                                    flags.length,
+                                    flags.speed,
+                                    executor);
+  for (std::string* model : {&scenario.lidars.front().model, &scenario.vehicle.model}) {
+    if (is_model_path(*model)) *model = from_folder(*model);
+  }
   OutputFile file(flags.output);
   file.write(
       "# A pointflight scenario; every key: docs/scenario.md, or pointflight scenario keys\n" +
@@ -62,7 +76,7 @@ void new_scenario(const NewFlags& flags) {
 
 void check_scenario(const std::string& path) {
   const Scenario scenario = load_scenario(path);
-  const auto map = SurfelMap::open(resolve_path(scenario.map, scenario.folder()));
+  const auto map = scenario.open_map();
   const Executor executor;
   const Simulation simulation(scenario, map, executor);
   warn_about(scenario, *map);
@@ -143,11 +157,9 @@ void add_scenario_command(CLI::App& parent, int& /*exit_code*/) {
   make->add_option("--lidar", flags->lidar, "A shipped sensor")->capture_default_str();
   make->add_option("--vehicle", flags->vehicle, "A shipped vehicle")->capture_default_str();
   make->add_option("--length", flags->length, "Of the mission, where the map allows, m")
-      ->check(CLI::Range(1.0, 1e5))
+      ->check(within(1.0, 1e5))
       ->capture_default_str();
-  make->add_option("--speed", flags->speed, "m/s")
-      ->check(CLI::Range(0.1, 30.0))
-      ->capture_default_str();
+  make->add_option("--speed", flags->speed, "m/s")->check(within(0.1, 30.0))->capture_default_str();
   make->callback([flags] { new_scenario(*flags); });
 
   auto* check = app->add_subcommand("check", "Read a scenario and say whether it can be flown");

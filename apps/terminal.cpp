@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cmath>
 #include <csignal>
+#include <cstdio>
 #include <memory>
 
 namespace pointflight::apps {
@@ -20,6 +21,11 @@ extern "C" void on_interrupt(int /*signal*/) {
 }
 
 }  // namespace
+
+void say(std::string_view text) {
+  // not fmt::print, which throws where stderr is closed or full
+  std::fwrite(text.data(), 1, text.size(), stderr);
+}
 
 Progress terminal_progress() {
   using Clock = std::chrono::steady_clock;
@@ -38,23 +44,23 @@ Progress terminal_progress() {
     if (state->terminal) {
       if (now - state->last < std::chrono::milliseconds(100)) return;
       state->last = now;
-      fmt::print(stderr, "\r\033[K{} {} %", what, percent);
+      say(fmt::format("\r\033[K{} {} %", what, percent));
       progress_line_open = true;
     } else if (what != state->what || percent / 10 != state->tenth) {
       state->what = std::string(what);
       state->tenth = percent / 10;
-      fmt::print(stderr, "{} {} %\n", what, percent);
+      say(fmt::format("{} {} %\n", what, percent));
     }
   };
 }
 
 void end_progress() {
-  if (progress_line_open.exchange(false)) fmt::print(stderr, "\r\033[K");
+  if (progress_line_open.exchange(false)) say("\r\033[K");
 }
 
 void log(std::string_view text) {
   end_progress();
-  fmt::print(stderr, "{}\n", text);
+  say(fmt::format("{}\n", text));
 }
 
 std::string short_count(double count) {
@@ -62,6 +68,14 @@ std::string short_count(double count) {
   if (count >= 1e6) return fmt::format("{:.2f} M", count / 1e6);
   if (count >= 1e4) return fmt::format("{:.1f} k", count / 1e3);
   return fmt::format("{:.0f}", count);
+}
+
+Progress interruptible_progress() {
+  catch_interrupts();
+  return [show = terminal_progress()](std::string_view what, double share) {
+    if (interrupted()) throw Interrupted();
+    show(what, share);
+  };
 }
 
 void catch_interrupts() {

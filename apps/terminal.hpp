@@ -11,8 +11,18 @@ namespace pointflight::apps {
 /// line every ten per cent elsewhere.
 Progress terminal_progress();
 
+/// Thrown out of work that a signal ended; main() turns it into the exit code.
+struct Interrupted {};
+
+/// The same, and throws Interrupted after SIGINT or SIGTERM, so that destructors remove what is
+/// half-written.
+Progress interruptible_progress();
+
 /// Ends an open progress line.
 void end_progress();
+
+/// Text on stderr, as it is; never fails.
+void say(std::string_view text);
 
 /// A line on stderr.
 void log(std::string_view text);

@@ -37,7 +37,7 @@ struct Bench {
       cloud_points.push_back({p, 0.0f});
     });
     points = cloud_points.size();
-    write_cloud_pcd(cloud, cloud_points, false);
+    write_cloud_pcd(OutputFile(cloud), cloud_points, false);
     import(2);
     map = SurfelMap::open(map_path);
   }

@@ -15,7 +15,7 @@ int main() try {
   room.shapes.emplace_back(Sphere{{5, 3, 1}, 0.5});
   std::vector<CloudPoint> points;
   room.sample(2000.0, 0.003, 1, [&](const Vector3d& p) { points.push_back({p, 0.0f}); });
-  write_cloud_pcd("room.pcd", points, false);
+  write_cloud_pcd(OutputFile("room.pcd"), points, false);
 
   const Executor executor;
   ImportOptions options;

@@ -23,7 +23,8 @@ std::string error_text(int error) {
 
 MappedFile::MappedFile(const std::string& path) : path_(path) {
   const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  if (file < 0) throw InputError(fmt::format("{}: cannot open: {}", path, error_text(errno)));
+  if (file < 0)
+    throw InputError(fmt::format("{}: cannot open: {}; check the path", path, error_text(errno)));
   struct stat status {};
   if (::fstat(file, &status) != 0 || !S_ISREG(status.st_mode)) {
     ::close(file);

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cerrno>
+#include <filesystem>
 #include <system_error>
 #include <utility>
 
@@ -12,6 +13,14 @@ namespace pointflight {
 
 OutputFile::OutputFile(std::string path)
     : path_(std::move(path)), partial_path_(path_ + ".partial"), buffer_(1 << 18) {
+  if (path_.empty()) throw InputError("no name is given for a file to write");
+  // renaming would replace a device or another's folder
+  std::error_code ignored;
+  const auto status = std::filesystem::status(path_, ignored);
+  if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) {
+    throw InputError(
+        fmt::format("{}: is there and is not a regular file; give the path of a file", path_));
+  }
   file_ = std::fopen(partial_path_.c_str(), "wbe");
   if (file_ == nullptr) fail(errno);
   std::setvbuf(file_, buffer_.data(), _IOFBF, buffer_.size());
@@ -48,9 +57,8 @@ void OutputFile::commit() {
 }
 
 void OutputFile::fail(int error) const {
-  throw InputError(fmt::format("{}: cannot write: {}; choose another place with -o",
-                               path_,
-                               std::generic_category().message(error)));
+  throw InputError(fmt::format(
+      "{}: cannot write: {}; choose another place", path_, std::generic_category().message(error)));
 }
 
 }  // namespace pointflight

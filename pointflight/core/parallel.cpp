@@ -4,6 +4,7 @@
 #include <thread>
 
 #ifdef POINTFLIGHT_HAS_TBB
+#include <oneapi/tbb/global_control.h>
 #include <oneapi/tbb/info.h>
 #include <oneapi/tbb/parallel_for.h>
 #include <oneapi/tbb/task_arena.h>
@@ -18,7 +19,10 @@ namespace pointflight {
 #ifdef POINTFLIGHT_HAS_TBB
 
 struct Executor::Arena {
-  explicit Arena(int threads) : arena(threads) {}
+  explicit Arena(int threads)
+      : limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads)),
+        arena(threads) {}
+  tbb::global_control limit;  ///< Without it TBB warns of more threads than cores.
   mutable tbb::task_arena arena;
 };
 

@@ -44,12 +44,15 @@ std::string resolve_path(const std::string& path, const std::string& base) {
   return (fs::path(base) / path).lexically_normal().string();
 }
 
+bool is_model_path(const std::string& name_or_path) {
+  return name_or_path.find('/') != std::string::npos ||
+         (name_or_path.size() > 5 && name_or_path.ends_with(".yaml"));
+}
+
 std::string find_model(const std::string& kind,
                        const std::string& name_or_path,
                        const std::string& base) {
-  const bool is_path = name_or_path.find('/') != std::string::npos ||
-                       (name_or_path.size() > 5 && name_or_path.ends_with(".yaml"));
-  if (is_path) return resolve_path(name_or_path, base);
+  if (is_model_path(name_or_path)) return resolve_path(name_or_path, base);
   const std::string path = (fs::path(data_folder()) / kind / (name_or_path + ".yaml")).string();
   std::error_code error;
   if (fs::is_regular_file(path, error)) return path;

@@ -9,6 +9,9 @@ namespace pointflight {
 /// else `../share/pointflight` beside the program, else the source tree it was built from.
 std::string data_folder();
 
+/// True for what `find_model` takes as a path: it contains '/' or ends in ".yaml".
+bool is_model_path(const std::string& name_or_path);
+
 /// The path of a model given by its name ("mid360" -> "<data>/lidars/mid360.yaml") or by a path
 /// that contains '/' or ends in ".yaml"; a relative path is taken from `base` (a folder; empty =
 /// the working directory). Throws InputError that lists the known names.

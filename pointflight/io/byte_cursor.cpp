@@ -1,6 +1,7 @@
 #include "pointflight/io/byte_cursor.hpp"
 
 #include <charconv>
+#include <cstdlib>
 
 namespace pointflight {
 
@@ -9,7 +10,8 @@ bool parse_number(std::string_view word, double& value) {
   const char* end = word.data() + word.size();
   const auto result = std::from_chars(word.data(), end, value);
   if (result.ec == std::errc::result_out_of_range && result.ptr == end) {
-    value = 0.0;  // below the smallest double; too large a number never passes the range checks
+    // from_chars does not say which way: infinite above the largest double, nearly zero below
+    value = std::strtod(std::string(word).c_str(), nullptr);
     return true;
   }
   return result.ec == std::errc() && result.ptr == end;

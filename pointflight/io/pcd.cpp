@@ -56,17 +56,19 @@ class HeaderParser {
   Header parse() {
     std::string_view line;
     while (lines_.next(line)) {
-      if (line.empty() || line.front() == '#') continue;
       const std::string_view key = take_word(line);
-      if (key == "VERSION" || key == "VIEWPOINT") continue;
+      if (key.empty() || key.front() == '#' || key == "VERSION" || key == "VIEWPOINT") continue;
       if (key == "FIELDS" || key == "COLUMNS") {
         parse_fields(line);
       } else if (key == "SIZE") {
-        for (Field& f : header_.fields) f.size = integer(line, "SIZE", 1, 8);
+        integers(line, "SIZE", 1, 8, sizes_);
       } else if (key == "TYPE") {
-        for (Field& f : header_.fields) f.type = parse_type(take_word(line));
+        types_.clear();
+        for (auto word = take_word(line); !word.empty(); word = take_word(line)) {
+          types_.push_back(parse_type(word));
+        }
       } else if (key == "COUNT") {
-        for (Field& f : header_.fields) f.count = integer(line, "COUNT", 0, 1 << 20);
+        integers(line, "COUNT", 0, 1 << 20, counts_);
       } else if (key == "WIDTH") {
         width_ = integer(line, "WIDTH", 0, kMaxPoints);
       } else if (key == "HEIGHT") {
@@ -111,6 +113,35 @@ class HeaderParser {
     return static_cast<std::uint64_t>(value);
   }
 
+  void integers(std::string_view line,
+                std::string_view key,
+                std::uint64_t min,
+                std::uint64_t max,
+                std::vector<std::uint64_t>& values) {
+    values.clear();
+    while (line.find_first_not_of(" \t") != std::string_view::npos) {
+      values.push_back(integer(line, key, min, max));
+    }
+  }
+
+  /// SIZE, TYPE and COUNT may stand before or after FIELDS.
+  void apply_to_fields() {
+    const auto check = [&](std::string_view key, std::size_t found, bool required) {
+      if (found != header_.fields.size() && (found != 0 || required)) {
+        fail(fmt::format("{} has {} values for {} FIELDS", key, found, header_.fields.size()));
+      }
+    };
+    const bool binary = header_.encoding != Encoding::kAscii;
+    check("SIZE", sizes_.size(), binary);
+    check("TYPE", types_.size(), binary);
+    check("COUNT", counts_.size(), false);
+    for (std::size_t i = 0; i < header_.fields.size(); ++i) {
+      if (!sizes_.empty()) header_.fields[i].size = sizes_[i];
+      if (!types_.empty()) header_.fields[i].type = types_[i];
+      if (!counts_.empty()) header_.fields[i].count = counts_[i];
+    }
+  }
+
   void parse_fields(std::string_view line) {
     header_.fields.clear();
     for (auto name = take_word(line); !name.empty(); name = take_word(line)) {
@@ -139,6 +170,7 @@ class HeaderParser {
   }
 
   void finish() {
+    apply_to_fields();
     for (Field& field : header_.fields) {
       if (field.type == 'F' && field.size != 4 && field.size != 8) {
         fail(fmt::format("field '{}': a float of {} bytes; 4 or 8", field.name, field.size));
@@ -151,7 +183,13 @@ class HeaderParser {
       header_.columns += field.count;
       header_.point_size += field.size * field.count;
     }
-    if (!header_.has_points) header_.points = width_ * std::max<std::uint64_t>(height_, 1);
+    if (!header_.has_points) {
+      height_ = std::max<std::uint64_t>(height_, 1);
+      if (width_ > kMaxPoints / height_) {
+        fail(fmt::format("WIDTH {} times HEIGHT {} is no number of points", width_, height_));
+      }
+      header_.points = width_ * height_;
+    }
     header_.data_offset = lines_.offset();
     header_.data_line = lines_.number();
   }
@@ -159,6 +197,9 @@ class HeaderParser {
   const MappedFile& file_;
   LineCursor lines_;
   Header header_;
+  std::vector<std::uint64_t> sizes_;
+  std::vector<char> types_;
+  std::vector<std::uint64_t> counts_;
   std::uint64_t width_ = 0;
   std::uint64_t height_ = 1;
 };
@@ -171,7 +212,8 @@ class PcdReader : public CloudReader {
       const std::string name(1, "xyz"[axis]);
       const Field* field = find(name);
       if (field == nullptr) {
-        throw InputError(fmt::format("{}: no field '{}' in the PCD header", file_.path(), name));
+        throw InputError(fmt::format(
+            "{}: no field '{}' in the PCD header; x, y and z are needed", file_.path(), name));
       }
       position_[axis] = *field;
     }

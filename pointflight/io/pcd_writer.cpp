@@ -2,9 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <utility>
+
 namespace pointflight {
 
-void write_pcd(const std::string& path,
+void write_pcd(OutputFile file,
                const std::vector<PcdField>& fields,
                std::size_t points,
                std::span<const std::byte> rows) {
@@ -18,7 +20,6 @@ void write_pcd(const std::string& path,
     types += fmt::format(" {}", field.type);
     counts += " 1";
   }
-  OutputFile file(path);
   file.write(
       fmt::format("# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS{}\nSIZE{}\n"
                   "TYPE{}\nCOUNT{}\nWIDTH {}\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS {}\n"
@@ -33,9 +34,7 @@ void write_pcd(const std::string& path,
   file.commit();
 }
 
-void write_cloud_pcd(const std::string& path,
-                     const std::vector<CloudPoint>& points,
-                     bool with_intensity) {
+void write_cloud_pcd(OutputFile file, const std::vector<CloudPoint>& points, bool with_intensity) {
   constexpr double kFloatIsExactEnough = 4096.0;  // a float's step is below 0.5 mm up to here
   bool near_origin = true;
   for (const CloudPoint& point : points) {
@@ -59,7 +58,7 @@ void write_cloud_pcd(const std::string& path,
   const std::size_t size = near_origin ? 4 : 8;
   std::vector<PcdField> fields = {{"x", 'F', size}, {"y", 'F', size}, {"z", 'F', size}};
   if (with_intensity) fields.push_back({"intensity", 'F', 4});
-  write_pcd(path, fields, points.size(), rows);
+  write_pcd(std::move(file), fields, points.size(), rows);
 }
 
 }  // namespace pointflight

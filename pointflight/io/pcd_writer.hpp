@@ -19,14 +19,12 @@ struct PcdField {
 };
 
 /// Writes a binary PCD 0.7 file; `rows` holds `points` rows of the fields without padding.
-void write_pcd(const std::string& path,
+void write_pcd(OutputFile file,
                const std::vector<PcdField>& fields,
                std::size_t points,
                std::span<const std::byte> rows);
 
 /// Writes x y z [intensity] as float32, or x y z as float64 where a coordinate is beyond 4 km.
-void write_cloud_pcd(const std::string& path,
-                     const std::vector<CloudPoint>& points,
-                     bool with_intensity);
+void write_cloud_pcd(OutputFile file, const std::vector<CloudPoint>& points, bool with_intensity);
 
 }  // namespace pointflight

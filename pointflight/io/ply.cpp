@@ -97,6 +97,7 @@ class HeaderParser {
         if (!has_format) fail("no format line before end_header");
         header_.data_offset = lines_.offset();
         header_.data_line = lines_.number();
+        check_length();
         return header_;
       }
       if (key == "comment" || key == "obj_info" || key.empty()) continue;
@@ -118,6 +119,33 @@ class HeaderParser {
  private:
   [[noreturn]] void fail(const std::string& what) const {
     throw InputError(fmt::format("{}:{}: {}", file_.path(), lines_.number(), what));
+  }
+
+  /// A header that promises more than the file can hold is found before anything is read.
+  void check_length() const {
+    auto room = static_cast<double>(file_.bytes().size() - header_.data_offset);
+    for (const Element& element : header_.elements) {
+      if (element.count > 0 && element.properties.empty()) {
+        fail(fmt::format("element '{}' has rows but no properties", excerpt(element.name)));
+      }
+      double row = 0.0;  // at least
+      for (const Property& property : element.properties) {
+        const Scalar first = property.count_type.value_or(property.type);
+        row += header_.ascii ? 1.0 : static_cast<double>(size_of(first));
+      }
+      if (row * static_cast<double>(element.count) > room) {
+        throw InputError(
+            fmt::format("{}: byte {}: the header promises {} '{}' rows, the file has room for {}; "
+                        "it is cut off "
+                        "or its header is wrong",
+                        file_.path(),
+                        file_.bytes().size(),
+                        element.count,
+                        excerpt(element.name),
+                        static_cast<std::uint64_t>(room / row)));
+      }
+      room -= row * static_cast<double>(element.count);
+    }
   }
 
   void parse_format(std::string_view word) {
@@ -185,7 +213,6 @@ class PlyReader : public CloudReader {
     vertex_ = header_.elements[element];
     find_columns();
     for (std::size_t i = 0; i < element; ++i) skip(header_.elements[i]);
-    check_length();
     file_.will_read_sequentially();
   }
 
@@ -227,25 +254,6 @@ class PlyReader : public CloudReader {
       if (column == std::numeric_limits<std::size_t>::max()) {
         throw InputError(fmt::format("{}: the 'vertex' element lacks x, y or z", file_.path()));
       }
-    }
-  }
-
-  // where every vertex has the same size, a short file is found before anything is read
-  void check_length() const {
-    if (header_.ascii) return;
-    std::size_t row = 0;
-    for (const Property& property : vertex_.properties) {
-      row += property.count_type ? size_of(*property.count_type) : size_of(property.type);
-    }
-    const std::size_t present = file_.bytes().size() - at_;
-    if (row > 0 && vertex_.count > present / row) {
-      throw InputError(fmt::format(
-          "{}: byte {}: the header promises {} vertices, the file has room for {}; it is cut off "
-          "or its header is wrong",
-          file_.path(),
-          file_.bytes().size(),
-          vertex_.count,
-          present / row));
     }
   }
 

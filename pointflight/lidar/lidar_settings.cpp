@@ -94,19 +94,38 @@ void describe_optics(SettingsVisitor& v, OpticsSettings& s) {
           s.range_at_80_percent);
 }
 
+constexpr std::int64_t kMostBeams = 16'000'000;
+
 LidarSettings read(SettingsReader& reader, const std::string& path) {
   LidarSettings settings;
   describe(reader, settings);
   reader.finish();
   settings.path = path;
+  settings.lines = reader.lines();
+  const auto fail = [&](const char* key, const std::string& what) {
+    throw InputError(fmt::format("{}: {}: {}", settings.place(key), key, what));
+  };
   if (settings.range_min >= settings.range_max) {
-    throw InputError(fmt::format("{}:{}: range_min {} m is not below range_max {} m",
-                                 path,
-                                 reader.lines().count("range_min") != 0
-                                     ? reader.lines().at("range_min")
-                                     : reader.lines().at("range_max"),
-                                 settings.range_min,
-                                 settings.range_max));
+    fail("range_min",
+         fmt::format("{} m is not below range_max {} m", settings.range_min, settings.range_max));
+  }
+  const GridSettings& grid = settings.grid;
+  if (settings.pattern == "rotor" && settings.rotor.line_angles_deg.empty()) {
+    fail("rotor.line_angles_deg", "no lines; at least one is needed");
+  } else if (settings.pattern == "prisms" && settings.prisms.line_heights.empty()) {
+    fail("prisms.line_heights", "no lines; at least one is needed");
+  } else if (settings.pattern == "rings" && settings.rings.table.empty()) {
+    fail("rings.table", "missing; name the CSV of channels");
+  } else if (settings.pattern == "csv" && settings.csv.file.empty()) {
+    fail("csv.file", "missing; name the CSV of directions");
+  } else if (settings.pattern == "grid") {
+    if (grid.columns * grid.rows > kMostBeams) {
+      fail("grid.columns",
+           fmt::format("{} beams a scan; {} at most", grid.columns * grid.rows, kMostBeams));
+    }
+    if (grid.projection == "pinhole" && (grid.fx <= 0.0 || grid.fy <= 0.0)) {
+      fail("grid.projection", "pinhole needs fx and fy");
+    }
   }
   return settings;
 }
@@ -145,6 +164,11 @@ void describe(SettingsVisitor& v, LidarSettings& s) {
     v.section({"csv", "", "a table of directions of your own"},
               [&](SettingsVisitor& w) { describe_csv(w, s.csv); });
   }
+}
+
+std::string LidarSettings::place(const std::string& key) const {
+  const auto line = lines.find(key);
+  return line == lines.end() ? path : fmt::format("{}:{}", path, line->second);
 }
 
 LidarSettings load_lidar(const std::string& name_or_path, const std::string& base) {

@@ -1,9 +1,11 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <string>
 #include <vector>
 
+#include "pointflight/core/input_error.hpp"
 #include "pointflight/core/settings.hpp"
 
 namespace pointflight {
@@ -106,6 +108,16 @@ struct LidarSettings {
   RingsSettings rings;
   GridSettings grid;
   CsvSettings csv;
+  std::map<std::string, int> lines;  ///< Of each key in the file, for messages.
+
+  /// "mid360.yaml:12" for a key, or the path where the key is not in the file.
+  [[nodiscard]] std::string place(const std::string& key) const;
+
+  /// Runs `action` for what a key names; an InputError in it also says where the key stands.
+  template <class Action>
+  auto at(const std::string& key, const Action& action) const {
+    return at_key(place(key), key, action);
+  }
 };
 
 /// The one list of keys of a sensor file.

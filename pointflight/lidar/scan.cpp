@@ -22,7 +22,7 @@ void write_scan_pcd(const std::string& path, const Scan& scan) {
     std::memcpy(at + sizeof values, &point.ring, sizeof point.ring);
     at += kRow;
   }
-  write_pcd(path,
+  write_pcd(OutputFile(path),
             {{"x", 'F', 4},
              {"y", 'F', 4},
              {"z", 'F', 4},

@@ -108,16 +108,12 @@ class Import {
 
   void accumulate() {
     ImportReport& report = map_.report;
+    const bool measures_spacing = !report.resolution_was_chosen;
+    fill_grid(std::nullopt, measures_spacing);
+    // the first point may be a stray one far from all others (0 0 0 before a cloud in UTM)
+    if (2 * report.points_out_of_reach > report.points_read) fill_grid(spacing_.middle(), false);
+    if (measures_spacing) measure_spacing();
     const double r = report.resolution;
-    for_each_point("reading points", [&](const Vector3d& p, float intensity) {
-      if (!grid_) {
-        const Vector3d base = ((p / r).array().floor() + kGridPhase) * r;
-        grid_.emplace(base, r);
-      }
-      if (!grid_->add(p, intensity)) ++report.points_out_of_reach;
-      if (!report.resolution_was_chosen) spacing_.add(p);
-    });
-    if (!report.resolution_was_chosen) measure_spacing();
     report.cells = grid_->cells().size();
     if (2 * report.points_out_of_reach > report.points_read) {
       throw InputError(fmt::format(
@@ -129,6 +125,22 @@ class Import {
           std::round(r * 1048.576),
           r));
     }
+  }
+
+  /// Cells lie around `middle`, or around the first point.
+  void fill_grid(const std::optional<Vector3d>& middle, bool measures_spacing) {
+    ImportReport& report = map_.report;
+    const double r = report.resolution;
+    grid_.reset();
+    report.points_out_of_reach = 0;
+    for_each_point("reading points", [&](const Vector3d& p, float intensity) {
+      if (!grid_) {
+        const Vector3d base = ((middle.value_or(p) / r).array().floor() + kGridPhase) * r;
+        grid_.emplace(base, r);
+      }
+      if (!grid_->add(p, intensity)) ++report.points_out_of_reach;
+      if (measures_spacing) spacing_.add(p);
+    });
   }
 
   void drop_outliers() {

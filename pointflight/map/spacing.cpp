@@ -52,22 +52,40 @@ void SpacingEstimate::add(const Vector3d& point) {
 
 double SpacingEstimate::median_spacing() const {
   constexpr std::size_t kMaxQueries = 20000;
-  const Points points{kept_};
-  if (kept_.size() < 20) return 0.0;
+  // the same point given twice (overlapping files) says nothing of the spacing
+  std::vector<Vector3d> distinct = kept_;
+  const auto less = [](const Vector3d& a, const Vector3d& b) {
+    return std::lexicographical_compare(a.data(), a.data() + 3, b.data(), b.data() + 3);
+  };
+  std::sort(distinct.begin(), distinct.end(), less);
+  distinct.erase(std::unique(distinct.begin(), distinct.end()), distinct.end());
+  const Points points{distinct};
+  if (distinct.size() < 20) return 0.0;
   const Tree tree(3, points, nanoflann::KDTreeSingleIndexAdaptorParams(16));
-  const std::size_t stride = std::max<std::size_t>(1, kept_.size() / kMaxQueries);
+  const std::size_t stride = std::max<std::size_t>(1, distinct.size() / kMaxQueries);
   std::vector<double> spacing;
-  for (std::size_t i = 0; i < kept_.size(); i += stride) {
+  for (std::size_t i = 0; i < distinct.size(); i += stride) {
     std::uint32_t index[2];
     double squared[2];
-    tree.knnSearch(kept_[i].data(), 2, index, squared);
-    // the same point given twice (overlapping files) says nothing of the spacing
+    tree.knnSearch(distinct[i].data(), 2, index, squared);
     if (squared[1] > 1e-12) spacing.push_back(std::sqrt(squared[1]));
   }
   if (spacing.empty()) return 0.0;
   const auto middle = spacing.begin() + static_cast<std::ptrdiff_t>(spacing.size() / 2);
   std::nth_element(spacing.begin(), middle, spacing.end());
   return *middle;
+}
+
+Vector3d SpacingEstimate::middle() const {
+  Vector3d middle = Vector3d::Zero();
+  std::vector<double> values(kept_.size());
+  for (int axis = 0; axis < 3 && !kept_.empty(); ++axis) {
+    for (std::size_t i = 0; i < kept_.size(); ++i) values[i] = kept_[i][axis];
+    const auto half = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::nth_element(values.begin(), half, values.end());
+    middle[axis] = *half;
+  }
+  return middle;
 }
 
 double supported_resolution(double spacing) {

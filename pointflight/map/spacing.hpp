@@ -15,6 +15,9 @@ class SpacingEstimate {
   /// Median distance between a point and its nearest neighbour, m; 0 below 20 usable points.
   [[nodiscard]] double median_spacing() const;
 
+  /// Median of each coordinate: a place amid the cloud that stray points do not move.
+  [[nodiscard]] Vector3d middle() const;
+
  private:
   static constexpr double kBlock = 2.0;              ///< m: far above any useful spacing.
   static constexpr std::size_t kMaxPoints = 200000;  ///< Kept; then blocks are thinned by half.

@@ -162,7 +162,7 @@ std::string summary_json(const Simulation& simulation) {
   } else {
     json["closest_approach"] = nullptr;
   }
-  return json.dump(2) + "\n";
+  return json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
 }
 
 }  // namespace pointflight

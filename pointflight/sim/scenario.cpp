@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "pointflight/core/input_error.hpp"
+#include "pointflight/core/resources.hpp"
 
 namespace pointflight {
 namespace {
@@ -89,6 +90,10 @@ std::string Scenario::folder() const {
 std::string Scenario::place(const std::string& key) const {
   const auto line = lines.find(key);
   return line == lines.end() ? path : fmt::format("{}:{}", path, line->second);
+}
+
+std::shared_ptr<const SurfelMap> Scenario::open_map() const {
+  return at("map", [&] { return SurfelMap::open(resolve_path(map, folder())); });
 }
 
 Scenario load_scenario(const std::string& path) {

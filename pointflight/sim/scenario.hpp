@@ -6,8 +6,10 @@
 #include <string>
 #include <vector>
 
+#include "pointflight/core/input_error.hpp"
 #include "pointflight/core/settings.hpp"
 #include "pointflight/core/time.hpp"
+#include "pointflight/map/surfel_map.hpp"
 #include "pointflight/sim/mission.hpp"
 
 namespace pointflight {
@@ -51,6 +53,15 @@ struct Scenario {
 
   /// "scenario.yaml:12" for a key, or the path where the key is not in the file.
   [[nodiscard]] std::string place(const std::string& key) const;
+
+  /// Runs `action` for what a key names; an InputError in it also says where the key stands.
+  template <class Action>
+  auto at(const std::string& key, const Action& action) const {
+    return at_key(place(key), key, action);
+  }
+
+  /// Opens the map.
+  [[nodiscard]] std::shared_ptr<const SurfelMap> open_map() const;
 };
 
 /// The one list of keys of a scenario file: reader, `scenario new` and docs/scenario.md use it.

@@ -52,7 +52,9 @@ Simulation::Simulation(const Scenario& scenario,
     : scenario_(scenario),
       map_(std::move(map)),
       executor_(executor),
-      dynamics_(load_vehicle(scenario.vehicle.model, scenario.folder())),
+      dynamics_(
+          scenario.at("vehicle.model",
+                      [&] { return load_vehicle(scenario.vehicle.model, scenario.folder()); })),
       controller_(make_controller(dynamics_.settings())),
       imu_(dynamics_.settings().imu, static_cast<std::uint64_t>(scenario.seed), 0),
       mission_(scenario.vehicle.start, scenario.vehicle.start_yaw_deg * kDegree, scenario.mission),
@@ -60,13 +62,16 @@ Simulation::Simulation(const Scenario& scenario,
       state_schedule_(scenario.output.trajectory_rate),
       imu_schedule_(dynamics_.settings().imu.rate) {
   for (const LidarMount& mount : scenario_.lidars) {
-    const LidarSettings settings = load_lidar(mount.model, scenario_.folder());
     const Vector3d rpy = mount.rotation_rpy_deg * kDegree;
     const auto number = static_cast<std::uint32_t>(lidars_.size());
-    lidars_.push_back({Lidar(settings, number),
+    Lidar lidar = scenario_.at(fmt::format("lidars[{}].model", number), [&] {
+      return Lidar(load_lidar(mount.model, scenario_.folder()), number);
+    });
+    const double rate = lidar.settings().rate;
+    lidars_.push_back({std::move(lidar),
                        make_renderer(mount.renderer, Scene{map_}),
                        {quaternion_from_rpy(rpy.x(), rpy.y(), rpy.z()), mount.position},
-                       Schedule(settings.rate),
+                       Schedule(rate),
                        mount.snapshot,
                        mount.noise});
   }
@@ -103,13 +108,17 @@ bool Simulation::step(SampleSink& sink) {
   rotor_commands_ = controller_->update(state_.body, command_, to_seconds(step_));
   history_.record(time_, state_.body.T_world_body());
   sense_clearance(sink);
-  sample_until(time_ + step_, sink);
-  take_due_scans(sink);
-  if (colliding_ && scenario_.vehicle.on_collision == "stop") {
+  const bool stops = colliding_ && scenario_.vehicle.on_collision == "stop";
+  sample_until(stops ? time_ + Duration{1} : time_ + step_, sink);
+  take_due_scans(time_, sink);
+  if (stops) {
     finish(RunEnd::kCollision);
     return false;
   }
   if (time_ >= end_time_) {
+    // the last scan ends with the run; its late channels need poses of one step more
+    history_.record(time_ + step_, state_at(time_ + step_).body.T_world_body());
+    take_due_scans(time_ + step_, sink);
     const bool arrived = (state_.body.p_world - mission_.goal()).norm() < kGoalTolerance &&
                          to_seconds(time_) >= mission_.duration();
     finish(scenario_.mission.waypoints.empty() || arrived ? RunEnd::kCompleted
@@ -146,6 +155,15 @@ void Simulation::finish(RunEnd end) {
   summary_.time = time_;
 }
 
+/// True if the sphere met the map between the last two steps: fast, small vehicles, thin walls.
+bool Simulation::passed_through() const {
+  if (!previous_p_world_ || !clearance_) return false;
+  const double moved = (state_.body.p_world - *previous_p_world_).norm();
+  if (clearance_->distance >= moved) return false;
+  const double radius = dynamics_.settings().radius;
+  return clearance_along(*map_, *previous_p_world_, state_.body.p_world, radius, moved) < 0.0;
+}
+
 void Simulation::sense_clearance(SampleSink& sink) {
   const double radius = dynamics_.settings().radius;
   clearance_ = clearance(*map_, state_.body.p_world, radius, kClearanceReach);
@@ -154,7 +172,8 @@ void Simulation::sense_clearance(SampleSink& sink) {
     summary_.closest_approach = clearance_->distance;
     summary_.closest_place_world = clearance_->place_world;
   }
-  const bool inside = clearance_ && clearance_->distance < 0.0;
+  const bool inside = (clearance_ && clearance_->distance < 0.0) || passed_through();
+  previous_p_world_ = state_.body.p_world;
   if (inside != colliding_) {
     colliding_ = inside;
     summary_.collisions += inside ? 1 : 0;
@@ -163,7 +182,7 @@ void Simulation::sense_clearance(SampleSink& sink) {
     event.entered = inside;
     event.vehicle_world = state_.body.p_world;
     if (clearance_) event.place_world = clearance_->place_world;
-    event.penetration = inside ? -clearance_->distance : 0.0;
+    event.penetration = inside ? std::max(0.0, -clearance_->distance) : 0.0;
     sink.on_collision(event);
   }
 }
@@ -199,32 +218,42 @@ void Simulation::sample_until(SimTime end, SampleSink& sink) {
   }
 }
 
-/// Scans whose last beam lies before the newest record: rendered in arrears.
-void Simulation::take_due_scans(SampleSink& sink) {
-  SimTime oldest_needed = time_;
-  for (MountedLidar& mounted : lidars_) {
-    const SimTime start = mounted.schedule.at(mounted.next);
-    const SimTime end = mounted.schedule.at(mounted.next + 1);
-    // a step later than the scan's end: channels of the last cycle fire up to 0.1 ms after it
-    if (end + step_ > time_) {
-      oldest_needed = std::min(oldest_needed, start);
-      continue;
+/// Scans whose last beam lies before `known`, the newest record: rendered in arrears.
+void Simulation::take_due_scans(SimTime known, SampleSink& sink) {
+  for (;;) {
+    // in the order of their ends; several may be due where a sensor is faster than the physics
+    MountedLidar* next = nullptr;
+    SimTime next_end = SimTime::max();
+    SimTime oldest_needed = time_;
+    for (MountedLidar& mounted : lidars_) {
+      const SimTime end = mounted.schedule.at(mounted.next + 1);
+      oldest_needed = std::min(oldest_needed, mounted.schedule.at(mounted.next));
+      // a step later than the scan's end: channels of the last cycle fire up to 0.1 ms after it
+      if (end + step_ > known || end >= next_end) continue;
+      next = &mounted;
+      next_end = end;
     }
-    const PoseAt pose_at = [&](SimTime t) { return history_.at(t) * mounted.T_body_sensor; };
-    const ScanRequest request{static_cast<std::uint64_t>(mounted.next),
-                              start,
-                              mounted.snapshot,
-                              mounted.noise,
-                              static_cast<std::uint64_t>(scenario_.seed)};
-    const Scan scan = mounted.lidar.take(request, pose_at, *mounted.renderer, executor_);
-    ++summary_.scans;
-    summary_.beams += scan.beams;
-    summary_.points += scan.points.size();
-    sink.on_scan(scan, pose_at);
-    ++mounted.next;
-    oldest_needed = std::min(oldest_needed, end);
+    if (next == nullptr) {
+      history_.forget_before(oldest_needed);
+      return;
+    }
+    take_scan(*next, sink);
   }
-  history_.forget_before(oldest_needed);
+}
+
+void Simulation::take_scan(MountedLidar& mounted, SampleSink& sink) {
+  const PoseAt pose_at = [&](SimTime t) { return history_.at(t) * mounted.T_body_sensor; };
+  const ScanRequest request{static_cast<std::uint64_t>(mounted.next),
+                            mounted.schedule.at(mounted.next),
+                            mounted.snapshot,
+                            mounted.noise,
+                            static_cast<std::uint64_t>(scenario_.seed)};
+  const Scan scan = mounted.lidar.take(request, pose_at, *mounted.renderer, executor_);
+  ++mounted.next;
+  ++summary_.scans;
+  summary_.beams += scan.beams;
+  summary_.points += scan.points.size();
+  sink.on_scan(scan, pose_at);
 }
 
 }  // namespace pointflight

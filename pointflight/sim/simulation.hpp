@@ -100,7 +100,9 @@ class Simulation {
   void check_start();
   void sense_clearance(SampleSink& sink);
   void sample_until(SimTime end, SampleSink& sink);
-  void take_due_scans(SampleSink& sink);
+  void take_due_scans(SimTime known, SampleSink& sink);
+  void take_scan(MountedLidar& mounted, SampleSink& sink);
+  [[nodiscard]] bool passed_through() const;
   void finish(RunEnd end);
   [[nodiscard]] VehicleState state_at(SimTime time) const;
 
@@ -121,6 +123,7 @@ class Simulation {
   PositionCommand command_;
   std::vector<double> rotor_commands_;
   std::optional<Clearance> clearance_;
+  std::optional<Vector3d> previous_p_world_;
   bool colliding_ = false;
   Schedule state_schedule_;
   Schedule imu_schedule_;

@@ -90,6 +90,12 @@ VehicleSettings read(SettingsReader& reader, const std::string& path) {
          fmt::format("thrust to weight is {:.2f}: this vehicle cannot hover",
                      settings.thrust_to_weight()));
   }
+  if (settings.hover_speed() <= settings.rotor.speed_min) {
+    fail("rotor.speed_min",
+         fmt::format("{} rad/s already lifts more than the vehicle's weight (it hovers at {:.0f})",
+                     settings.rotor.speed_min,
+                     settings.hover_speed()));
+  }
   return settings;
 }
 

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
+#include "pointflight/core/resources.hpp"
 #include "tests/support.hpp"
 
 // Runs the program as a user would: exit codes, messages, files.
@@ -336,6 +337,65 @@ TEST_F(Program, ScenarioNewCheckAndFly) {
   EXPECT_EQ(run(fmt::format("fly {} -o {} --force", yaml, folder / "run")).code, 0);
 }
 
+TEST_F(Program, AScenarioFindsItsFilesFromItsOwnFolder) {
+  const TemporaryFolder folder;
+  for (const char* name : {"a", "x"}) std::filesystem::create_directory(folder / name);
+  std::filesystem::copy_file(map(), folder / "a/m.pfmap");
+  std::filesystem::copy_file(data_folder() + "/lidars/marsim_grid.yaml", folder / "a/my.yaml");
+  const Result made = run("scenario new m.pfmap --lidar my.yaml --length 3 -o ../x/s.yaml",
+                          fmt::format("cd {} &&", folder / "a"));
+  ASSERT_EQ(made.code, 0) << made.err;
+  const Result check = run(fmt::format("scenario check {}", folder / "x/s.yaml"));
+  EXPECT_EQ(check.code, 0) << check.err;
+}
+
+TEST_F(Program, ForceLeavesWhatOthersHavePutThere) {
+  const TemporaryFolder folder;
+  std::filesystem::create_directories(folder / "run/scans");
+  write_file(folder / "run/scans/mine.txt", "data");
+  write_file(folder / "run/scans/0_000099.pcd", "an old scan");
+  write_file(folder / "s.yaml",
+             fmt::format("map: {}\nduration: 0.3\nvehicle:\n  start: [12, 10, 4]\n", map()));
+  EXPECT_EQ(run(fmt::format("fly {} -o {} --force", folder / "s.yaml", folder / "run")).code, 0);
+  EXPECT_EQ(read_file(folder / "run/scans/mine.txt"), "data");
+  EXPECT_FALSE(std::filesystem::exists(folder / "run/scans/0_000099.pcd"));
+  EXPECT_TRUE(std::filesystem::exists(folder / "run/scans/0_000002.pcd"));  // the last one too
+}
+
+TEST_F(Program, RefusesToOverwriteWhatItReads) {
+  const TemporaryFolder folder;
+  const std::string copy = folder / "c.pcd";
+  std::filesystem::copy_file(cloud(), copy);
+  expect_user_error(run(fmt::format("map import {} -o {}", copy, copy)), "another name");
+  expect_user_error(run(fmt::format("map import {} -o {} --export-outliers {}",
+                                    copy,
+                                    folder / "m.pfmap",
+                                    folder / "m.pfmap")),
+                    "another name");
+  expect_user_error(run(fmt::format("map import {} -o {}", copy, folder.path())),
+                    "not a regular file");
+  EXPECT_EQ(read_file(copy), read_file(cloud()));
+}
+
+TEST_F(Program, AnInterruptedImportLeavesNothing) {
+  const TemporaryFolder folder;
+  const Result result = run(fmt::format("map forest -o {}", folder / "f.pcd"));
+  ASSERT_EQ(result.code, 0);
+  const Result import = run(
+      fmt::format(
+          "map import {0} {0} {0} -o {1} --resolution 0.02", folder / "f.pcd", folder / "f.pfmap"),
+      "timeout --preserve-status -s INT 0.3");
+  EXPECT_EQ(import.code, 130) << import.err;
+  EXPECT_FALSE(std::filesystem::exists(folder / "f.pfmap"));
+  EXPECT_FALSE(std::filesystem::exists(folder / "f.pfmap.partial"));
+}
+
+TEST_F(Program, AFullTerminalIsNoCrash) {
+  const Result lost = run(fmt::format("map info {} --json >/dev/full #", map()));
+  EXPECT_EQ(lost.code, 2);
+  EXPECT_EQ(run("map info nothing.pfmap 2>/dev/full #").code, 2);
+}
+
 TEST_F(Program, BadScenariosSayFileAndLine) {
   const TemporaryFolder folder;
   const auto check = [&](const std::string& text) {
@@ -346,6 +406,7 @@ TEST_F(Program, BadScenariosSayFileAndLine) {
   };
   const std::string map_line = fmt::format("map: {}\n", map());
   expect_user_error(check("seed: 1\n"), "map: missing");
+  expect_user_error(check("map: absent.pfmap\n"), "s.yaml:1: map: ");
   expect_user_error(check("map: absent.pfmap\n"), "absent.pfmap: cannot open");
   expect_user_error(check(map_line + "sede: 1\n"),
                     "s.yaml:2: sede: unknown key; did you mean 'seed'");
@@ -353,7 +414,8 @@ TEST_F(Program, BadScenariosSayFileAndLine) {
                     "s.yaml:3: output.trajectory_rate");
   expect_user_error(check(map_line + "mission:\n  speed: 2 km/h\n"), "plain number in m/s");
   expect_user_error(check(map_line + "vehicle: {model: helicopter}\n"), "quad_330");
-  expect_user_error(check(map_line + "lidars:\n  - model: mid3600\n"), "did you mean 'mid360'");
+  expect_user_error(check(map_line + "lidars:\n  - model: mid3600\n"),
+                    "s.yaml:3: lidars[0].model: ");
   expect_user_error(check(map_line + "vehicle:\n  start: [12, 10, 0.3]\n"),
                     "s.yaml:3: vehicle.start");
   expect_user_error(check(map_line + "vehicle: [\n"), "not valid YAML");

@@ -114,8 +114,30 @@ TEST(Import, TooWideForTheResolutionIsAnError) {
   ImportOptions options;
   options.resolution = 0.001;
   const std::vector<CloudPoint> points = {
-      {{0, 0, 0}, 0}, {{5000, 0, 0}, 0}, {{5001, 0, 0}, 0}, {{5002, 0, 0}, 0}};
+      {{0, 0, 0}, 0}, {{5000, 0, 0}, 0}, {{10000, 0, 0}, 0}, {{15000, 0, 0}, 0}};
   expect_contains(error_of([&] { import_points(points, options); }), "coarser --resolution");
+}
+
+TEST(Import, AStrayFirstPointDoesNotRefuseTheCloud) {
+  std::vector<CloudPoint> points = {{{0, 0, 0}, 0}};
+  for (int i = 0; i < 30; ++i) {
+    for (int j = 0; j < 30; ++j) points.push_back({{5e5 + 0.1 * i, 5e6 + 0.1 * j, 100.0}, 0});
+  }
+  ImportOptions options;
+  options.resolution = 0.25;
+  const ImportedMap map = import_points(points, options);
+  EXPECT_EQ(map.report.points_out_of_reach, 1u);
+  EXPECT_NEAR(map.description.bounds_world.min.x(), 5e5, 0.3);
+}
+
+TEST(Import, PointsGivenTwiceDoNotHideTheSpacing) {
+  std::vector<CloudPoint> points;
+  for (int twice = 0; twice < 2; ++twice) {
+    for (int i = 0; i < 60; ++i) {
+      for (int j = 0; j < 60; ++j) points.push_back({{0.02 * i, 0.02 * j, 1.0}, 0.0f});
+    }
+  }
+  EXPECT_NEAR(import_points(points, {}).report.spacing, 0.02, 1e-9);
 }
 
 TEST(Import, OnePointMakesAMapOfOneSurfel) {
@@ -176,7 +198,7 @@ TEST(Import, KeepsIntensities) {
   const TemporaryFolder folder;
   auto points = cloud_of(room(), 500.0);
   for (CloudPoint& p : points) p.intensity = p.position.z() > 2.9 ? 200.0f : 50.0f;
-  write_cloud_pcd(folder / "a.pcd", points, true);
+  write_cloud_pcd(OutputFile(folder / "a.pcd"), points, true);
   ImportOptions options;
   options.resolution = 0.1;
   const Executor executor(1);
@@ -209,7 +231,7 @@ TEST(Import, DoesNotDependOnThreads) {
   options.resolution = 0.05;
   std::uint64_t first = 0;
   const TemporaryFolder folder;
-  write_cloud_pcd(folder / "a.pcd", points, false);
+  write_cloud_pcd(OutputFile(folder / "a.pcd"), points, false);
   for (const int threads : {1, 2, 8}) {
     const Executor executor(threads);
     const ImportedMap map = import_clouds({folder / "a.pcd"}, options, executor);

@@ -6,6 +6,7 @@
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/hash.hpp"
 #include "pointflight/core/output_file.hpp"
+#include "pointflight/core/resources.hpp"
 #include "pointflight/geometry/rotation.hpp"
 #include "pointflight/sim/mission.hpp"
 #include "pointflight/sim/scenario.hpp"
@@ -19,6 +20,9 @@ namespace {
 using testing::error_of;
 using testing::expect_contains;
 using testing::map_of;
+using testing::read_file;
+using testing::TemporaryFolder;
+using testing::write_file;
 
 TEST(SmoothMove, KeepsItsLimitsAndArrives) {
   const MotionLimits limits{2.0, 1.5, 4.0};
@@ -274,7 +278,45 @@ TEST(Simulation, WhateverTheRatesNothingIsLost) {
   HashSink sink;
   const RunSummary s = run(scenario, hall(), sink);
   EXPECT_EQ(s.states, 334u);  // k / 333 from 0 to 1 s
-  EXPECT_EQ(s.scans, 29u);    // the thirtieth ends with the run, a step too late
+  EXPECT_EQ(s.scans, 30u);    // the last one ends with the run
+}
+
+TEST(Simulation, ASensorFasterThanThePhysicsLosesNoScan) {
+  const TemporaryFolder folder;
+  write_file(folder / "fast.yaml",
+             "range_max: 50\nrate: 1000\npattern: grid\ngrid: {columns: 4, rows: 4}\n");
+  Scenario scenario = short_flight();
+  scenario.duration = 0.5;
+  scenario.physics_step = 0.005;
+  scenario.lidars = {LidarMount{folder / "fast.yaml"}};
+  HashSink sink;
+  EXPECT_EQ(run(scenario, hall(), sink).scans, 500u);
+}
+
+TEST(Simulation, AFastSmallVehicleMeetsAThinWall) {
+  const TemporaryFolder folder;
+  std::string yaml = read_file(data_folder() + "/vehicles/quad_330.yaml");
+  const std::string radius = "radius: 0.26";
+  yaml.replace(yaml.find(radius), radius.size(), "radius: 0.02");
+  write_file(folder / "tiny.yaml", yaml);
+  ShapeScene wall;
+  wall.add_rectangle({5, -4, -4}, {0, 8, 0}, {0, 0, 8});
+  const auto map = map_of(wall, 0.1);
+  for (int i = 0; i < 6; ++i) {  // 6 cm a step: some of these would step over it
+    Scenario scenario = short_flight();
+    scenario.physics_step = 0.005;
+    scenario.duration = 4.0;
+    scenario.lidars.clear();
+    scenario.vehicle.model = folder / "tiny.yaml";
+    scenario.vehicle.on_collision = "stop";
+    scenario.vehicle.start = {-5.0 + 0.01 * i, 0, 0};
+    scenario.mission = MissionSettings{};
+    scenario.mission.motion = {12.0, 20.0, 200.0};
+    scenario.mission.yaw = "fixed";
+    scenario.mission.waypoints = {{60, 0, 0}};
+    HashSink sink;
+    EXPECT_EQ(run(scenario, map, sink).end, RunEnd::kCollision) << i;
+  }
 }
 
 }  // namespace

@@ -21,7 +21,7 @@ class CsvPattern : public BeamPattern {
         train_(settings.csv.points_per_second, Duration{0}, settings.rate) {
     const std::string folder = std::filesystem::path(settings.path).parent_path().string();
     const std::string path = resolve_path(settings.csv.file, folder);
-    const CsvTable table(path);
+    const CsvTable table = settings.at("csv.file", [&] { return CsvTable(path); });
     const int azimuth = table.require("azimuth");
     const int zenith = table.find("zenith");
     const int elevation = zenith < 0 ? table.require("elevation") : -1;

@@ -16,12 +16,9 @@ namespace pointflight {
 namespace {
 
 CsvTable load_table(const LidarSettings& settings) {
-  if (settings.rings.table.empty()) {
-    throw InputError(
-        fmt::format("{}: rings.table: missing; name the CSV of channels", settings.path));
-  }
   const std::string folder = std::filesystem::path(settings.path).parent_path().string();
-  return CsvTable(resolve_path(settings.rings.table, folder));
+  return settings.at("rings.table",
+                     [&] { return CsvTable(resolve_path(settings.rings.table, folder)); });
 }
 
 /// Velodyne: the head turns clockwise seen from above; a channel fires at its own time within the
@@ -46,10 +43,18 @@ class VelodynePattern : public BeamPattern {
       if (std::isnan(time_us)) {
         time_us = settings.rings.channel_interval_us * static_cast<double>(row);
       }
-      channel.fire_time = from_seconds(time_us * 1e-6);
       channel.vertical = vertical < 0 ? 0.0 : table.at(row, vertical) * 1e-3;
       channel.horizontal = horizontal < 0 ? 0.0 : table.at(row, horizontal) * 1e-3;
-      channel.ring = static_cast<std::uint16_t>(table.at(row, ring));
+      const double number = table.at(row, ring);
+      if (!(number >= 0.0 && number <= 65535.0) || !(std::abs(time_us) < 1e6)) {
+        throw InputError(
+            fmt::format("{}: row {}: a ring from 0 to 65535 and a firing time within a second are "
+                        "wanted",
+                        settings.rings.table,
+                        row + 1));
+      }
+      channel.ring = static_cast<std::uint16_t>(number);
+      channel.fire_time = from_seconds(time_us * 1e-6);
       if (!std::isfinite(channel.elevation.sin + channel.azimuth + channel.vertical +
                          channel.horizontal)) {
         throw InputError(fmt::format("{}: row {} lacks a number", settings.rings.table, row + 1));
