@@ -17,11 +17,12 @@ allowed() {
     render) echo "core geometry map render" ;;
     lidar) echo "core geometry io map render lidar" ;;
     vehicle) echo "core geometry vehicle" ;;
+    fidelity) echo "core geometry io map render fidelity" ;;
     world) echo "core geometry map world" ;;
     sim) echo "core geometry io map render lidar vehicle world sim" ;;
   esac
 }
-for folder in core geometry io map render lidar vehicle world sim; do
+for folder in core geometry io map render lidar vehicle world fidelity sim; do
   for used in $(grep -rhoE '#include "(pointflight|apps|tests)/[a-z_]+' "pointflight/$folder" |
                 sed 's/.*"//; s/pointflight\///' | sort -u); do
     case " $(allowed "$folder") " in

@@ -11,7 +11,9 @@
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/core/version.hpp"
 #include "pointflight/geometry/morton.hpp"
+#include "pointflight/map/noise_projection.hpp"
 #include "pointflight/map/spacing.hpp"
+#include "pointflight/map/sparse_growth.hpp"
 #include "pointflight/map/surfel_fit.hpp"
 
 namespace pointflight {
@@ -46,6 +48,7 @@ class Import {
     report.resolution = options_.resolution.value_or(report.supported_resolution);
     accumulate();
     drop_outliers();
+    flatten_noise();
     build_tree();
     describe();
     return std::move(map_);
@@ -200,10 +203,22 @@ class Import {
     grid_->reorder(indices);
   }
 
+  void flatten_noise() {
+    pointflight::report(progress_, "measuring the noise", 0.0);
+    ImportReport& report = map_.report;
+    report.noise = estimate_noise(*grid_, executor_);
+    if (!needs_projection(*grid_, report.noise)) return;
+    pointflight::report(progress_, "taking the noise out", 0.0);
+    grid_ = project_noise(*grid_, report.noise, executor_, report.projection);
+    sort_cells(std::vector<bool>(grid_->cells().size(), false));
+  }
+
   void build_tree() {
     pointflight::report(progress_, "fitting surfels", 0.0);
     auto surfels = fit_surfels(*grid_, min_voxel_, executor_);
     ImportReport& report = map_.report;
+    pointflight::report(progress_, "closing gaps of thin scans", 0.0);
+    report.grown_surfels = grow_sparse_surfels(*grid_, surfels, executor_);
     report.surfels = surfels.size();
     for (const BuildSurfel& surfel : surfels) {
       report.planar_surfels += surfel.s[0] <= kPlanarThickness ? 1 : 0;
@@ -264,8 +279,13 @@ class Import {
                                {"sigmas", options_.outliers.sigmas},
                                {"cells_dropped", report.outlier_cells},
                                {"points_dropped", report.outlier_points}};
+    json["noise"] = report.noise;
+    json["projection"] = {{"kept", report.projection.kept},
+                          {"projected", report.projection.projected},
+                          {"too_thick", report.projection.too_thick}};
     json["surfels"] = report.surfels;
     json["planar_surfels"] = report.planar_surfels;
+    json["grown_surfels"] = report.grown_surfels;
     json["has_intensity"] = report.has_intensity;
     d.metadata = json.dump(1, ' ', false, nlohmann::json::error_handler_t::replace);
   }

@@ -10,6 +10,7 @@
 #include "pointflight/core/progress.hpp"
 #include "pointflight/io/cloud_reader.hpp"
 #include "pointflight/map/map_file.hpp"
+#include "pointflight/map/noise_projection.hpp"
 #include "pointflight/map/outliers.hpp"
 
 namespace pointflight {
@@ -33,6 +34,9 @@ struct ImportReport {
   std::uint64_t outlier_points = 0;
   std::uint64_t surfels = 0;
   std::uint64_t planar_surfels = 0;
+  double noise = 0.0;  ///< Deviation of the points across flat surfaces, m.
+  ProjectionReport projection;
+  std::uint64_t grown_surfels = 0;  ///< Widened where the scan is thin.
   double resolution = 0.0;
   double spacing = 0.0;               ///< Median nearest-neighbour distance, m; 0 if unknown.
   double supported_resolution = 0.0;  ///< 2.5 spacings.

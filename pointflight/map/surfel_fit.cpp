@@ -1,45 +1,18 @@
 #include "pointflight/map/surfel_fit.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
 #include "pointflight/geometry/morton.hpp"
+#include "pointflight/map/covariance_axes.hpp"
 
 namespace pointflight {
 namespace {
 
 constexpr double kPriorPoints = 8.0;
 
-/// Eigenvalues ascending with their eigenvectors as columns.
-struct Axes {
-  Vector3d lambda = Vector3d::Zero();
-  Matrix3d vectors = Matrix3d::Identity();
-};
-
-Axes eigen_axes(const Matrix3d& covariance) {
-  // computeDirect calls libm's atan2, cos and sin: the iterative solver needs only sqrt
-  const Eigen::SelfAdjointEigenSolver<Matrix3d> solver(covariance);
-  return {solver.eigenvalues().cwiseMax(0.0), solver.eigenvectors()};
-}
-
-Moments neighbourhood(const VoxelGrid& grid, const VoxelCell& cell) {
-  Moments all;
-  for (std::int32_t dx = -1; dx <= 1; ++dx) {
-    for (std::int32_t dy = -1; dy <= 1; ++dy) {
-      for (std::int32_t dz = -1; dz <= 1; ++dz) {
-        const std::uint32_t at =
-            grid.find({cell.voxel[0] + dx, cell.voxel[1] + dy, cell.voxel[2] + dz});
-        if (at == VoxelGrid::kNone) continue;
-        all.add(grid.cells()[at].moments().about(grid.resolution() * -Vector3d(dx, dy, dz)));
-      }
-    }
-  }
-  return all;
-}
-
 /// Frame with the plane's normal first and the cell's own longest direction last.
-Matrix3d planar_frame(const Axes& plane, const Axes& own) {
+Matrix3d planar_frame(const CovarianceAxes& plane, const CovarianceAxes& own) {
   const Vector3d normal = plane.vectors.col(0);
   Vector3d longest = own.vectors.col(2) - own.vectors.col(2).dot(normal) * normal;
   if (longest.squaredNorm() < 1e-6) longest = plane.vectors.col(2);
@@ -53,11 +26,11 @@ BuildSurfel fit(const VoxelGrid& grid, const VoxelCell& cell) {
   const double r = grid.resolution();
   const double cell_variance = r * r / 12.0;  // of a plane that fills the cell, per axis
   const Moments own = cell.moments();
-  Moments near = neighbourhood(grid, cell);
-  const Axes around = eigen_axes(near.covariance());
+  Moments near = grid.neighbourhood(cell, 1);
+  const CovarianceAxes around = covariance_axes(near.covariance());
   Matrix3d own_covariance = own.covariance();
   if (!own_covariance.allFinite()) own_covariance.setZero();
-  const Axes inside = eigen_axes(own_covariance);
+  const CovarianceAxes inside = covariance_axes(own_covariance);
 
   const double thickness = std::sqrt(around.lambda[0]);
   const bool neighbours_planar =

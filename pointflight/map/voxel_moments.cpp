@@ -54,9 +54,8 @@ void VoxelGrid::grow(std::size_t slots) {
   for (std::uint32_t i = 0; i < cells_.size(); ++i) slots_[slot_of(cells_[i].voxel)] = i;
 }
 
-bool VoxelGrid::add(const Vector3d& point_world, float intensity) {
-  const Vector3d cells = (point_world - base_) / resolution_;
-  if (!(cells.cwiseAbs().maxCoeff() < kMaxCells)) return false;
+VoxelCell* VoxelGrid::cell_at(const Vector3d& cells) {
+  if (!(cells.cwiseAbs().maxCoeff() < kMaxCells)) return nullptr;
   const Vector3d low = cells.array().floor();
   const std::array<std::int32_t, 3> voxel = {static_cast<std::int32_t>(low.x()),
                                              static_cast<std::int32_t>(low.y()),
@@ -70,19 +69,63 @@ bool VoxelGrid::add(const Vector3d& point_world, float intensity) {
     slots_[slot] = static_cast<std::uint32_t>(cells_.size());
     cells_.emplace_back().voxel = voxel;
   }
-  VoxelCell& cell = cells_[slots_[slot]];
+  return &cells_[slots_[slot]];
+}
+
+bool VoxelGrid::add(const Vector3d& point_world, float intensity) {
+  const Vector3d cells = (point_world - base_) / resolution_;
+  VoxelCell* cell = cell_at(cells);
+  if (cell == nullptr) return false;
+  const Vector3d low = cells.array().floor();
   const Vector3f q =
       ((cells - low).array() - 0.5).matrix().cast<float>() * static_cast<float>(resolution_);
-  ++cell.n;
-  for (std::size_t axis = 0; axis < 3; ++axis) cell.sum[axis] += q[static_cast<int>(axis)];
-  cell.products[0] += q.x() * q.x();
-  cell.products[1] += q.x() * q.y();
-  cell.products[2] += q.x() * q.z();
-  cell.products[3] += q.y() * q.y();
-  cell.products[4] += q.y() * q.z();
-  cell.products[5] += q.z() * q.z();
-  cell.intensity_sum += intensity;
+  ++cell->n;
+  for (std::size_t axis = 0; axis < 3; ++axis) cell->sum[axis] += q[static_cast<int>(axis)];
+  cell->products[0] += q.x() * q.x();
+  cell->products[1] += q.x() * q.y();
+  cell->products[2] += q.x() * q.z();
+  cell->products[3] += q.y() * q.y();
+  cell->products[4] += q.y() * q.z();
+  cell->products[5] += q.z() * q.z();
+  cell->intensity_sum += intensity;
   return true;
+}
+
+bool VoxelGrid::add(const Vector3d& mean_world,
+                    const Matrix3d& covariance,
+                    std::uint32_t n,
+                    float intensity_sum) {
+  const Vector3d cells = (mean_world - base_) / resolution_;
+  VoxelCell* cell = cell_at(cells);
+  if (cell == nullptr) return false;
+  const Vector3d q = (cells.array() - cells.array().floor() - 0.5).matrix() * resolution_;
+  const Matrix3d products = n * (covariance + q * q.transpose());
+  cell->n += n;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    cell->sum[axis] += static_cast<float>(n * q[static_cast<int>(axis)]);
+  }
+  std::size_t k = 0;
+  for (int row = 0; row < 3; ++row) {
+    for (int column = row; column < 3; ++column) {
+      cell->products[k++] += static_cast<float>(products(row, column));
+    }
+  }
+  cell->intensity_sum += intensity_sum;
+  return true;
+}
+
+Moments VoxelGrid::neighbourhood(const VoxelCell& cell, std::int32_t reach) const {
+  Moments all;
+  for (std::int32_t dx = -reach; dx <= reach; ++dx) {
+    for (std::int32_t dy = -reach; dy <= reach; ++dy) {
+      for (std::int32_t dz = -reach; dz <= reach; ++dz) {
+        const std::uint32_t at = find({cell.voxel[0] + dx, cell.voxel[1] + dy, cell.voxel[2] + dz});
+        if (at == kNone) continue;
+        all.add(cells_[at].moments().about(resolution_ * -Vector3d(dx, dy, dz)));
+      }
+    }
+  }
+  return all;
 }
 
 std::uint32_t VoxelGrid::find(const std::array<std::int32_t, 3>& voxel) const {

@@ -50,6 +50,12 @@ class VoxelGrid {
   /// False if the point lies more than 2^20 cells from the base.
   bool add(const Vector3d& point_world, float intensity);
 
+  /// Adds `n` points by their mean and covariance; false where `add` would be.
+  bool add(const Vector3d& mean_world,
+           const Matrix3d& covariance,
+           std::uint32_t n,
+           float intensity_sum);
+
   [[nodiscard]] const std::vector<VoxelCell>& cells() const { return cells_; }
   [[nodiscard]] const Vector3d& base_world() const { return base_; }
   [[nodiscard]] double resolution() const { return resolution_; }
@@ -58,6 +64,9 @@ class VoxelGrid {
   [[nodiscard]] std::uint32_t find(const std::array<std::int32_t, 3>& voxel) const;
   static constexpr std::uint32_t kNone = 0xffffffffu;
 
+  /// Moments of the (2 reach + 1)^3 cells around one, relative to its centre.
+  [[nodiscard]] Moments neighbourhood(const VoxelCell& cell, std::int32_t reach) const;
+
   /// World position of the cell's mean point.
   [[nodiscard]] Vector3d centroid_world(const VoxelCell& cell) const;
 
@@ -65,6 +74,8 @@ class VoxelGrid {
   void reorder(const std::vector<std::uint32_t>& indices);
 
  private:
+  /// The cell of a place given in cells from the base, made where it is new; null out of reach.
+  VoxelCell* cell_at(const Vector3d& cells);
   [[nodiscard]] std::size_t slot_of(const std::array<std::int32_t, 3>& voxel) const;
   void grow(std::size_t slots);
 

@@ -245,9 +245,16 @@ TEST_F(Program, ExportsTheOutliersThatItDropped) {
 
 TEST_F(Program, FliesAMapWithoutAScenario) {
   const TemporaryFolder folder;
-  const Result fly = run(fmt::format("fly {} -o {}", map(), folder / "run"),
-                         "timeout --preserve-status -s INT 1.5");
-  EXPECT_TRUE(fly.code == 0 || fly.code == 130) << fly.err;
+  const std::string small = folder / "small.pfmap";
+  ASSERT_EQ(run(fmt::format("map forest --size-x 8 --size-y 8 --trees 150 --density 300 -o {}",
+                            folder / "small.pcd"))
+                .code,
+            0);
+  ASSERT_EQ(
+      run(fmt::format("map import {} -o {} --resolution 0.1", folder / "small.pcd", small)).code,
+      0);
+  const Result fly = run(fmt::format("fly {} -o {}", small, folder / "run"));
+  EXPECT_EQ(fly.code, 0) << fly.err;
   EXPECT_FALSE(read_file(folder / "run/summary.json").empty());
 }
 
@@ -388,6 +395,52 @@ TEST_F(Program, AnInterruptedImportLeavesNothing) {
   EXPECT_EQ(import.code, 130) << import.err;
   EXPECT_FALSE(std::filesystem::exists(folder / "f.pfmap"));
   EXPECT_FALSE(std::filesystem::exists(folder / "f.pfmap.partial"));
+}
+
+TEST_F(Program, ComparesRealScansWithAMap) {
+  // scans that the program itself takes stand for real ones
+  const TemporaryFolder folder;
+  std::string poses = "# time tx ty tz qx qy qz qw file\n";
+  for (int i = 0; i < 2; ++i) {
+    const std::string name = fmt::format("scan{}.pcd", i);
+    ASSERT_EQ(run(fmt::format("scan {} --lidar marsim_grid --pose {},10,4,0,0,90 --no-noise -o {}",
+                              map(),
+                              10 + 2 * i,
+                              folder / name))
+                  .code,
+              0);
+    poses += fmt::format("{} {} 10 4 0 0 0.70710678 0.70710678 {}\n", i, 10 + 2 * i, name);
+  }
+  write_file(folder / "poses.tum", poses);
+  const Result compared = run(fmt::format("compare {} --scans {} --poses {} --cloud {} --json",
+                                          map(),
+                                          folder.path(),
+                                          folder / "poses.tum",
+                                          cloud()));
+  ASSERT_EQ(compared.code, 0) << compared.err;
+  const auto json = nlohmann::json::parse(compared.out);
+  ASSERT_EQ(json["scans"].size(), 2u);
+  const auto& all = json["overall"]["all"];
+  EXPECT_GT(all["rays"].get<int>(), 50000);
+  // the same rays but for the rounding of directions to float
+  EXPECT_LT(all["median_abs_error"].get<double>(), 1e-4);
+  EXPECT_LT(all["missing_fraction"].get<double>(), 0.01);
+  EXPECT_LT(all["wrong_fraction"].get<double>(), 0.01);
+  EXPECT_GT(json["overall"]["supported"]["rays"].get<int>(), 1000);
+  // a pose that is wrong is seen
+  write_file(folder / "shifted.tum", "0 10 10 4.5 0 0 0.70710678 0.70710678 scan0.pcd\n");
+  const auto shifted =
+      nlohmann::json::parse(run(fmt::format("compare {} --scans {} --poses {} --json",
+                                            map(),
+                                            folder.path(),
+                                            folder / "shifted.tum"))
+                                .out);
+  EXPECT_GT(shifted["overall"]["all"]["late_fraction"].get<double>(), 0.2);
+  write_file(folder / "bad.tum", "0 1 2 3 0 0 0\n");
+  expect_user_error(
+      run(fmt::format(
+          "compare {} --scans {} --poses {}", map(), folder.path(), folder / "bad.tum")),
+      "bad.tum:1: ");
 }
 
 TEST_F(Program, AFullTerminalIsNoCrash) {

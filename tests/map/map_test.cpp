@@ -118,6 +118,71 @@ TEST(Import, TooWideForTheResolutionIsAnError) {
   expect_contains(error_of([&] { import_points(points, options); }), "coarser --resolution");
 }
 
+TEST(Import, MeasuresTheNoiseAndTakesItOut) {
+  for (const double noise : {0.0, 0.005, 0.01, 0.02}) {
+    SCOPED_TRACE(noise);
+    ImportOptions options;
+    options.resolution = 0.05;
+    const ImportedMap imported = import_points(cloud_of(room(), 3200.0, noise), options);
+    EXPECT_NEAR(imported.report.noise, noise, 0.12 * noise + 1e-4);
+    EXPECT_EQ(imported.report.projection.projected > 0, noise > 0.0025);
+    // centres on the floor lie on it
+    const auto map =
+        SurfelMap::from_bytes(map_bytes(imported.tree, imported.description), "memory");
+    double squares = 0.0;
+    double count = 0.0;
+    map->for_each_surfel([&](const Vector3d& c, const Vector3d&, double, std::uint32_t) {
+      const bool on_floor =
+          std::abs(c.z()) < 0.1 && c.x() > 0.5 && c.x() < 2.5 && c.y() > 0.5 && c.y() < 1.5;
+      squares += on_floor ? c.z() * c.z() : 0.0;
+      count += on_floor ? 1.0 : 0.0;
+    });
+    EXPECT_GT(count, 100.0);
+    EXPECT_LT(std::sqrt(squares / count), 0.35 * noise + 2e-4);
+  }
+}
+
+TEST(Import, LeavesTheFacesOfAPartitionApart) {
+  ShapeScene scene;  // 5 cm thick
+  scene.add_box({0, 0, 0}, {0.05, 3, 3});
+  ImportOptions options;
+  options.resolution = 0.05;
+  const ImportedMap imported = import_points(cloud_of(scene, 3200.0, 0.005), options);
+  const auto map = SurfelMap::from_bytes(map_bytes(imported.tree, imported.description), "memory");
+  double worst = 0.0;
+  double sum = 0.0;
+  double count = 0.0;
+  map->for_each_surfel([&](const Vector3d& c, const Vector3d&, double, std::uint32_t) {
+    if (c.y() < 0.3 || c.y() > 2.7 || c.z() < 0.3 || c.z() > 2.7) return;
+    const double off = std::min(std::abs(c.x()), std::abs(c.x() - 0.05));
+    worst = std::max(worst, off);
+    sum += off;
+    count += 1.0;
+  });
+  EXPECT_LT(sum / count, 0.008);
+  EXPECT_GT(count, 1000.0);
+}
+
+TEST(Import, ClosesTheGapsOfAThinScanOnly) {
+  // a wall with a point every other cell, and a dense one
+  for (const double per_cell : {0.5, 16.0}) {
+    SCOPED_TRACE(per_cell);
+    ShapeScene scene;
+    scene.add_rectangle({0, 0, 0}, {0, 4, 0}, {0, 0, 4});
+    ImportOptions options;
+    options.resolution = 0.05;
+    const ImportedMap imported =
+        import_points(cloud_of(scene, per_cell / (0.05 * 0.05), 0.0), options);
+    const auto share = static_cast<double>(imported.report.grown_surfels) /
+                       static_cast<double>(imported.report.surfels);
+    if (per_cell < 4.0) {
+      EXPECT_GT(share, 0.9);
+    } else {
+      EXPECT_LT(share, 0.01);
+    }
+  }
+}
+
 TEST(Import, AStrayFirstPointDoesNotRefuseTheCloud) {
   std::vector<CloudPoint> points = {{{0, 0, 0}, 0}};
   for (int i = 0; i < 30; ++i) {

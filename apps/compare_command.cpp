@@ -1,0 +1,112 @@
+#include <fmt/format.h>
+
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "apps/commands.hpp"
+#include "apps/terminal.hpp"
+#include "pointflight/fidelity/scan_comparison.hpp"
+
+namespace pointflight::apps {
+namespace {
+
+struct CompareFlags {
+  std::string map;
+  std::string scans;
+  std::string poses;
+  std::string cloud;
+  std::string renderer = "beam";
+  bool json = false;
+  int threads = 0;
+};
+
+nlohmann::ordered_json to_json(const ErrorStatistics& s) {
+  return {{"rays", s.rays},
+          {"median_abs_error", s.median_abs_error},
+          {"p90_abs_error", s.p90_abs_error},
+          {"p95_abs_error", s.p95_abs_error},
+          {"bias", s.bias},
+          {"missing_fraction", s.missing_fraction},
+          {"early_fraction", s.early_fraction},
+          {"late_fraction", s.late_fraction},
+          {"wrong_fraction", s.wrong_fraction}};
+}
+
+void print_row(const std::string& name, const ErrorStatistics& s) {
+  fmt::print("{:<24} {:>9} {:>7.2f} {:>7.2f} {:>7.2f} {:>8.2f} {:>8.1f} {:>8.1f} {:>8.1f} {:>7.1f}\n",
+             name,
+             s.rays,
+             100.0 * (1.0 - s.wrong_fraction - s.missing_fraction),
+             100.0 * s.early_fraction,
+             100.0 * s.late_fraction,
+             100.0 * s.missing_fraction,
+             1e3 * s.median_abs_error,
+             1e3 * s.p90_abs_error,
+             1e3 * s.p95_abs_error,
+             1e3 * s.bias);
+}
+
+void compare(const CompareFlags& flags) {
+  const Executor executor(flags.threads);
+  const auto map = SurfelMap::open(flags.map);
+  const auto scans = read_real_scans(flags.scans, flags.poses);
+  std::optional<SupportCloud> cloud;
+  if (!flags.cloud.empty()) cloud.emplace(flags.cloud);
+  const auto renderer = make_renderer(flags.renderer, Scene{map});
+  const Progress progress = interruptible_progress();
+  ErrorCollector all;
+  ErrorCollector supported;
+  nlohmann::ordered_json rows = nlohmann::ordered_json::array();
+  if (!flags.json) {
+    fmt::print("{:<24} {:>9} {:>7} {:>7} {:>7} {:>8} {:>8} {:>8} {:>8} {:>7}\n",
+               "", "rays", "right %", "early %", "late %", "missing%", "median", "p90", "p95",
+               "bias mm");
+  }
+  for (std::size_t i = 0; i < scans.size(); ++i) {
+    report(progress, "comparing", static_cast<double>(i) / static_cast<double>(scans.size()));
+    const auto rays = compare_scan(scans[i], *renderer, cloud ? &*cloud : nullptr, executor);
+    const ErrorCollector scan_all = collect(rays, false);
+    const ErrorCollector scan_supported = collect(rays, true);
+    all.add(scan_all);
+    supported.add(scan_supported);
+    rows.push_back({{"file", scans[i].file},
+                    {"all", to_json(scan_all.statistics())},
+                    {"supported", to_json(scan_supported.statistics())}});
+    if (!flags.json) print_row(scans[i].file, scan_all.statistics());
+  }
+  end_progress();
+  if (flags.json) {
+    const nlohmann::ordered_json json = {
+        {"overall", {{"all", to_json(all.statistics())}, {"supported", to_json(supported.statistics())}}},
+        {"scans", rows}};
+    fmt::print("{}\n", json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
+    return;
+  }
+  print_row("all", all.statistics());
+  if (cloud) print_row("all, supported", supported.statistics());
+}
+
+}  // namespace
+
+void add_compare_command(CLI::App& parent, int& /*exit_code*/) {
+  auto* app = parent.add_subcommand("compare", "Render real scans' rays from a map and say how they differ");
+  auto flags = std::make_shared<CompareFlags>();
+  app->add_option("map", flags->map, "A .pfmap")->required();
+  app->add_option("--scans", flags->scans, "Folder of real scans, points in the sensor frame")
+      ->required();
+  app->add_option("--poses", flags->poses, "TUM file: map <- sensor; a ninth column names the scan")
+      ->required();
+  app->add_option("--cloud", flags->cloud, "What the map was made from: tells which rays it supports");
+  app->add_option("--renderer", flags->renderer, "How ranges are made")
+      ->check(CLI::IsMember(renderer_names()))
+      ->capture_default_str();
+  app->add_flag("--json", flags->json, "JSON on stdout");
+  app->add_option("--threads", flags->threads, "0: all cores")->check(CLI::Range(0, 1024));
+  app->callback([flags] { compare(*flags); });
+}
+
+}  // namespace pointflight::apps

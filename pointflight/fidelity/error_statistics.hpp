@@ -1,0 +1,44 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+namespace pointflight {
+
+/// How rendered ranges lie beside true or measured ones.
+///
+/// A ray is *right* within 0.1 m, else *early* (rendered nearer) or *late*; *missing* where nothing
+/// was rendered. Shares are of all rays; median, percentiles and bias are over the right ones, so
+/// that a few wrong surfaces do not hide how exact the others are.
+struct ErrorStatistics {
+  std::uint64_t rays = 0;
+  double median_abs_error = 0.0;  ///< m
+  double p90_abs_error = 0.0;     ///< m
+  double p95_abs_error = 0.0;     ///< m
+  double bias = 0.0;              ///< Mean of rendered minus true, m.
+  double missing_fraction = 0.0;
+  double early_fraction = 0.0;
+  double late_fraction = 0.0;
+  double wrong_fraction = 0.0;    ///< Early and late.
+
+  static constexpr double kRight = 0.1;  ///< m
+};
+
+/// Collects rays for `ErrorStatistics`.
+class ErrorCollector {
+ public:
+  /// `rendered` is nothing where there was no return.
+  void add(double true_range, const std::optional<double>& rendered);
+  void add(const ErrorCollector& other);
+  [[nodiscard]] ErrorStatistics statistics() const;
+
+ private:
+  std::uint64_t rays_ = 0;
+  std::uint64_t missing_ = 0;
+  std::uint64_t early_ = 0;
+  std::uint64_t late_ = 0;
+  std::vector<float> errors_;  ///< Of the right rays, m.
+};
+
+}  // namespace pointflight

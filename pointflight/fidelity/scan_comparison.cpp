@@ -1,0 +1,174 @@
+#include "pointflight/fidelity/scan_comparison.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <nanoflann.hpp>
+
+#include "pointflight/core/input_error.hpp"
+#include "pointflight/io/cloud_reader.hpp"
+#include "pointflight/io/tum.hpp"
+
+namespace pointflight {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kSupportRadius = 0.25;  // m
+constexpr std::size_t kSupportPoints = 16;
+constexpr float kRangeMax = 1000.0f;  // a late hit must be seen as late
+constexpr double kRangeMin = 0.01;
+
+std::vector<std::string> clouds_in(const std::string& folder) {
+  std::vector<std::string> names;
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(folder, error)) {
+    if (entry.is_regular_file() && entry.path().extension() == ".pcd") {
+      names.push_back(entry.path().filename().string());
+    }
+  }
+  if (error) throw InputError(fmt::format("{}: not a folder that can be read", folder));
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+RealScan read_scan(const std::string& folder, const std::string& name, const Pose& pose) {
+  RealScan scan{name, pose, {}};
+  const auto reader = open_cloud((fs::path(folder) / name).string());
+  std::vector<CloudPoint> batch;
+  while (reader->read(batch)) {
+    for (const CloudPoint& point : batch) {
+      if (!point.position.allFinite() || point.position.norm() < kRangeMin) continue;
+      scan.points_sensor.push_back(point.position.cast<float>());
+    }
+  }
+  return scan;
+}
+
+/// nanoflann's result set that stops once enough points are found.
+class EnoughPoints {
+ public:
+  using DistanceType = double;
+  EnoughPoints(double radius, std::size_t wanted) : squared_(radius * radius), wanted_(wanted) {}
+  [[nodiscard]] bool addPoint(double squared, std::uint32_t /*index*/) {
+    count_ += squared < squared_ ? 1 : 0;
+    return count_ < wanted_;
+  }
+  [[nodiscard]] double worstDist() const { return squared_; }
+  [[nodiscard]] bool full() const { return true; }
+  [[nodiscard]] std::size_t size() const { return count_; }
+  [[nodiscard]] bool enough() const { return count_ >= wanted_; }
+
+ private:
+  double squared_;
+  std::size_t wanted_;
+  std::size_t count_ = 0;
+};
+
+}  // namespace
+
+std::vector<RealScan> read_real_scans(const std::string& folder, const std::string& poses) {
+  const std::vector<TumPose> trajectory = read_tum(poses);
+  std::vector<std::string> names;
+  for (const TumPose& pose : trajectory) {
+    if (!pose.file.empty()) names.push_back(pose.file);
+  }
+  if (names.empty()) names = clouds_in(folder);
+  if (names.size() != trajectory.size()) {
+    throw InputError(fmt::format(
+        "{}: {} poses for {} scans in {}; a ninth column can name the scan of each pose",
+        poses,
+        trajectory.size(),
+        names.size(),
+        folder));
+  }
+  std::vector<RealScan> scans;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    scans.push_back(read_scan(folder, names[i], trajectory[i].T_world_sensor));
+  }
+  return scans;
+}
+
+struct SupportCloud::Tree {
+  std::vector<Vector3f> points;
+  Vector3d origin = Vector3d::Zero();
+  [[nodiscard]] std::size_t kdtree_get_point_count() const { return points.size(); }
+  [[nodiscard]] double kdtree_get_pt(std::size_t i, std::size_t axis) const {
+    return static_cast<double>(points[i][static_cast<int>(axis)]);
+  }
+  template <class Box>
+  bool kdtree_get_bbox(Box& /*box*/) const {
+    return false;
+  }
+  using Index = nanoflann::
+      KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, Tree>, Tree, 3, std::uint32_t>;
+  std::unique_ptr<Index> index;
+};
+
+SupportCloud::SupportCloud(const std::string& path) : tree_(std::make_unique<Tree>()) {
+  const auto reader = open_cloud(path);
+  std::vector<CloudPoint> batch;
+  while (reader->read(batch)) {
+    for (const CloudPoint& point : batch) {
+      if (!point.position.allFinite()) continue;
+      if (tree_->points.empty()) tree_->origin = point.position;
+      tree_->points.emplace_back((point.position - tree_->origin).cast<float>());
+    }
+  }
+  if (tree_->points.empty()) throw InputError(fmt::format("{}: no points", path));
+  tree_->index = std::make_unique<Tree::Index>(
+      3, *tree_, nanoflann::KDTreeSingleIndexAdaptorParams(16));
+}
+
+SupportCloud::~SupportCloud() = default;
+
+bool SupportCloud::supports(const Vector3d& point_world) const {
+  EnoughPoints result(kSupportRadius, kSupportPoints);
+  const Vector3d query = point_world - tree_->origin;
+  tree_->index->findNeighbors(result, query.data(), nanoflann::SearchParams());
+  return result.enough();
+}
+
+std::vector<ComparedRay> compare_scan(const RealScan& scan,
+                                      const Renderer& renderer,
+                                      const SupportCloud* cloud,
+                                      const Executor& executor) {
+  std::vector<Ray> rays;
+  std::vector<ComparedRay> compared(scan.points_sensor.size());
+  rays.reserve(scan.points_sensor.size());
+  for (std::size_t i = 0; i < scan.points_sensor.size(); ++i) {
+    const Vector3d p = scan.points_sensor[i].cast<double>();
+    compared[i].range = static_cast<float>(p.norm());
+    const Vector3d direction = scan.T_world_sensor.rotation * p.normalized();
+    rays.push_back({scan.T_world_sensor.translation, direction.cast<float>(), kRangeMax});
+  }
+  std::vector<Hit> hits(rays.size());
+  RayBatch batch;
+  batch.rays = rays;
+  batch.T_world_sensor = scan.T_world_sensor;
+  batch.range_max = kRangeMax;
+  renderer.render(batch, hits, executor);
+  executor.parallel_for(compared.size(), 1024, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      if (hits[i].is_return()) compared[i].rendered = hits[i].range;
+      if (cloud == nullptr) continue;
+      compared[i].supported =
+          cloud->supports(scan.T_world_sensor * scan.points_sensor[i].cast<double>());
+    }
+  });
+  return compared;
+}
+
+ErrorCollector collect(const std::vector<ComparedRay>& rays, bool supported_only) {
+  ErrorCollector collector;
+  for (const ComparedRay& ray : rays) {
+    if (supported_only && !ray.supported) continue;
+    std::optional<double> rendered;
+    if (ray.rendered >= 0.0f) rendered = static_cast<double>(ray.rendered);
+    collector.add(static_cast<double>(ray.range), rendered);
+  }
+  return collector;
+}
+
+}  // namespace pointflight

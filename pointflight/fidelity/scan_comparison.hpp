@@ -1,0 +1,57 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "pointflight/core/parallel.hpp"
+#include "pointflight/fidelity/error_statistics.hpp"
+#include "pointflight/geometry/types.hpp"
+#include "pointflight/render/renderer.hpp"
+
+namespace pointflight {
+
+/// A real scan: returns in the sensor frame and the sensor's pose.
+struct RealScan {
+  std::string file;  ///< Name without folder.
+  Pose T_world_sensor;
+  std::vector<Vector3f> points_sensor;  ///< m
+};
+
+/// Reads the scans that a TUM file of poses (map <- sensor) names in its ninth column; without one,
+/// the clouds of the folder in sorted order. Points that are not finite or nearer than 1 cm are left
+/// out. Throws InputError.
+std::vector<RealScan> read_real_scans(const std::string& folder, const std::string& poses);
+
+/// Which places a cloud supports: those with 16 or more of its points within 25 cm.
+class SupportCloud {
+ public:
+  /// Reads the whole cloud. Throws InputError.
+  explicit SupportCloud(const std::string& path);
+  ~SupportCloud();
+  [[nodiscard]] bool supports(const Vector3d& point_world) const;
+
+ private:
+  struct Tree;
+  std::unique_ptr<Tree> tree_;
+};
+
+/// One real return and what was rendered along its ray.
+struct ComparedRay {
+  float range = 0.0f;      ///< Measured, m.
+  float rendered = -1.0f;  ///< m; negative where nothing was met.
+  bool supported = false;
+};
+
+/// Renders the ray of each real return from the scan's pose; one result a point, in their order.
+/// Without a cloud no ray is supported.
+std::vector<ComparedRay> compare_scan(const RealScan& scan,
+                                      const Renderer& renderer,
+                                      const SupportCloud* cloud,
+                                      const Executor& executor);
+
+/// All rays, or only the supported ones.
+ErrorCollector collect(const std::vector<ComparedRay>& rays, bool supported_only);
+
+}  // namespace pointflight

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <vector>
+
+#include "pointflight/core/parallel.hpp"
+#include "pointflight/map/bvh8.hpp"
+#include "pointflight/map/voxel_moments.hpp"
+
+namespace pointflight {
+
+/// Widens the surfels of thinly scanned surfaces until neighbours touch, so that a wall with a point
+/// every other cell stays a wall. Works where a block of 3 m has fewer than 4 points in its median
+/// planar cell, on cells with fewer than 4 points whose wider neighbourhood is planar; dense regions
+/// and foliage are left as they are. Returns how many surfels were widened.
+///
+/// `surfels` are those of `grid`, in its order. Does not depend on threads.
+std::uint64_t grow_sparse_surfels(const VoxelGrid& grid,
+                                  std::vector<BuildSurfel>& surfels,
+                                  const Executor& executor);
+
+}  // namespace pointflight
