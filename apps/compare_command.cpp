@@ -37,17 +37,18 @@ nlohmann::ordered_json to_json(const ErrorStatistics& s) {
 }
 
 void print_row(const std::string& name, const ErrorStatistics& s) {
-  fmt::print("{:<24} {:>9} {:>7.2f} {:>7.2f} {:>7.2f} {:>8.2f} {:>8.1f} {:>8.1f} {:>8.1f} {:>7.1f}\n",
-             name,
-             s.rays,
-             100.0 * (1.0 - s.wrong_fraction - s.missing_fraction),
-             100.0 * s.early_fraction,
-             100.0 * s.late_fraction,
-             100.0 * s.missing_fraction,
-             1e3 * s.median_abs_error,
-             1e3 * s.p90_abs_error,
-             1e3 * s.p95_abs_error,
-             1e3 * s.bias);
+  fmt::print(
+      "{:<24} {:>9} {:>7.2f} {:>7.2f} {:>7.2f} {:>8.2f} {:>8.1f} {:>8.1f} {:>8.1f} {:>7.1f}\n",
+      name,
+      s.rays,
+      100.0 * (1.0 - s.wrong_fraction - s.missing_fraction),
+      100.0 * s.early_fraction,
+      100.0 * s.late_fraction,
+      100.0 * s.missing_fraction,
+      1e3 * s.median_abs_error,
+      1e3 * s.p90_abs_error,
+      1e3 * s.p95_abs_error,
+      1e3 * s.bias);
 }
 
 void compare(const CompareFlags& flags) {
@@ -63,7 +64,15 @@ void compare(const CompareFlags& flags) {
   nlohmann::ordered_json rows = nlohmann::ordered_json::array();
   if (!flags.json) {
     fmt::print("{:<24} {:>9} {:>7} {:>7} {:>7} {:>8} {:>8} {:>8} {:>8} {:>7}\n",
-               "", "rays", "right %", "early %", "late %", "missing%", "median", "p90", "p95",
+               "",
+               "rays",
+               "right %",
+               "early %",
+               "late %",
+               "missing%",
+               "median",
+               "p90",
+               "p95",
                "bias mm");
   }
   for (std::size_t i = 0; i < scans.size(); ++i) {
@@ -81,7 +90,8 @@ void compare(const CompareFlags& flags) {
   end_progress();
   if (flags.json) {
     const nlohmann::ordered_json json = {
-        {"overall", {{"all", to_json(all.statistics())}, {"supported", to_json(supported.statistics())}}},
+        {"overall",
+         {{"all", to_json(all.statistics())}, {"supported", to_json(supported.statistics())}}},
         {"scans", rows}};
     fmt::print("{}\n", json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
     return;
@@ -93,14 +103,16 @@ void compare(const CompareFlags& flags) {
 }  // namespace
 
 void add_compare_command(CLI::App& parent, int& /*exit_code*/) {
-  auto* app = parent.add_subcommand("compare", "Render real scans' rays from a map and say how they differ");
+  auto* app = parent.add_subcommand("compare",
+                                    "Render real scans' rays from a map and say how they differ");
   auto flags = std::make_shared<CompareFlags>();
   app->add_option("map", flags->map, "A .pfmap")->required();
   app->add_option("--scans", flags->scans, "Folder of real scans, points in the sensor frame")
       ->required();
   app->add_option("--poses", flags->poses, "TUM file: map <- sensor; a ninth column names the scan")
       ->required();
-  app->add_option("--cloud", flags->cloud, "What the map was made from: tells which rays it supports");
+  app->add_option(
+      "--cloud", flags->cloud, "What the map was made from: tells which rays it supports");
   app->add_option("--renderer", flags->renderer, "How ranges are made")
       ->check(CLI::IsMember(renderer_names()))
       ->capture_default_str();

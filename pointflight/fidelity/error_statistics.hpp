@@ -20,7 +20,7 @@ struct ErrorStatistics {
   double missing_fraction = 0.0;
   double early_fraction = 0.0;
   double late_fraction = 0.0;
-  double wrong_fraction = 0.0;    ///< Early and late.
+  double wrong_fraction = 0.0;  ///< Early and late.
 
   static constexpr double kRight = 0.1;  ///< m
 };

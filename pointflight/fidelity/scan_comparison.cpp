@@ -117,8 +117,8 @@ SupportCloud::SupportCloud(const std::string& path) : tree_(std::make_unique<Tre
     }
   }
   if (tree_->points.empty()) throw InputError(fmt::format("{}: no points", path));
-  tree_->index = std::make_unique<Tree::Index>(
-      3, *tree_, nanoflann::KDTreeSingleIndexAdaptorParams(16));
+  tree_->index =
+      std::make_unique<Tree::Index>(3, *tree_, nanoflann::KDTreeSingleIndexAdaptorParams(16));
 }
 
 SupportCloud::~SupportCloud() = default;

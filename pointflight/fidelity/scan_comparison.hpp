@@ -20,8 +20,8 @@ struct RealScan {
 };
 
 /// Reads the scans that a TUM file of poses (map <- sensor) names in its ninth column; without one,
-/// the clouds of the folder in sorted order. Points that are not finite or nearer than 1 cm are left
-/// out. Throws InputError.
+/// the clouds of the folder in sorted order. Points that are not finite or nearer than 1 cm are
+/// left out. Throws InputError.
 std::vector<RealScan> read_real_scans(const std::string& folder, const std::string& poses);
 
 /// Which places a cloud supports: those with 16 or more of its points within 25 cm.

@@ -21,11 +21,12 @@ std::vector<TumPose> read_tum(const std::string& path) {
     std::array<double, 8> v{};
     for (double& value : v) {
       if (!parse_number(word, value) || !std::isfinite(value)) {
-        throw InputError(fmt::format("{}:{}: '{}' is no number; time tx ty tz qx qy qz qw [file] are "
-                                     "wanted",
-                                     path,
-                                     lines.number(),
-                                     excerpt(word)));
+        throw InputError(
+            fmt::format("{}:{}: '{}' is no number; time tx ty tz qx qy qz qw [file] are "
+                        "wanted",
+                        path,
+                        lines.number(),
+                        excerpt(word)));
       }
       word = take_word(line);
     }

@@ -9,10 +9,10 @@
 namespace pointflight {
 namespace {
 
-constexpr double kWorthwhile = 0.05;          // cells
-constexpr double kThickest = 0.020;           // m, or 2.5 sigma
+constexpr double kWorthwhile = 0.05;  // cells
+constexpr double kThickest = 0.020;   // m, or 2.5 sigma
 constexpr std::size_t kSampledCells = 200000;
-constexpr double kNoiseShare = 0.2;           // percentile
+constexpr double kNoiseShare = 0.2;  // percentile
 
 /// l1 of a full plane of a neighbourhood `2 reach + 1` cells wide.
 double full_plane_variance(const VoxelGrid& grid, std::int32_t reach) {

@@ -15,16 +15,17 @@ double estimate_noise(const VoxelGrid& grid, const Executor& executor);
 struct ProjectionReport {
   std::uint64_t kept = 0;       ///< Cells that are thin themselves.
   std::uint64_t projected = 0;  ///< Cells moved onto a plane.
-  std::uint64_t too_thick = 0;  ///< Left alone: planar, but thicker than noise explains (two faces).
+  std::uint64_t too_thick =
+      0;  ///< Left alone: planar, but thicker than noise explains (two faces).
 };
 
-/// True if a noise of `sigma` is worth a projection: above 0.05 of a cell. On cleaner clouds it does
-/// more harm than good.
+/// True if a noise of `sigma` is worth a projection: above 0.05 of a cell. On cleaner clouds it
+/// does more harm than good.
 bool needs_projection(const VoxelGrid& grid, double sigma);
 
-/// The grid with its cells moved along the normal onto the plane of the smallest neighbourhood (3, 5
-/// or 7 cells wide) that is planar, and flattened; cells that land in one merge. A plane must not be
-/// thicker than max(2.5 sigma, 20 mm): the faces of a partition stay apart. Does not depend on
+/// The grid with its cells moved along the normal onto the plane of the smallest neighbourhood (3,
+/// 5 or 7 cells wide) that is planar, and flattened; cells that land in one merge. A plane must not
+/// be thicker than max(2.5 sigma, 20 mm): the faces of a partition stay apart. Does not depend on
 /// threads.
 VoxelGrid project_noise(const VoxelGrid& grid,
                         double sigma,

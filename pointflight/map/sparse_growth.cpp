@@ -12,7 +12,7 @@
 namespace pointflight {
 namespace {
 
-constexpr double kBlock = 3.0;  // m
+constexpr double kBlock = 3.0;   // m
 constexpr double kSparse = 4.0;  // points a cell
 constexpr std::size_t kEnoughCells = 7;
 constexpr std::int32_t kWidest = 3;  // cells to each side: 7^3
@@ -22,7 +22,8 @@ using BlockKey = std::array<std::int32_t, 3>;
 BlockKey block_of(const VoxelGrid& grid, const VoxelCell& cell) {
   BlockKey key{};
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    key[axis] = static_cast<std::int32_t>(std::floor(cell.voxel[axis] * grid.resolution() / kBlock));
+    key[axis] =
+        static_cast<std::int32_t>(std::floor(cell.voxel[axis] * grid.resolution() / kBlock));
   }
   return key;
 }

@@ -8,10 +8,10 @@
 
 namespace pointflight {
 
-/// Widens the surfels of thinly scanned surfaces until neighbours touch, so that a wall with a point
-/// every other cell stays a wall. Works where a block of 3 m has fewer than 4 points in its median
-/// planar cell, on cells with fewer than 4 points whose wider neighbourhood is planar; dense regions
-/// and foliage are left as they are. Returns how many surfels were widened.
+/// Widens the surfels of thinly scanned surfaces until neighbours touch, so that a wall with a
+/// point every other cell stays a wall. Works where a block of 3 m has fewer than 4 points in its
+/// median planar cell, on cells with fewer than 4 points whose wider neighbourhood is planar; dense
+/// regions and foliage are left as they are. Returns how many surfels were widened.
 ///
 /// `surfels` are those of `grid`, in its order. Does not depend on threads.
 std::uint64_t grow_sparse_surfels(const VoxelGrid& grid,
