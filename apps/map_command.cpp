@@ -58,6 +58,16 @@ void print_report(const ImportReport& r, const ImportOptions& options) {
                                     r.cells,
                                     r.outlier_points)
                       : "kept"));
+  log(fmt::format("noise         {:.1f} mm across flat surfaces; {}",
+                  r.noise * 1e3,
+                  r.projection.projected > 0
+                      ? fmt::format("{} cells moved onto their planes, {} left (two faces?)",
+                                    r.projection.projected,
+                                    r.projection.too_thick)
+                      : "clean enough to be left as it is"));
+  if (r.grown_surfels > 0) {
+    log(fmt::format("thin scan     {} surfels widened to close gaps", r.grown_surfels));
+  }
   log(fmt::format("surfels       {}, {:.0f} % planar{}",
                   short_count(static_cast<double>(r.surfels)),
                   100.0 * static_cast<double>(r.planar_surfels) /
