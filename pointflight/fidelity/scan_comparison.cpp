@@ -47,6 +47,7 @@ RealScan read_scan(const std::string& folder, const std::string& name, const Pos
 }
 
 /// nanoflann's result set that stops once enough points are found.
+// NOLINTBEGIN(readability-identifier-naming): nanoflann asks for these names
 class EnoughPoints {
  public:
   using DistanceType = double;
@@ -65,6 +66,7 @@ class EnoughPoints {
   std::size_t wanted_;
   std::size_t count_ = 0;
 };
+// NOLINTEND(readability-identifier-naming)
 
 }  // namespace
 

@@ -151,6 +151,7 @@ class XyzReader : public CloudReader {
     std::vector<std::string_view> fields;
     split(line, fields);
     std::vector<std::string> names;
+    names.reserve(fields.size());
     for (const std::string_view field : fields) {
       names.push_back(lower(field.substr(std::min(field.size(), field.find_first_not_of("/")))));
     }
