@@ -12,6 +12,7 @@ void add_fly_command(CLI::App& app, int& exit_code);
 void add_scenario_command(CLI::App& app, int& exit_code);
 void add_lidar_command(CLI::App& app, int& exit_code);
 void add_compare_command(CLI::App& app, int& exit_code);
+void add_fidelity_command(CLI::App& app, int& exit_code);
 
 /// Exit codes that scripts can trust.
 enum ExitCode : int {

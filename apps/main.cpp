@@ -31,6 +31,7 @@ int run(int argc, char** argv) {
   add_scan_command(app, exit_code);
   add_lidar_command(app, exit_code);
   add_compare_command(app, exit_code);
+  add_fidelity_command(app, exit_code);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -1,158 +1,19 @@
 #include "apps/pictures.hpp"
 
-#include <cairo.h>
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
-#include <exception>
-#include <span>
 #include <tuple>
 
+#include "apps/canvas.hpp"
 #include "pointflight/core/constants.hpp"
-#include "pointflight/core/input_error.hpp"
-#include "pointflight/core/output_file.hpp"
 
 namespace pointflight::apps {
 namespace {
 
-struct Color {
-  double r, g, b;
-};
-
-constexpr Color kPaper{1.0, 1.0, 1.0};
-constexpr Color kInk{0.15, 0.15, 0.18};
-constexpr Color kDim{0.55, 0.55, 0.6};
 constexpr Color kPath{0.85, 0.1, 0.15};
 constexpr Color kSeen{0.1, 0.45, 0.85};
-constexpr Color kNight{0.07, 0.07, 0.1};
-
-/// Viridis-like scale from dark blue over green to yellow: equal steps look equal, in grey too.
-Color ramp(double share) {
-  constexpr Color kStops[] = {{0.267, 0.005, 0.329},
-                              {0.231, 0.318, 0.545},
-                              {0.129, 0.569, 0.549},
-                              {0.369, 0.788, 0.384},
-                              {0.993, 0.906, 0.144}};
-  const double at = std::clamp(share, 0.0, 1.0) * 4.0;
-  const int i = std::min(3, static_cast<int>(at));
-  const double f = at - i;
-  const Color& a = kStops[i];
-  const Color& b = kStops[i + 1];
-  return {a.r + f * (b.r - a.r), a.g + f * (b.g - a.g), a.b + f * (b.b - a.b)};
-}
-
-/// Where cairo writes to; an exception must not pass through its C code.
-struct PngTarget {
-  OutputFile file;
-  std::exception_ptr error;
-};
-
-cairo_status_t append(void* target, const unsigned char* data, unsigned length) {
-  auto& png = *static_cast<PngTarget*>(target);
-  try {
-    png.file.write(std::as_bytes(std::span<const unsigned char>(data, length)));
-    return CAIRO_STATUS_SUCCESS;
-  } catch (...) {
-    png.error = std::current_exception();
-    return CAIRO_STATUS_WRITE_ERROR;
-  }
-}
-
-/// A picture in memory with the few strokes that we need.
-class Canvas {
- public:
-  Canvas(int width, int height, Color background)
-      : surface_(cairo_image_surface_create(CAIRO_FORMAT_RGB24, width, height)),
-        cr_(cairo_create(surface_)) {
-    color(background);
-    cairo_paint(cr_);
-    cairo_select_font_face(cr_, "sans", CAIRO_FONT_SLANT_NORMAL, CAIRO_FONT_WEIGHT_NORMAL);
-  }
-  ~Canvas() {
-    cairo_destroy(cr_);
-    cairo_surface_destroy(surface_);
-  }
-  Canvas(const Canvas&) = delete;
-  Canvas& operator=(const Canvas&) = delete;
-
-  void color(Color c, double alpha = 1.0) { cairo_set_source_rgba(cr_, c.r, c.g, c.b, alpha); }
-
-  void text(double x, double y, const std::string& words, double size, Color c) {
-    color(c);
-    cairo_set_font_size(cr_, size);
-    cairo_move_to(cr_, x, y);
-    cairo_show_text(cr_, words.c_str());
-  }
-
-  void dot(double x, double y, double radius, Color c, double alpha = 1.0) {
-    color(c, alpha);
-    cairo_new_path(cr_);
-    cairo_arc(cr_, x, y, radius, 0.0, 2.0 * kPi);
-    cairo_fill(cr_);
-  }
-
-  void ring(double x, double y, double radius, double width, Color c) {
-    color(c);
-    cairo_set_line_width(cr_, width);
-    cairo_new_path(cr_);
-    cairo_arc(cr_, x, y, radius, 0.0, 2.0 * kPi);
-    cairo_stroke(cr_);
-  }
-
-  void box(double x, double y, double w, double h, Color c) {
-    color(c);
-    cairo_rectangle(cr_, x, y, w, h);
-    cairo_fill(cr_);
-  }
-
-  void line(const std::vector<std::pair<double, double>>& points, double width, Color c) {
-    color(c);
-    cairo_set_line_width(cr_, width);
-    cairo_set_line_join(cr_, CAIRO_LINE_JOIN_ROUND);
-    cairo_new_path(cr_);  // text leaves a current point behind
-    for (const auto& [x, y] : points) cairo_line_to(cr_, x, y);
-    cairo_stroke(cr_);
-  }
-
-  void save(const std::string& path) {
-    cairo_surface_flush(surface_);
-    PngTarget png{OutputFile(path), nullptr};
-    const auto status = cairo_surface_write_to_png_stream(surface_, append, &png);
-    if (png.error) std::rethrow_exception(png.error);
-    if (status != CAIRO_STATUS_SUCCESS) {
-      throw InputError(fmt::format("{}: cannot draw: {}", path, cairo_status_to_string(status)));
-    }
-    png.file.commit();
-  }
-
-  /// Between these two only `put` may draw.
-  void begin_pixels() { cairo_surface_flush(surface_); }
-  void end_pixels() { cairo_surface_mark_dirty(surface_); }
-
-  /// Mixes a colour into one pixel: for clouds of marks.
-  void put(int x, int y, Color c, double alpha) {
-    const int width = cairo_image_surface_get_width(surface_);
-    const int height = cairo_image_surface_get_height(surface_);
-    if (x < 0 || y < 0 || x >= width || y >= height) return;
-    auto* row = cairo_image_surface_get_data(surface_) +
-                static_cast<std::ptrdiff_t>(y) * cairo_image_surface_get_stride(surface_);
-    std::uint32_t pixel = 0;
-    std::memcpy(&pixel, row + static_cast<std::ptrdiff_t>(x) * 4, 4);
-    const auto mix = [&](int shift, double value) {
-      const double old = static_cast<double>((pixel >> shift) & 255u);
-      const double mixed = old + alpha * (255.0 * value - old);
-      return static_cast<std::uint32_t>(std::clamp(mixed, 0.0, 255.0)) << shift;
-    };
-    pixel = mix(16, c.r) | mix(8, c.g) | mix(0, c.b);
-    std::memcpy(row + static_cast<std::ptrdiff_t>(x) * 4, &pixel, 4);
-  }
-
- private:
-  cairo_surface_t* surface_;
-  cairo_t* cr_;
-};
 
 /// An orthographic view: world x to the right, and y (top view) or z (side view) up.
 struct View {

@@ -17,6 +17,8 @@ enum class StreamId : std::uint32_t {
   kCloudSampling = 7,    ///< points on analytic shapes; entity: shape, index: point
   kMissionSearch = 8,    ///< candidate places in `scenario new`; index: candidate
   kSpacingSample = 9,    ///< which blocks of a cloud measure its point spacing; index: block key
+  kScenePoses = 10,      ///< where sensors stand in an exact scene; index: try
+  kAimedBeams = 11,      ///< beams at the targets of a small scene; entity: pose, index: beam
   kTest = 1000,          ///< inputs of tests and benchmarks
 };
 

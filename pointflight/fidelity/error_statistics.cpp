@@ -21,11 +21,17 @@ void ErrorCollector::add(double true_range, const std::optional<double>& rendere
   }
 }
 
+void ErrorCollector::add_empty(bool has_return) {
+  ++rays_;
+  false_ += has_return ? 1 : 0;
+}
+
 void ErrorCollector::add(const ErrorCollector& other) {
   rays_ += other.rays_;
   missing_ += other.missing_;
   early_ += other.early_;
   late_ += other.late_;
+  false_ += other.false_;
   errors_.insert(errors_.end(), other.errors_.begin(), other.errors_.end());
 }
 
@@ -39,6 +45,7 @@ ErrorStatistics ErrorCollector::statistics() const {
   s.missing_fraction = share(missing_);
   s.early_fraction = share(early_);
   s.late_fraction = share(late_);
+  s.false_fraction = share(false_);
   s.wrong_fraction = share(early_ + late_);
   if (errors_.empty()) return s;
   double sum = 0.0;

@@ -21,6 +21,10 @@ struct ErrorStatistics {
   double early_fraction = 0.0;
   double late_fraction = 0.0;
   double wrong_fraction = 0.0;  ///< Early and late.
+  double false_fraction = 0.0;  ///< Returns of rays that meet nothing in truth.
+
+  /// Late or missed: rays that came through a surface.
+  [[nodiscard]] double leak_fraction() const { return late_fraction + missing_fraction; }
 
   static constexpr double kRight = 0.1;  ///< m
 };
@@ -30,6 +34,8 @@ class ErrorCollector {
  public:
   /// `rendered` is nothing where there was no return.
   void add(double true_range, const std::optional<double>& rendered);
+  /// A ray that meets nothing in truth.
+  void add_empty(bool has_return);
   void add(const ErrorCollector& other);
   [[nodiscard]] ErrorStatistics statistics() const;
 
@@ -38,6 +44,7 @@ class ErrorCollector {
   std::uint64_t missing_ = 0;
   std::uint64_t early_ = 0;
   std::uint64_t late_ = 0;
+  std::uint64_t false_ = 0;
   std::vector<float> errors_;  ///< Of the right rays, m.
 };
 

@@ -144,6 +144,40 @@ Vector3d normal_of(const Cone& c, const Vector3d& p) {
   return (m - m.dot(axis) * axis).normalized();
 }
 
+Aabb box_around(const Vector3d& center, const Vector3d& axis, double radius) {
+  // a circle reaches radius * sin(angle between its axis and the coordinate's) to each side
+  const Vector3d half = radius * (Vector3d::Ones() - axis.cwiseAbs2()).cwiseMax(0.0).cwiseSqrt();
+  Aabb box;
+  box.add(center - half);
+  box.add(center + half);
+  return box;
+}
+
+Aabb bounds_of(const Triangle& t) {
+  Aabb box;
+  box.add(t.a);
+  box.add(t.b);
+  box.add(t.c);
+  return box;
+}
+Aabb bounds_of(const Disc& d) {
+  return box_around(d.center, d.normal, d.radius);
+}
+Aabb bounds_of(const Sphere& s) {
+  Aabb box;
+  box.add(s.center - Vector3d::Constant(s.radius));
+  box.add(s.center + Vector3d::Constant(s.radius));
+  return box;
+}
+Aabb bounds_of(const Cone& c) {
+  const Vector3d axis = (c.to - c.from).normalized();
+  Aabb box = box_around(c.from, axis, c.radius_from);
+  const Aabb end = box_around(c.to, axis, c.radius_to);
+  box.add(end.min);
+  box.add(end.max);
+  return box;
+}
+
 }  // namespace
 
 std::optional<double> intersect(const Shape& shape,
@@ -159,6 +193,30 @@ double area(const Shape& shape) {
 
 Vector3d point_on(const Shape& shape, double u, double v) {
   return std::visit([&](const auto& s) { return point_of(s, u, v); }, shape);
+}
+
+Vector3d normal_at(const Shape& shape, const Vector3d& point) {
+  return std::visit([&](const auto& s) { return normal_of(s, point); }, shape);
+}
+
+Aabb bounds(const Shape& shape) {
+  return std::visit([](const auto& s) { return bounds_of(s); }, shape);
+}
+
+void sample_shape(const Shape& shape,
+                  std::uint32_t index,
+                  std::uint64_t first,
+                  std::uint64_t count,
+                  double noise,
+                  std::uint64_t seed,
+                  const std::function<void(const Vector3d&)>& emit) {
+  const RandomStream random(seed, StreamId::kCloudSampling, index);
+  for (std::uint64_t k = first; k < first + count; ++k) {
+    const auto [u, v] = random.uniform2(2 * k);
+    Vector3d p = point_on(shape, u, v);
+    if (noise > 0.0) p += noise * random.normal(2 * k + 1) * normal_at(shape, p);
+    emit(p);
+  }
 }
 
 std::optional<double> ShapeScene::intersect(const Vector3d& origin,
@@ -177,19 +235,10 @@ void ShapeScene::sample(double density,
                         const std::function<void(const Vector3d&)>& emit) const {
   double owed = 0.0;  // carried over, so that many small shapes get their share
   for (std::size_t i = 0; i < shapes.size(); ++i) {
-    const RandomStream random(seed, StreamId::kCloudSampling, static_cast<std::uint32_t>(i));
     owed += area(shapes[i]) * density;
     const auto count = static_cast<std::uint64_t>(owed);
     owed -= static_cast<double>(count);
-    for (std::uint64_t k = 0; k < count; ++k) {
-      const auto [u, v] = random.uniform2(2 * k);
-      Vector3d p = point_on(shapes[i], u, v);
-      if (noise > 0.0) {
-        const Vector3d n = std::visit([&](const auto& s) { return normal_of(s, p); }, shapes[i]);
-        p += noise * random.normal(2 * k + 1) * n;
-      }
-      emit(p);
-    }
+    sample_shape(shapes[i], static_cast<std::uint32_t>(i), 0, count, noise, seed, emit);
   }
 }
 

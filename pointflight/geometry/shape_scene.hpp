@@ -41,6 +41,23 @@ double area(const Shape& shape);
 /// Point of the surface for (u, v) in [0, 1)^2, uniform by area.
 Vector3d point_on(const Shape& shape, double u, double v);
 
+/// Unit normal of the surface at a point of it (of a cone: across its axis); the side is arbitrary.
+Vector3d normal_at(const Shape& shape, const Vector3d& point);
+
+/// Axis-aligned box around the shape.
+Aabb bounds(const Shape& shape);
+
+/// Calls `emit(point)` for the draws [first, first + count) of shape number `index`: points uniform
+/// by area, each moved along its normal by `noise` * N(0, 1). Every draw is addressed by (seed,
+/// index, number), so parts may be drawn apart.
+void sample_shape(const Shape& shape,
+                  std::uint32_t index,
+                  std::uint64_t first,
+                  std::uint64_t count,
+                  double noise,
+                  std::uint64_t seed,
+                  const std::function<void(const Vector3d&)>& emit);
+
 /// A list of shapes with exact ray casting by brute force.
 struct ShapeScene {
   std::vector<Shape> shapes;

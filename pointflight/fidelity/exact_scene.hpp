@@ -1,0 +1,56 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "pointflight/geometry/shape_scene.hpp"
+#include "pointflight/io/cloud_reader.hpp"
+
+namespace pointflight {
+
+/// A world of analytic shapes: what a map of it should answer is known exactly.
+struct ExactScene {
+  std::string name;
+  std::string about;  ///< One line: what it is there to show.
+  ShapeScene geometry;
+  std::vector<std::string> tags;         ///< Kinds of shapes: "wall", "rod", ...
+  std::vector<std::uint16_t> shape_tag;  ///< Of each shape, an index in `tags`.
+  /// Points of each shape relative to the rest of the cloud; empty: all 1.
+  std::vector<float> shape_density;
+  std::vector<bool> is_target;  ///< Of each shape: small scenes aim their beams at these.
+  std::vector<Pose> poses;      ///< Where sensors stand; empty: random places in `free`.
+  Aabb free;                    ///< Sensors stand in it, at least 0.3 m from every shape.
+
+  /// Adds a tag for the shapes from number `first` on. `density` and `target` as above.
+  void tag_from(std::size_t first,
+                const std::string& tag,
+                float density = 1.0f,
+                bool target = false);
+};
+
+/// A shipped scene by name, or one of your own from a file: `shape,tag,x0,...` as CSV, plain or xz
+/// (docs/fidelity.md). Throws InputError that lists the names.
+ExactScene load_scene(const std::string& name_or_path);
+
+/// Names and one line each.
+std::vector<std::pair<std::string, std::string>> scene_names();
+
+/// The small exact cases by name; nothing for another name.
+std::optional<ExactScene> make_small_scene(const std::string& name);
+std::vector<std::pair<std::string, std::string>> small_scene_names();
+
+/// How a scene is sampled to a cloud.
+struct SceneSampling {
+  double points_per_cell = 8.0;  ///< Points a square of `resolution`.
+  double resolution = 0.05;      ///< m
+  double density_min = 2000.0;   ///< At least so many a square metre.
+  double noise = 0.0;            ///< Deviation along the surface normal, m.
+  std::uint64_t seed = 1;
+};
+
+/// Streams the points of a sampled scene; the scene must outlive it.
+std::unique_ptr<CloudReader> sampled_cloud(const ExactScene& scene, const SceneSampling& sampling);
+
+}  // namespace pointflight

@@ -1,0 +1,81 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "pointflight/core/parallel.hpp"
+#include "pointflight/core/progress.hpp"
+#include "pointflight/fidelity/error_statistics.hpp"
+#include "pointflight/fidelity/exact_scene.hpp"
+#include "pointflight/render/renderer.hpp"
+
+namespace pointflight {
+
+/// Which beams look at a scene.
+struct BeamPlan {
+  std::string name;
+  /// Unit vectors in the sensor frame; empty: aimed at the scene's targets, or all around.
+  std::vector<Vector3f> directions_sensor;
+  float range_max = 40.0f;          ///< m
+  std::size_t poses = 8;            ///< Random ones where the scene has none of its own.
+  std::size_t aimed_beams = 20000;  ///< A pose, without directions.
+  std::uint64_t seed = 1;
+};
+
+/// The patterns that the scenes' tables were measured with: "avia_grid" (385 x 350 over 77 x 70
+/// degrees, 30 m), "mid360_uniform" (20,000 at random, -7 to 52 degrees, 40 m), "vlp32_grid"
+/// (1,800 x 32, -25 to 15 degrees, 100 m). Nothing for another name.
+std::optional<BeamPlan> table_beams(const std::string& name);
+
+/// A beam and what it meets in truth.
+struct TrueBeam {
+  Ray ray;
+  float range = -1.0f;         ///< m; negative where it meets nothing within its range.
+  float cos_incidence = 0.0f;  ///< |cos| of the angle to the surface normal.
+  std::uint16_t tag = 0;       ///< Of the shape met.
+  bool silhouette = false;     ///< A range jump lies within 0.2 degrees.
+};
+
+/// All beams of a plan in a scene.
+struct SceneBeams {
+  BeamPlan plan;
+  std::vector<Pose> poses;
+  std::vector<TrueBeam> beams;  ///< Pose after pose, as many for each.
+
+  [[nodiscard]] std::size_t per_pose() const {
+    return poses.empty() ? 0 : beams.size() / poses.size();
+  }
+};
+
+/// Casts the beams into the exact shapes. A silhouette is where one of eight rays 0.2 degrees
+/// around the beam ends more than 0.1 m off the plane that the beam meets. Throws InputError where
+/// no free place for a sensor is found.
+SceneBeams cast_exactly(const ExactScene& scene,
+                        const BeamPlan& plan,
+                        const Executor& executor,
+                        const Progress& progress = {});
+
+/// One class of beams.
+struct FidelityRow {
+  std::string name;
+  ErrorStatistics statistics;
+};
+
+/// How rendered ranges compare with the exact ones.
+struct FidelityReport {
+  ErrorStatistics all;
+  ErrorStatistics interior;    ///< No range jump near.
+  ErrorStatistics silhouette;  ///< The others.
+  std::vector<FidelityRow> by_tag;
+  std::vector<FidelityRow> by_incidence;  ///< 0 is face on.
+  std::vector<FidelityRow> by_range;
+  std::vector<float> rendered;  ///< Of each beam, m; negative where nothing was met.
+};
+
+FidelityReport measure_fidelity(const ExactScene& scene,
+                                const SceneBeams& beams,
+                                const Renderer& renderer,
+                                const Executor& executor);
+
+}  // namespace pointflight
