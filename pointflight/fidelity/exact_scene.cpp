@@ -113,8 +113,7 @@ Shape shape_of(const Row& row, const std::string& place) {
       fmt::format("{}: '{}' is no shape; known: triangle, cone, disc", place, excerpt(row.shape)));
 }
 
-void read_shapes(const std::string& path, ExactScene& scene) {
-  const std::string text = text_of(path);
+void read_shapes(std::string_view text, const std::string& path, ExactScene& scene) {
   LineCursor lines(text);
   for (std::string_view line; lines.next(line);) {
     if (line.empty() || line.starts_with('#') || line.starts_with("shape,")) continue;
@@ -171,7 +170,8 @@ void add_relief(ExactScene& scene) {
 ExactScene shipped(const std::string& name) {
   ExactScene scene;
   scene.name = name;
-  read_shapes(data_folder() + "/scenes/" + name + ".csv.xz", scene);
+  const std::string path = data_folder() + "/scenes/" + name + ".csv.xz";
+  read_shapes(text_of(path), path, scene);
   read_poses(data_folder() + "/scenes/" + name + "_poses.csv", scene);
   if (name == "forest") add_relief(scene);
   return scene;
@@ -270,9 +270,13 @@ ExactScene load_scene(const std::string& name_or_path) {
     throw InputError(
         fmt::format("'{}' is neither a file nor a scene; known: {}", name_or_path, known));
   }
+  return parse_scene(text_of(name_or_path), name_or_path);
+}
+
+ExactScene parse_scene(std::string_view text, const std::string& path) {
   ExactScene scene;
-  scene.name = fs::path(name_or_path).stem().string();
-  read_shapes(name_or_path, scene);
+  scene.name = fs::path(path).stem().string();
+  read_shapes(text, path, scene);
   for (const Shape& shape : scene.geometry.shapes) {
     const Aabb box = bounds(shape);
     scene.free.add(box.min);

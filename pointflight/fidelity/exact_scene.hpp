@@ -34,6 +34,9 @@ struct ExactScene {
 /// (docs/fidelity.md). Throws InputError that lists the names.
 ExactScene load_scene(const std::string& name_or_path);
 
+/// A scene from the text of such a file; `path` names it in messages. Throws InputError.
+ExactScene parse_scene(std::string_view text, const std::string& path);
+
 /// Names and one line each.
 std::vector<std::pair<std::string, std::string>> scene_names();
 
