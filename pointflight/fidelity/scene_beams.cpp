@@ -169,9 +169,11 @@ class Caster {
       beam.tag = scene_.shape_tag[met->shape];
     }
     const auto [u, v] = across(d);
-    for (int i = 0; i < 8 && !beam.silhouette; ++i) {
-      const auto angle = math::sincos(0.25 * kPi * i);
-      const Vector3d beside = (d + kBeside * (angle.cos * u + angle.sin * v)).normalized();
+    for (int i = 0; i < 16 && !beam.silhouette; ++i) {
+      // eight directions on the rim, eight half-way between them
+      const auto angle = math::sincos((0.25 * i + (i < 8 ? 0.0 : 0.125)) * kPi);
+      const double offset = i < 8 ? kBeside : 0.5 * kBeside;
+      const Vector3d beside = (d + offset * (angle.cos * u + angle.sin * v)).normalized();
       const auto there = tree_.intersect(o, beside);
       const bool also = there && there->range <= reach;
       if (!returns || !also) {

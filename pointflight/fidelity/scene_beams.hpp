@@ -48,9 +48,9 @@ struct SceneBeams {
   }
 };
 
-/// Casts the beams into the exact shapes. A silhouette is where one of eight rays 0.2 degrees
-/// around the beam ends more than 0.1 m off the plane that the beam meets. Throws InputError where
-/// no free place for a sensor is found.
+/// Casts the beams into the exact shapes. A silhouette is where one of sixteen rays 0.1 and
+/// 0.2 degrees around the beam ends more than 0.1 m off the plane that the beam meets. Throws
+/// InputError where no free place for a sensor is found.
 SceneBeams cast_exactly(const ExactScene& scene,
                         const BeamPlan& plan,
                         const Executor& executor,
