@@ -120,11 +120,13 @@ void draw_errors(std::span<const ErrorPanel> panels,
     x += 30.0 + 6.2 * static_cast<double>(words.size());
   }
   for (std::size_t i = 0; i < panels.size(); ++i) {
+    const auto column = static_cast<double>(i % columns);
+    const std::size_t row_number = i / columns;
+    const auto row = static_cast<double>(row_number);
     draw_panel(canvas,
                panels[i],
-               kMargin + static_cast<double>(i % columns) * (kPanelWidth + kMargin),
-               kHeader + kCaption * static_cast<double>(i / columns + 1) - 8.0 +
-                   static_cast<double>(i / columns) * tallest);
+               kMargin + column * (kPanelWidth + kMargin),
+               kHeader + kCaption * (row + 1.0) - 8.0 + row * tallest);
   }
   canvas.save(path);
 }

@@ -26,7 +26,7 @@ else()
 endif()
 
 # sleef, xxhash and lzf come without a CMake package of a stable name: linked as plain libraries.
-foreach(library sleef xxhash lzf lzma)
+foreach(library sleef xxhash lzf lzma hwy)
   find_library(POINTFLIGHT_${library} ${library} REQUIRED)
 endforeach()
 

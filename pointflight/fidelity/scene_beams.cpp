@@ -194,7 +194,8 @@ class Caster {
 /// Collectors for the classes of one kind, in the order of their limits.
 class Classes {
  public:
-  Classes(std::vector<std::string> names) : names_(std::move(names)), collectors_(names_.size()) {}
+  explicit Classes(std::vector<std::string> names)
+      : names_(std::move(names)), collectors_(names_.size()) {}
   ErrorCollector& at(std::size_t i) { return collectors_[i]; }
   [[nodiscard]] std::vector<FidelityRow> rows() const {
     std::vector<FidelityRow> rows;

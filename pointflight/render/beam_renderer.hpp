@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 
+#include "pointflight/render/beam_kernel.hpp"
 #include "pointflight/render/renderer.hpp"
 
 namespace pointflight {
@@ -14,7 +15,7 @@ namespace pointflight {
 /// Rays longer than `range_max` end there. Uses + - * / and sqrt only: the same bytes everywhere.
 class BeamRenderer : public Renderer {
  public:
-  explicit BeamRenderer(const Scene& scene) : map_(scene.map) {}
+  explicit BeamRenderer(const Scene& scene);
 
   void render(const RayBatch& batch, std::span<Hit> hits, const Executor& executor) const override;
 
@@ -26,7 +27,10 @@ class BeamRenderer : public Renderer {
   [[nodiscard]] std::uint64_t overflow_count() const { return overflows_; }
 
  private:
+  [[nodiscard]] Hit hit_of(const KernelHit& found) const;
+
   std::shared_ptr<const SurfelMap> map_;
+  KernelMap kernel_map_;
   mutable std::atomic<std::uint64_t> overflows_{0};
 };
 

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "pointflight/core/constants.hpp"
@@ -9,8 +10,8 @@
 #include "pointflight/core/random.hpp"
 #include "pointflight/lidar/beam_pattern.hpp"
 #include "pointflight/render/beam_renderer.hpp"
-#include "pointflight/render/coverage.hpp"
 #include "pointflight/render/paper_renderer.hpp"
+#include "tests/render/coverage_reference.hpp"
 #include "tests/support.hpp"
 
 namespace pointflight {
@@ -261,6 +262,42 @@ TEST(BeamRenderer, DoesNotDependOnThreads) {
   for (const int threads : {2, 8}) {
     const auto many = render(renderer, rays, threads);
     EXPECT_EQ(hash64(as_bytes(one)), hash64(as_bytes(many)));
+  }
+}
+
+/// All bits of what was met.
+std::vector<std::uint32_t> bits_of(const std::vector<Hit>& hits) {
+  std::vector<std::uint32_t> bits;
+  for (const Hit& hit : hits) {
+    for (const float value : {hit.range, hit.cos_incidence, hit.intensity}) {
+      bits.push_back(std::bit_cast<std::uint32_t>(value));
+    }
+  }
+  return bits;
+}
+
+TEST(BeamRenderer, TheSameBitsOnEveryInstructionSetAndInEveryOrder) {
+  ShapeScene scene;
+  scene.add_box({-4, -4, -2}, {4, 4, 2});
+  scene.shapes.emplace_back(Sphere{{2, 2, 0}, 0.5});
+  const BeamRenderer renderer(Scene{map_of(scene, 0.1, 6.0, 0.02)});
+  auto rays = fan({0.3, 0.2, 0.1}, 179, 80, 0.9);
+  for (std::size_t i = 0; i < rays.size(); ++i) {  // a moving sensor
+    rays[i].origin_world.x() += 1e-5 * static_cast<double>(i);
+  }
+  ASSERT_GE(kernel_names().size(), 2u);
+  const auto expected = bits_of(render(renderer, rays));
+  for (const std::string& name : kernel_names()) {
+    use_kernel(name);
+    EXPECT_EQ(bits_of(render(renderer, rays)), expected) << name;
+  }
+  use_kernel("");
+  EXPECT_THROW(use_kernel("MMX"), InputError);
+  std::vector<Hit> alone;
+  for (std::size_t i = 0; i < rays.size(); i += 37) alone.push_back(renderer.trace(rays[i]));
+  const auto bits = bits_of(alone);
+  for (std::size_t i = 0; i < bits.size(); ++i) {
+    ASSERT_EQ(bits[i], expected[i / 3 * 37 * 3 + i % 3]);
   }
 }
 

@@ -1,4 +1,4 @@
-#include "pointflight/render/coverage.hpp"
+#include "tests/render/coverage_reference.hpp"
 
 #include <algorithm>
 

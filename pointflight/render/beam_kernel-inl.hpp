@@ -1,0 +1,488 @@
+// The beam kernel for one instruction set: single rays, several of them in flight at once.
+//
+// Included once a target by Highway's foreach_target; see beam_kernel.cpp. The measurement model is
+// in docs/architecture.md ("Hit rule").
+#if defined(POINTFLIGHT_RENDER_BEAM_KERNEL_INL_HPP) == defined(HWY_TARGET_TOGGLE)
+#ifdef POINTFLIGHT_RENDER_BEAM_KERNEL_INL_HPP
+#undef POINTFLIGHT_RENDER_BEAM_KERNEL_INL_HPP
+#else
+#define POINTFLIGHT_RENDER_BEAM_KERNEL_INL_HPP
+#endif
+
+#include <hwy/cache_control.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstddef>
+#include <cstring>
+
+#include "pointflight/render/beam_kernel.hpp"
+#include "pointflight/render/simd8-inl.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace pointflight::HWY_NAMESPACE {
+
+/// Rays that one thread follows at the same time: while one waits for its node, others compute.
+inline constexpr std::size_t kInFlight = 4;
+/// 7 siblings a level and 60 levels of Morton bits; a corrupt map stops being followed here.
+inline constexpr std::size_t kStack = 512;
+inline constexpr std::size_t kHits = 256;
+inline constexpr float kNever = 3.0e38f;
+
+struct Entry {
+  float t;              ///< Where the beam enters the box.
+  std::uint32_t index;  ///< Node, or word of a leaf's header.
+  std::uint32_t meta;   ///< Bvh8Node::meta
+};
+
+/// Surfels that one beam has met, in no order; lanes behind the last are never met.
+struct HitLanes {
+  std::size_t count;
+  std::int32_t total;  ///< Of the weights: below tau no surface can exist.
+  alignas(32) float t[kHits + 16];
+  alignas(32) std::int32_t weight[kHits + 16];
+  alignas(32) std::int32_t word[kHits + 16];
+  alignas(32) float cosine[kHits + 16];  ///< |e0 . d|
+};
+
+/// One beam on its way through the tree.
+struct RayState {
+  alignas(32) float enter[8];  ///< Where it enters the children of the present node.
+  float start[3];              ///< Origin from the map's origin, for boxes.
+  float direction[3];
+  float inverse[3];
+  std::uint32_t near_side[3];  ///< Byte of the node at which the nearer planes begin, a axis.
+  std::uint32_t far_side[3];
+  float end;    ///< Nothing beyond matters.
+  float first;  ///< Where the surface begins, kNever before one is found.
+  double origin[3];
+  std::uint32_t ray;
+  const Bvh8Node* node;
+  std::size_t steps;  ///< More visits than children: a cycle, a corrupt file.
+  std::size_t depth;
+  Entry stack[kStack];
+  HitLanes hits;
+};
+
+HWY_INLINE void start_ray(const KernelMap& map, const Ray& ray, std::uint32_t index, RayState& s) {
+  s.ray = index;
+  s.end = ray.range_max;
+  s.first = kNever;
+  s.node = map.nodes;
+  s.steps = map.node_count * 8 + 8;
+  s.depth = 0;
+  s.hits.count = 0;
+  s.hits.total = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    s.origin[axis] = ray.origin_world[axis] - map.origin[axis];
+    s.start[axis] = static_cast<float>(s.origin[axis]);
+    const float d = ray.direction_world[axis];
+    s.direction[axis] = d;
+    // a zero would make 0 * inf; a tiny slope reaches as far
+    s.inverse[axis] = 1.0f / (std::abs(d) > 1e-12f ? d : std::copysign(1e-12f, d));
+    const auto lo = static_cast<std::uint32_t>(offsetof(Bvh8Node, lo)) + 8u * axis;
+    const auto hi = static_cast<std::uint32_t>(offsetof(Bvh8Node, hi)) + 8u * axis;
+    s.near_side[axis] = s.inverse[axis] >= 0.0f ? lo : hi;
+    s.far_side[axis] = s.inverse[axis] >= 0.0f ? hi : lo;
+  }
+}
+
+/// Which children of the present node the ray enters before its end; `s.enter` says where.
+HWY_INLINE std::uint32_t test_node(RayState& s) {
+  const Bvh8Node& node = *s.node;
+  const auto* bytes = reinterpret_cast<const std::uint8_t*>(&node);
+  F8 enter = splat(0.0f);
+  F8 leave = splat(s.end);
+  for (int axis = 0; axis < 3; ++axis) {
+    const F8 step = splat(node.scale * s.inverse[axis]);
+    const F8 offset = splat((node.origin[axis] - s.start[axis]) * s.inverse[axis]);
+    enter = max(enter, offset + load_bytes(bytes + s.near_side[axis]) * step);
+    leave = min(leave, offset + load_bytes(bytes + s.far_side[axis]) * step);
+  }
+  store(enter, s.enter);
+  return bits(enter <= leave);
+}
+
+HWY_INLINE std::uint64_t meta_of(const Bvh8Node& node) {
+  std::uint64_t meta = 0;
+  std::memcpy(&meta, node.meta, 8);
+  return meta;
+}
+
+/// Where the children of a node lie: byte i is the offset of child i among its kind.
+struct Offsets {
+  std::uint64_t inner;
+  std::uint64_t leaf;
+};
+HWY_INLINE Offsets offsets_of(std::uint64_t meta) {
+  constexpr std::uint64_t kOnes = 0x0101010101010101ull;
+  const std::uint64_t count = meta & (0x7full * kOnes);
+  const std::uint64_t words = count + (((count + 0x7full * kOnes) >> 7) & kOnes);
+  // sums of all bytes below, by one multiplication each
+  return {((meta >> 7) & kOnes) * (kOnes << 8), words * (kOnes << 8)};
+}
+
+HWY_INLINE Entry child_of(const RayState& s, const Offsets& offsets, std::uint64_t meta, int i) {
+  const auto own = static_cast<std::uint32_t>(meta >> (8 * i)) & 0xffu;
+  const bool inner = own == Bvh8Node::kInner;
+  const std::uint64_t offset = inner ? offsets.inner : offsets.leaf;
+  const std::uint32_t first = inner ? s.node->first_inner : s.node->first_leaf_word;
+  return {s.enter[i], first + (static_cast<std::uint32_t>(offset >> (8 * i)) & 0xffu), own};
+}
+
+/// Pushes the children that were entered, the nearest on top.
+HWY_INLINE void push_children(const KernelMap& map, RayState& s, std::uint32_t entered) {
+  const std::uint64_t meta = meta_of(*s.node);
+  const Offsets offsets = offsets_of(meta);
+  const std::size_t bottom = s.depth;
+  for (; entered != 0 && s.depth < kStack; entered &= entered - 1) {
+    const Entry child = child_of(s, offsets, meta, std::countr_zero(entered));
+    if (child.meta == 0) continue;
+    const void* place = child.meta == Bvh8Node::kInner
+                            ? static_cast<const void*>(map.nodes + child.index)
+                            : static_cast<const void*>(map.words + child.index);
+    hwy::Prefetch(static_cast<const char*>(place));
+    hwy::Prefetch(static_cast<const char*>(place) + 64);
+    std::size_t at = s.depth++;
+    for (; at > bottom && s.stack[at - 1].t < child.t; --at) s.stack[at] = s.stack[at - 1];
+    s.stack[at] = child;
+  }
+}
+
+/// The surfels of a leaf, one a lane, decoded: what does not depend on the beam.
+struct SurfelLanes {
+  F8 x, y, z;    ///< Centre from the leaf's origin, m.
+  F8 variance2;  ///< s2^2, m^2
+  U8 low, high;
+};
+
+HWY_INLINE SurfelLanes load_surfels(const KernelMap& map, const SurfelWord* words) {
+  SurfelLanes s;  // NOLINT(cppcoreguidelines-pro-type-member-init): all is written
+  load_words(words, s.low, s.high);
+  const F8 step = splat(map.r / 64.0f);
+  const F8 half = splat(0.5f);
+  const U8 ten = splat_bits(1023u);
+  s.x = (to_float(s.low & ten) + half) * step;
+  s.y = (to_float(right<10>(s.low) & ten) + half) * step;
+  s.z = (to_float(right<20>(s.low) & ten) + half) * step;
+  const U8 code = right<27>(s.high) * splat_bits(0x288000u) + splat_bits(0x3b6bedfau);
+  s.variance2 = as_float(code) * splat(map.r * map.r);
+  return s;
+}
+
+/// Rotation (rows are the axes) and inverse variances.
+struct Shapes {
+  F8 e0x, e0y, e0z, e1x, e1y, e1z, e2x, e2y, e2z;
+  F8 inverse0, inverse1, inverse2;
+};
+
+HWY_INLINE Shapes decode_shapes(const KernelMap& map, const SurfelLanes& s) {
+  const F8 one = splat(1.0f);
+  const F8 two = splat(2.0f);
+  const F8 step = splat(0.70711f / 127.0f);
+  const F8 qx = signed_top_byte(left<24>(s.high)) * step;
+  const F8 qy = signed_top_byte(left<16>(s.high)) * step;
+  const F8 qz = signed_top_byte(left<8>(s.high)) * step;
+  const F8 xx = qx * qx;
+  const F8 yy = qy * qy;
+  const F8 zz = qz * qz;
+  const F8 qw = sqrt(max(splat(0.0f), one - xx - yy - zz));
+  const F8 xy = qx * qy;
+  const F8 xz = qx * qz;
+  const F8 yz = qy * qz;
+  const F8 wx = qw * qx;
+  const F8 wy = qw * qy;
+  const F8 wz = qw * qz;
+  Shapes e;  // NOLINT(cppcoreguidelines-pro-type-member-init): all is written
+  e.e0x = one - two * (yy + zz);
+  e.e0y = two * (xy + wz);
+  e.e0z = two * (xz - wy);
+  e.e1x = two * (xy - wz);
+  e.e1y = one - two * (xx + zz);
+  e.e1z = two * (yz + wx);
+  e.e2x = two * (xz + wy);
+  e.e2y = two * (yz - wx);
+  e.e2z = one - two * (xx + yy);
+  // 1 / s_k^2: thickness by class, s1 = s2 * 0.75^k as three selects on the variance
+  const float r2 = map.r * map.r;
+  const auto inverse_of = [r2](float thickness) {
+    return splat(1.0f / (thickness * thickness * r2));
+  };
+  e.inverse0 = select(any_bit(s.low, 1u << 31),
+                      select(any_bit(s.low, 1u << 30),
+                             inverse_of(kThicknessClasses[3]),
+                             inverse_of(kThicknessClasses[2])),
+                      select(any_bit(s.low, 1u << 30),
+                             inverse_of(kThicknessClasses[1]),
+                             inverse_of(kThicknessClasses[0])));
+  e.inverse2 = one / s.variance2;
+  const F8 ratio1 = select(any_bit(s.high, 1u << 24), splat(1.0f / 0.5625f), one);
+  const F8 ratio2 = select(any_bit(s.high, 1u << 25), splat(1.0f / 0.31640625f), one);
+  const F8 ratio4 = select(any_bit(s.high, 1u << 26), splat(1.0f / 0.1001129150390625f), one);
+  e.inverse1 = e.inverse2 * ratio1 * ratio2 * ratio4;
+  return e;
+}
+
+/// What the model says for eight pairs of a beam and a surfel: u = S R (p - o), v = S R d,
+/// t = u.v / v.v, m^2 = |u - t v|^2.
+struct Meeting {
+  F8 t;  ///< From the place of the beam that (x, y, z) are relative to.
+  F8 m2;
+  F8 cosine;  ///< |e0 . d|
+};
+
+/// (x, y, z): the surfel's centre minus a place on the beam; (dx, dy, dz): the beam's direction.
+HWY_INLINE Meeting meet(const Shapes& e, F8 x, F8 y, F8 z, F8 dx, F8 dy, F8 dz) {
+  const F8 p0 = e.e0x * x + e.e0y * y + e.e0z * z;
+  const F8 p1 = e.e1x * x + e.e1y * y + e.e1z * z;
+  const F8 p2 = e.e2x * x + e.e2y * y + e.e2z * z;
+  const F8 d0 = e.e0x * dx + e.e0y * dy + e.e0z * dz;
+  const F8 d1 = e.e1x * dx + e.e1y * dy + e.e1z * dz;
+  const F8 d2 = e.e2x * dx + e.e2y * dy + e.e2z * dz;
+  const F8 n0 = d0 * e.inverse0;
+  const F8 n1 = d1 * e.inverse1;
+  const F8 n2 = d2 * e.inverse2;
+  Meeting result;  // NOLINT(cppcoreguidelines-pro-type-member-init): all is written
+  result.t = (p0 * n0 + p1 * n1 + p2 * n2) / (d0 * n0 + d1 * n1 + d2 * n2);
+  const F8 a0 = p0 - result.t * d0;
+  const F8 a1 = p1 - result.t * d1;
+  const F8 a2 = p2 - result.t * d2;
+  result.m2 = a0 * a0 * e.inverse0 + a1 * a1 * e.inverse1 + a2 * a2 * e.inverse2;
+  result.cosine = abs(d0);
+  return result;
+}
+
+/// Weights c (1 - m^2 / M^2)^2 in whole steps.
+HWY_INLINE I8 weights_of(const KernelMap& map, const F8& m2) {
+  const F8 share = splat(1.0f) - m2 * splat(map.inverse_support);
+  return to_int(splat(map.weight_scale) * share * share);
+}
+
+/// The hit rule: the nearest hit a for which the weights within [t_a, t_a + window] reach tau.
+/// Returns its t, or kNever.
+HWY_INLINE float find_surface(const KernelMap& map, const HitLanes& hits) {
+  float tried = -1.0f;
+  while (true) {
+    F8 nearest = splat(kNever);
+    for (std::size_t i = 0; i < hits.count; i += 8) {
+      const F8 t = load(hits.t + i);
+      nearest = min(nearest, select(splat(tried) < t, t, splat(kNever)));
+    }
+    const float a = least(nearest);
+    if (a == kNever) return kNever;
+    std::int32_t weight = 0;
+    const F8 begin = splat(a);
+    const F8 end = splat(a + map.window);
+    for (std::size_t i = 0; i < hits.count; i += 8) {
+      const F8 t = load(hits.t + i);
+      weight += sum(keep((begin <= t) & (t <= end), load_unaligned(hits.weight + i)));
+    }
+    if (weight >= map.tau) return a;
+    tried = a;
+  }
+}
+
+/// Looks for the surface; what lies behind it no longer matters.
+HWY_INLINE void shorten(const KernelMap& map, RayState& s) {
+  const float a = find_surface(map, s.hits);
+  if (a == kNever) return;
+  s.first = a;
+  const float end = a + map.window;
+  s.end = end < s.end ? end : s.end;
+}
+
+/// Room for eight more hits: forgets those behind the end, else the farthest half. True if hits
+/// that might have mattered are lost.
+static HWY_NOINLINE bool make_room(RayState& s) {
+  HitLanes& h = s.hits;
+  const auto keep_up_to = [&h](float limit) {
+    std::size_t kept = 0;
+    h.total = 0;
+    for (std::size_t i = 0; i < h.count; ++i) {
+      if (h.t[i] > limit) continue;
+      h.t[kept] = h.t[i];
+      h.weight[kept] = h.weight[i];
+      h.word[kept] = h.word[i];
+      h.cosine[kept] = h.cosine[i];
+      h.total += h.weight[kept++];
+    }
+    h.count = kept;
+    store_unaligned(splat(kNever), h.t + kept);
+    store_unaligned(splat(kNever), h.t + kept + 8);
+  };
+  keep_up_to(s.end);
+  if (h.count + 8 <= kHits) return false;
+  float sorted[kHits + 16];
+  std::copy(h.t, h.t + h.count, sorted);
+  std::nth_element(sorted, sorted + kHits / 2, sorted + h.count);
+  keep_up_to(std::nextafter(sorted[kHits / 2], 0.0f));
+  // more than half at one depth: any of them will do
+  h.count = std::min(h.count, kHits - 8);
+  store_unaligned(splat(kNever), h.t + h.count);
+  return true;
+}
+
+/// Adds the hits among eight lanes. `first_word` is the word of lane 0.
+HWY_INLINE void add_hits(const KernelMap& map,
+                         RayState& s,
+                         const M8& accepted,
+                         const F8& t,
+                         const Meeting& meeting,
+                         const I8& word,
+                         std::uint32_t count,
+                         std::uint64_t& overflows) {
+  if (s.hits.count + 8 > kHits) {
+    shorten(map, s);
+    overflows += make_room(s) ? 1 : 0;
+  }
+  HitLanes& h = s.hits;
+  const I8 weight = weights_of(map, meeting.m2);
+  compress(accepted, t, h.t + h.count);
+  compress(accepted, weight, h.weight + h.count);
+  compress(accepted, word, h.word + h.count);
+  compress(accepted, meeting.cosine, h.cosine + h.count);
+  h.total += sum(keep(accepted, weight));
+  h.count += count;
+  store_unaligned(splat(kNever), h.t + h.count);
+  if (h.total >= map.tau) shorten(map, s);
+}
+
+HWY_INLINE void visit_leaf(const KernelMap& map,
+                           RayState& s,
+                           const Entry& entry,
+                           std::uint64_t& overflows) {
+  if (entry.meta > 8 || entry.index + entry.meta + kLeafPadding >= map.word_count) return;
+  const LeafHeader leaf = decode_leaf(map.words[entry.index]);
+  // in double: maps may be kilometres wide; and nothing here depends on the way to the leaf
+  const auto vx = static_cast<float>(leaf.x * map.resolution - s.origin[0]);
+  const auto vy = static_cast<float>(leaf.y * map.resolution - s.origin[1]);
+  const auto vz = static_cast<float>(leaf.z * map.resolution - s.origin[2]);
+  const float t_leaf = s.direction[0] * vx + s.direction[1] * vy + s.direction[2] * vz;
+  const F8 dx = splat(s.direction[0]);
+  const F8 dy = splat(s.direction[1]);
+  const F8 dz = splat(s.direction[2]);
+  const SurfelLanes surfels = load_surfels(map, map.words + entry.index + 1);
+  const F8 x = surfels.x - splat(s.direction[0] * t_leaf - vx);
+  const F8 y = surfels.y - splat(s.direction[1] * t_leaf - vy);
+  const F8 z = surfels.z - splat(s.direction[2] * t_leaf - vz);
+  // most leaves are passed at a distance: no surfel reaches farther than M s2
+  const F8 along = dx * x + dy * y + dz * z;
+  const F8 away = x * x + y * y + z * z - along * along;
+  const std::uint32_t lanes = (1u << entry.meta) - 1u;
+  if ((bits(away <= surfels.variance2 * splat(map.support_squared * 1.01f)) & lanes) == 0) return;
+
+  const Meeting meeting = meet(decode_shapes(map, surfels), x, y, z, dx, dy, dz);
+  const F8 t = splat(t_leaf) + meeting.t;
+  static constexpr float kNumbers[8] = {0, 1, 2, 3, 4, 5, 6, 7};
+  const F8 number = load_unaligned(kNumbers);
+  const M8 accepted = (meeting.m2 < splat(map.support_squared)) & (splat(0.0f) <= t) &
+                      (t <= splat(s.end)) & (number < splat(static_cast<float>(entry.meta)));
+  const std::uint32_t hit = bits(accepted);
+  if (hit == 0) return;
+  add_hits(map,
+           s,
+           accepted,
+           t,
+           meeting,
+           count_from(static_cast<std::int32_t>(entry.index + 1)),
+           static_cast<std::uint32_t>(std::popcount(hit)),
+           overflows);
+}
+
+/// The return: weighted means over the window, in whole numbers so that no order shows.
+HWY_INLINE KernelHit finish(const KernelMap& map, const RayState& s) {
+  KernelHit result;
+  if (s.first == kNever) return result;
+  const float end = s.first + map.window;
+  const float steps = 65536.0f / map.window;
+  std::int64_t weight = 0;
+  std::int64_t depth = 0;
+  std::int64_t cosine = 0;
+  std::int32_t largest = -1;
+  for (std::size_t i = 0; i < s.hits.count; ++i) {
+    const float t = s.hits.t[i];
+    if (!(t >= s.first) || !(t <= end)) continue;
+    const std::int64_t w = s.hits.weight[i];
+    weight += w;
+    depth += w * static_cast<std::int64_t>((t - s.first) * steps);
+    cosine += w * static_cast<std::int64_t>(s.hits.cosine[i] * 65536.0f);
+    const auto word = static_cast<std::uint32_t>(s.hits.word[i]);
+    if (s.hits.weight[i] > largest || (s.hits.weight[i] == largest && word < result.strongest)) {
+      largest = s.hits.weight[i];
+      result.strongest = word;
+    }
+  }
+  const double total = static_cast<double>(weight) * 65536.0;
+  result.range = s.first + static_cast<float>(static_cast<double>(depth) / total) * map.window;
+  result.cos_incidence = std::min(1.0f, static_cast<float>(static_cast<double>(cosine) / total));
+  return result;
+}
+
+/// On to the next inner node, through the leaves on the way. False at the end of the beam's way.
+HWY_INLINE bool advance(const KernelMap& map, RayState& s, std::uint64_t& overflows) {
+  while (s.depth > 0) {
+    const Entry entry = s.stack[--s.depth];
+    if (s.steps == 0) return false;
+    --s.steps;
+    if (entry.t > s.end) continue;
+    if (entry.meta != Bvh8Node::kInner) {
+      visit_leaf(map, s, entry, overflows);
+    } else if (entry.index < map.node_count) {
+      s.node = map.nodes + entry.index;
+      return true;
+    }
+  }
+  return false;
+}
+
+static std::uint64_t trace(const KernelMap& map,
+                           const Ray* rays,
+                           const std::uint32_t* order,
+                           std::size_t count,
+                           KernelHit* hits) {
+  if (map.node_count == 0) {
+    for (std::size_t i = 0; i < count; ++i) hits[order[i]] = {};
+    return 0;
+  }
+  RayState states[kInFlight];  // NOLINT(cppcoreguidelines-pro-type-member-init): by start_ray
+  RayState* active[kInFlight];
+  std::uint32_t entered[kInFlight];
+  std::size_t flying = 0;
+  std::size_t next = 0;
+  std::uint64_t overflows = 0;
+  while (flying < kInFlight && next < count) {
+    active[flying] = &states[flying];
+    start_ray(map, rays[order[next]], order[next], *active[flying]);
+    ++flying;
+    ++next;
+  }
+  while (flying > 0) {
+    // all node tests first: they do not wait for each other
+    for (std::size_t k = 0; k < flying; ++k) entered[k] = test_node(*active[k]);
+    for (std::size_t k = 0; k < flying;) {
+      RayState& s = *active[k];
+      if (entered[k] != 0) push_children(map, s, entered[k]);
+      if (advance(map, s, overflows)) {
+        ++k;
+        continue;
+      }
+      hits[s.ray] = finish(map, s);
+      if (next < count) {
+        start_ray(map, rays[order[next]], order[next], s);
+        ++next;
+        ++k;
+      } else {
+        --flying;
+        std::swap(active[k], active[flying]);
+        entered[k] = entered[flying];
+      }
+    }
+  }
+  return overflows;
+}
+
+}  // namespace pointflight::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif

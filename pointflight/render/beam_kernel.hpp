@@ -1,0 +1,58 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "pointflight/map/surfel_map.hpp"
+#include "pointflight/render/renderer.hpp"
+
+namespace pointflight {
+
+/// Numbers of the map that every beam needs.
+struct KernelMap {
+  const Bvh8Node* nodes;
+  std::size_t node_count;
+  const SurfelWord* words;
+  std::size_t word_count;
+  double origin[3];  ///< World position of voxel (0, 0, 0), m.
+  double resolution;
+  float r;                ///< The same.
+  float support_squared;  ///< M^2
+  float inverse_support;  ///< 1 / M^2
+  float weight_scale;     ///< Weight of a hit in the middle, in steps of kWeightOne.
+  float window;           ///< m
+  std::int32_t tau;       ///< In steps of kWeightOne.
+};
+
+/// Weights are whole numbers of 2^-20: their sums do not depend on the order of adding.
+inline constexpr float kWeightOne = 1048576.0f;
+
+/// What a beam met, before intensities are looked up.
+struct KernelHit {
+  float range = -1.0f;  ///< m; negative where nothing was met.
+  float cos_incidence = 0.0f;
+  std::uint32_t strongest = 0;  ///< Word of the surfel with the largest weight.
+};
+
+KernelMap kernel_map_of(const SurfelMap& map);
+
+/// Traces the rays `order[0..]` of `rays` and writes `hits[order[i]]`, by the best kernel for this
+/// processor: AVX-512, AVX2, SSE4 or NEON. The results are the same bits on all of them, whatever
+/// the order, and whatever else is traced in the same call. Returns how many beams met more surfels
+/// than fit in their list (docs/architecture.md, "Hit rule").
+std::uint64_t trace_beams(const KernelMap& map,
+                          std::span<const Ray> rays,
+                          std::span<const std::uint32_t> order,
+                          std::span<KernelHit> hits);
+
+/// Names of the kernels that this processor can run, the best first.
+std::vector<std::string> kernel_names();
+
+/// From now on this kernel is used ("" = the best): for tests and measurements, not thread-safe.
+/// Throws InputError that lists the names.
+void use_kernel(const std::string& name);
+
+}  // namespace pointflight
