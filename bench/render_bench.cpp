@@ -172,6 +172,7 @@ nlohmann::ordered_json measure(const std::shared_ptr<const SurfelMap>& map,
                                const BeamPlan& plan,
                                const Flags& flags) {
   const BeamRenderer beam(Scene{map});
+  const BeamRenderer singly(Scene{map}, BeamGrouping::kSingly);
   const PaperRenderer paper(Scene{map}, {});
   const Executor one(1);
   const Executor two(2);
@@ -179,6 +180,7 @@ nlohmann::ordered_json measure(const std::shared_ptr<const SurfelMap>& map,
   volatile double sink = 0.0;
   std::vector<Contestant> contestants = {
       {"beam", [&](const RayBatch& b) { beam.render(b, hits, one); }},
+      {"single", [&](const RayBatch& b) { singly.render(b, hits, one); }},
       {"embree1", [&](const RayBatch& b) { sink = sink + embree.one_by_one(b.rays); }},
       {"embree8", [&](const RayBatch& b) { sink = sink + embree.by_eight(b.rays); }},
       {"paper", [&](const RayBatch& b) { paper.render(b, hits, one); }},
@@ -245,6 +247,7 @@ nlohmann::ordered_json measure(const std::shared_ptr<const SurfelMap>& map,
     ratios[name] = best[to] / best[of];
     fmt::print(stderr, "  | {} {:.2f}", name, best[to] / best[of]);
   };
+  ratio("single_to_embree1", "single", "embree1");
   ratio("beam_to_embree1", "beam", "embree1");
   ratio("beam_to_embree8", "beam", "embree8");
   ratio("beam_to_paper", "beam", "paper");

@@ -123,37 +123,42 @@ HWY_INLINE Offsets offsets_of(std::uint64_t meta) {
   return {((meta >> 7) & kOnes) * (kOnes << 8), words * (kOnes << 8)};
 }
 
-HWY_INLINE Entry child_of(const RayState& s, const Offsets& offsets, std::uint64_t meta, int i) {
-  const auto own = static_cast<std::uint32_t>(meta >> (8 * i)) & 0xffu;
-  const bool inner = own == Bvh8Node::kInner;
-  const std::uint64_t offset = inner ? offsets.inner : offsets.leaf;
-  const std::uint32_t first = inner ? s.node->first_inner : s.node->first_leaf_word;
-  return {s.enter[i], first + (static_cast<std::uint32_t>(offset >> (8 * i)) & 0xffu), own};
-}
-
-/// Pushes the children that were entered, the nearest on top.
-HWY_INLINE void push_children(const KernelMap& map, RayState& s, std::uint32_t entered) {
-  const std::uint64_t meta = meta_of(*s.node);
+/// Pushes the children of a node that were entered at `enter`, the nearest on top. Returns the new
+/// depth of the stack.
+HWY_INLINE std::size_t push_children(const KernelMap& map,
+                                     const Bvh8Node& node,
+                                     std::uint32_t entered,
+                                     const float* enter,
+                                     Entry* stack,
+                                     std::size_t depth) {
+  if (entered == 0) return depth;
+  const std::uint64_t meta = meta_of(node);
   const Offsets offsets = offsets_of(meta);
-  const std::size_t bottom = s.depth;
-  for (; entered != 0 && s.depth < kStack; entered &= entered - 1) {
-    const Entry child = child_of(s, offsets, meta, std::countr_zero(entered));
-    if (child.meta == 0) continue;
-    const void* place = child.meta == Bvh8Node::kInner
-                            ? static_cast<const void*>(map.nodes + child.index)
-                            : static_cast<const void*>(map.words + child.index);
-    hwy::Prefetch(static_cast<const char*>(place));
-    hwy::Prefetch(static_cast<const char*>(place) + 64);
-    std::size_t at = s.depth++;
-    for (; at > bottom && s.stack[at - 1].t < child.t; --at) s.stack[at] = s.stack[at - 1];
-    s.stack[at] = child;
+  const std::size_t bottom = depth;
+  for (; entered != 0 && depth < kStack; entered &= entered - 1) {
+    const int i = std::countr_zero(entered);
+    const auto own = static_cast<std::uint32_t>(meta >> (8 * i)) & 0xffu;
+    if (own == 0) continue;
+    const bool inner = own == Bvh8Node::kInner;
+    const std::uint64_t offset = (inner ? offsets.inner : offsets.leaf) >> (8 * i) & 0xffu;
+    const std::uint32_t index =
+        (inner ? node.first_inner : node.first_leaf_word) + static_cast<std::uint32_t>(offset);
+    const char* place = inner ? reinterpret_cast<const char*>(map.nodes + index)
+                              : reinterpret_cast<const char*>(map.words + index);
+    hwy::Prefetch(place);
+    hwy::Prefetch(place + 64);
+    std::size_t at = depth++;
+    for (; at > bottom && stack[at - 1].t < enter[i]; --at) stack[at] = stack[at - 1];
+    stack[at] = {enter[i], index, own};
   }
+  return depth;
 }
 
 /// The surfels of a leaf, one a lane, decoded: what does not depend on the beam.
 struct SurfelLanes {
   F8 x, y, z;    ///< Centre from the leaf's origin, m.
   F8 variance2;  ///< s2^2, m^2
+  F8 widest;     ///< The largest variance: the surfel reaches M times its root.
   U8 low, high;
 };
 
@@ -167,7 +172,16 @@ HWY_INLINE SurfelLanes load_surfels(const KernelMap& map, const SurfelWord* word
   s.y = (to_float(right<10>(s.low) & ten) + half) * step;
   s.z = (to_float(right<20>(s.low) & ten) + half) * step;
   const U8 code = right<27>(s.high) * splat_bits(0x288000u) + splat_bits(0x3b6bedfau);
-  s.variance2 = as_float(code) * splat(map.r * map.r);
+  const float r2 = map.r * map.r;
+  s.variance2 = as_float(code) * splat(r2);
+  // the coarse classes of s0 can lie above s2
+  const auto thick = [r2](int k) {
+    return splat(kThicknessClasses[k] * kThicknessClasses[k] * r2);
+  };
+  s.widest = max(s.variance2,
+                 select(any_bit(s.low, 1u << 31),
+                        select(any_bit(s.low, 1u << 30), thick(3), thick(2)),
+                        splat(0.0f)));
   return s;
 }
 
@@ -276,7 +290,7 @@ HWY_INLINE float find_surface(const KernelMap& map, const HitLanes& hits) {
     const F8 end = splat(a + map.window);
     for (std::size_t i = 0; i < hits.count; i += 8) {
       const F8 t = load(hits.t + i);
-      weight += sum(keep((begin <= t) & (t <= end), load_unaligned(hits.weight + i)));
+      weight += sum(keep((begin <= t) & (t <= end), load(hits.weight + i)));
     }
     if (weight >= map.tau) return a;
     tried = a;
@@ -366,11 +380,11 @@ HWY_INLINE void visit_leaf(const KernelMap& map,
   const F8 x = surfels.x - splat(s.direction[0] * t_leaf - vx);
   const F8 y = surfels.y - splat(s.direction[1] * t_leaf - vy);
   const F8 z = surfels.z - splat(s.direction[2] * t_leaf - vz);
-  // most leaves are passed at a distance: no surfel reaches farther than M s2
+  // many leaves are passed at a distance
   const F8 along = dx * x + dy * y + dz * z;
   const F8 away = x * x + y * y + z * z - along * along;
   const std::uint32_t lanes = (1u << entry.meta) - 1u;
-  if ((bits(away <= surfels.variance2 * splat(map.support_squared * 1.01f)) & lanes) == 0) return;
+  if ((bits(away <= surfels.widest * splat(map.support_squared * 1.01f)) & lanes) == 0) return;
 
   const Meeting meeting = meet(decode_shapes(map, surfels), x, y, z, dx, dy, dz);
   const F8 t = splat(t_leaf) + meeting.t;
@@ -390,33 +404,66 @@ HWY_INLINE void visit_leaf(const KernelMap& map,
            overflows);
 }
 
-/// The return: weighted means over the window, in whole numbers so that no order shows.
+/// Shares of a hit in the sums over the surface's window: whole numbers, so that no order shows,
+/// and small enough that 128 full weights fit.
+struct Shares {
+  I8 weight, depth, cosine;
+};
+inline constexpr float kShareSteps = 4096.0f;
+
+HWY_INLINE Shares
+shares_of(const KernelMap& map, const F8& first, const F8& t, const I8& weight, const F8& cosine) {
+  const M8 inside = (first <= t) & (t <= first + splat(map.window));
+  Shares s;  // NOLINT(cppcoreguidelines-pro-type-member-init): all is written
+  s.weight = keep(inside, right<8>(weight));
+  // lanes outside may be anything: they count nothing
+  const F8 behind = select(inside, t - first, splat(0.0f));
+  s.depth = s.weight * to_int(behind * splat(kShareSteps / map.window));
+  s.cosine = s.weight * to_int(cosine * splat(kShareSteps));
+  return s;
+}
+
+HWY_INLINE KernelHit return_of(const KernelMap& map,
+                               float first,
+                               std::int32_t weight,
+                               std::int32_t depth,
+                               std::int32_t cosine,
+                               std::uint32_t strongest) {
+  const float total = static_cast<float>(weight) * kShareSteps;
+  KernelHit hit;
+  hit.range = first + static_cast<float>(depth) / total * map.window;
+  hit.cos_incidence = std::min(1.0f, static_cast<float>(cosine) / total);
+  hit.strongest = strongest;
+  return hit;
+}
+
+/// The return: weighted means over the window.
 HWY_INLINE KernelHit finish(const KernelMap& map, const RayState& s) {
-  KernelHit result;
-  if (s.first == kNever) return result;
-  const float end = s.first + map.window;
-  const float steps = 65536.0f / map.window;
-  std::int64_t weight = 0;
-  std::int64_t depth = 0;
-  std::int64_t cosine = 0;
+  if (s.first == kNever) return {};
+  const F8 first = splat(s.first);
+  std::int32_t weight = 0;
+  std::int32_t depth = 0;
+  std::int32_t cosine = 0;
   std::int32_t largest = -1;
+  std::uint32_t strongest = 0;
+  for (std::size_t i = 0; i < s.hits.count; i += 8) {
+    const Shares shares =
+        shares_of(map, first, load(s.hits.t + i), load(s.hits.weight + i), load(s.hits.cosine + i));
+    weight += sum(shares.weight);
+    depth += sum(shares.depth);
+    cosine += sum(shares.cosine);
+  }
+  const float end = s.first + map.window;
   for (std::size_t i = 0; i < s.hits.count; ++i) {
-    const float t = s.hits.t[i];
-    if (!(t >= s.first) || !(t <= end)) continue;
-    const std::int64_t w = s.hits.weight[i];
-    weight += w;
-    depth += w * static_cast<std::int64_t>((t - s.first) * steps);
-    cosine += w * static_cast<std::int64_t>(s.hits.cosine[i] * 65536.0f);
+    if (!(s.hits.t[i] >= s.first) || !(s.hits.t[i] <= end)) continue;
     const auto word = static_cast<std::uint32_t>(s.hits.word[i]);
-    if (s.hits.weight[i] > largest || (s.hits.weight[i] == largest && word < result.strongest)) {
-      largest = s.hits.weight[i];
-      result.strongest = word;
+    const std::int32_t w = s.hits.weight[i];
+    if (w > largest || (w == largest && word < strongest)) {
+      largest = w;
+      strongest = word;
     }
   }
-  const double total = static_cast<double>(weight) * 65536.0;
-  result.range = s.first + static_cast<float>(static_cast<double>(depth) / total) * map.window;
-  result.cos_incidence = std::min(1.0f, static_cast<float>(static_cast<double>(cosine) / total));
-  return result;
+  return return_of(map, s.first, weight, depth, cosine, strongest);
 }
 
 /// On to the next inner node, through the leaves on the way. False at the end of the beam's way.
@@ -436,11 +483,12 @@ HWY_INLINE bool advance(const KernelMap& map, RayState& s, std::uint64_t& overfl
   return false;
 }
 
-static std::uint64_t trace(const KernelMap& map,
-                           const Ray* rays,
-                           const std::uint32_t* order,
-                           std::size_t count,
-                           KernelHit* hits) {
+/// Single rays, several in flight. Returns how many lists overflowed.
+static std::uint64_t trace_singly(const KernelMap& map,
+                                  const Ray* rays,
+                                  const std::uint32_t* order,
+                                  std::size_t count,
+                                  KernelHit* hits) {
   if (map.node_count == 0) {
     for (std::size_t i = 0; i < count; ++i) hits[order[i]] = {};
     return 0;
@@ -462,7 +510,7 @@ static std::uint64_t trace(const KernelMap& map,
     for (std::size_t k = 0; k < flying; ++k) entered[k] = test_node(*active[k]);
     for (std::size_t k = 0; k < flying;) {
       RayState& s = *active[k];
-      if (entered[k] != 0) push_children(map, s, entered[k]);
+      s.depth = push_children(map, *s.node, entered[k], s.enter, s.stack, s.depth);
       if (advance(map, s, overflows)) {
         ++k;
         continue;

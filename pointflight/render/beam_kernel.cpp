@@ -15,7 +15,7 @@
 #define HWY_TARGET_INCLUDE "pointflight/render/beam_kernel.cpp"
 #include <hwy/foreach_target.h>
 // after foreach_target
-#include "pointflight/render/beam_kernel-inl.hpp"
+#include "pointflight/render/beam_packets-inl.hpp"
 
 #if HWY_ONCE
 namespace pointflight {
@@ -47,8 +47,10 @@ KernelMap kernel_map_of(const SurfelMap& map) {
 std::uint64_t trace_beams(const KernelMap& map,
                           std::span<const Ray> rays,
                           std::span<const std::uint32_t> order,
-                          std::span<KernelHit> hits) {
-  return HWY_DYNAMIC_DISPATCH(trace)(map, rays.data(), order.data(), order.size(), hits.data());
+                          std::span<KernelHit> hits,
+                          BeamGrouping grouping) {
+  return HWY_DYNAMIC_DISPATCH(trace)(
+      map, rays.data(), order.data(), order.size(), grouping, hits.data());
 }
 
 std::vector<std::string> kernel_names() {

@@ -37,16 +37,21 @@ struct KernelHit {
   std::uint32_t strongest = 0;  ///< Word of the surfel with the largest weight.
 };
 
+/// Which beams go through the tree together: what suits each, or each by itself.
+enum class BeamGrouping { kAsSuits, kSingly };
+
 KernelMap kernel_map_of(const SurfelMap& map);
 
 /// Traces the rays `order[0..]` of `rays` and writes `hits[order[i]]`, by the best kernel for this
 /// processor: AVX-512, AVX2, SSE4 or NEON. The results are the same bits on all of them, whatever
-/// the order, and whatever else is traced in the same call. Returns how many beams met more surfels
-/// than fit in their list (docs/architecture.md, "Hit rule").
+/// the order, whatever else is traced in the same call, and however beams are grouped: 64
+/// neighbours in `order` that point nearly the same way go as a packet. Returns how many beams met
+/// more surfels than fit in their list (docs/architecture.md, "Hit rule").
 std::uint64_t trace_beams(const KernelMap& map,
                           std::span<const Ray> rays,
                           std::span<const std::uint32_t> order,
-                          std::span<KernelHit> hits);
+                          std::span<KernelHit> hits,
+                          BeamGrouping grouping = BeamGrouping::kAsSuits);
 
 /// Names of the kernels that this processor can run, the best first.
 std::vector<std::string> kernel_names();

@@ -12,8 +12,8 @@ constexpr std::size_t kChunk = 1024;  // beams
 
 }  // namespace
 
-BeamRenderer::BeamRenderer(const Scene& scene)
-    : map_(scene.map), kernel_map_(kernel_map_of(*scene.map)) {}
+BeamRenderer::BeamRenderer(const Scene& scene, BeamGrouping grouping)
+    : map_(scene.map), kernel_map_(kernel_map_of(*scene.map)), grouping_(grouping) {}
 
 void BeamRenderer::render(const RayBatch& batch,
                           std::span<Hit> hits,
@@ -22,7 +22,7 @@ void BeamRenderer::render(const RayBatch& batch,
   std::vector<KernelHit> found(batch.rays.size());
   executor.parallel_for(order.size(), kChunk, [&](std::size_t begin, std::size_t end) {
     const std::span part(order.data() + begin, end - begin);
-    const std::uint64_t overflows = trace_beams(kernel_map_, batch.rays, part, found);
+    const std::uint64_t overflows = trace_beams(kernel_map_, batch.rays, part, found, grouping_);
     if (overflows > 0) overflows_ += overflows;
     for (const std::uint32_t i : part) hits[i] = hit_of(found[i]);
   });

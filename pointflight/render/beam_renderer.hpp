@@ -15,7 +15,7 @@ namespace pointflight {
 /// Rays longer than `range_max` end there. Uses + - * / and sqrt only: the same bytes everywhere.
 class BeamRenderer : public Renderer {
  public:
-  explicit BeamRenderer(const Scene& scene);
+  explicit BeamRenderer(const Scene& scene, BeamGrouping grouping = BeamGrouping::kAsSuits);
 
   void render(const RayBatch& batch, std::span<Hit> hits, const Executor& executor) const override;
 
@@ -26,11 +26,14 @@ class BeamRenderer : public Renderer {
   /// depend on the shape of the tree (never on threads).
   [[nodiscard]] std::uint64_t overflow_count() const { return overflows_; }
 
+  [[nodiscard]] Scene scene() const { return {map_}; }
+
  private:
   [[nodiscard]] Hit hit_of(const KernelHit& found) const;
 
   std::shared_ptr<const SurfelMap> map_;
   KernelMap kernel_map_;
+  BeamGrouping grouping_;
   mutable std::atomic<std::uint64_t> overflows_{0};
 };
 

@@ -7,15 +7,49 @@
 namespace pointflight {
 namespace {
 
-constexpr int kBits = 9;  // per axis
+constexpr int kBits = 12;     // per axis
+constexpr int kSortBits = 8;  // a pass
 constexpr std::uint32_t kCells = 1u << kBits;
 
-/// Spreads nine bits to every second place.
-std::uint32_t spread(std::uint32_t v) {
-  v = (v | v << 8) & 0x00ff00ffu;
-  v = (v | v << 4) & 0x0f0f0f0fu;
-  v = (v | v << 2) & 0x33333333u;
-  return (v | v << 1) & 0x55555555u;
+/// Steps of a Hilbert curve over blocks of 8 x 8 cells: from (direction of the curve in the block,
+/// x, y) to (number of the cell along it, direction there).
+struct HilbertTable {
+  std::uint8_t place[4][64];
+  std::uint8_t next[4][64];
+};
+
+constexpr HilbertTable make_hilbert_table() {
+  // one step, by direction and quadrant (2 x + y): number along the curve and direction in it
+  constexpr std::uint8_t kPlace[4][4] = {{0, 1, 3, 2}, {0, 3, 1, 2}, {2, 1, 3, 0}, {2, 3, 1, 0}};
+  constexpr std::uint8_t kNext[4][4] = {{1, 0, 2, 0}, {0, 3, 1, 1}, {2, 2, 0, 3}, {3, 1, 3, 2}};
+  HilbertTable table{};
+  for (unsigned direction = 0; direction < 4; ++direction) {
+    for (unsigned cell = 0; cell < 64; ++cell) {
+      unsigned place = 0;
+      unsigned now = direction;
+      for (int bit = 2; bit >= 0; --bit) {
+        const unsigned quadrant = (cell >> (3 + bit) & 1u) << 1 | (cell >> bit & 1u);
+        place = place << 2 | kPlace[now][quadrant];
+        now = kNext[now][quadrant];
+      }
+      table.place[direction][cell] = static_cast<std::uint8_t>(place);
+      table.next[direction][cell] = static_cast<std::uint8_t>(now);
+    }
+  }
+  return table;
+}
+
+constexpr HilbertTable kHilbert = make_hilbert_table();
+
+std::uint32_t hilbert(std::uint32_t x, std::uint32_t y) {
+  std::uint32_t place = 0;
+  std::uint32_t direction = 0;
+  for (int shift = kBits - 3; shift >= 0; shift -= 3) {
+    const std::uint32_t cell = (x >> shift & 7u) << 3 | (y >> shift & 7u);
+    place = place << 6 | kHilbert.place[direction][cell];
+    direction = kHilbert.next[direction][cell];
+  }
+  return place;
 }
 
 std::uint32_t cell_of(const Vector3f& d) {
@@ -31,10 +65,10 @@ std::uint32_t cell_of(const Vector3f& d) {
   const auto cell = [](float x) {
     const float at = (0.5f + 0.5f * x) * static_cast<float>(kCells);
     // NaN too ends in a cell
-    return at >= 0.0f ? std::min(kCells - 1, static_cast<std::uint32_t>(std::min(at, 4096.0f)))
+    return at >= 0.0f ? std::min(kCells - 1, static_cast<std::uint32_t>(std::min(at, 65536.0f)))
                       : 0u;
   };
-  return spread(cell(u)) | spread(cell(v)) << 1;
+  return hilbert(cell(u), cell(v));
 }
 
 }  // namespace
@@ -45,15 +79,16 @@ std::vector<std::uint32_t> direction_order(std::span<const Ray> rays, const Exec
   executor.parallel_for(n, 8192, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) keys[i] = cell_of(rays[i].direction_world);
   });
-  // counting sort by the lower, then by the upper nine bits
+  // counting sort, a byte at a time
   std::vector<std::uint32_t> order(n);
   std::vector<std::uint32_t> other(n);
   for (std::size_t i = 0; i < n; ++i) other[i] = static_cast<std::uint32_t>(i);
-  for (const int shift : {0, kBits}) {
-    std::array<std::uint32_t, kCells + 1> starts{};
-    for (const std::uint32_t key : keys) ++starts[(key >> shift & (kCells - 1)) + 1];
-    for (std::size_t c = 0; c < kCells; ++c) starts[c + 1] += starts[c];
-    for (const std::uint32_t i : other) order[starts[keys[i] >> shift & (kCells - 1)]++] = i;
+  constexpr std::uint32_t kBuckets = 1u << kSortBits;
+  for (int shift = 0; shift < 2 * kBits; shift += kSortBits) {
+    std::array<std::uint32_t, kBuckets + 1> starts{};
+    for (const std::uint32_t key : keys) ++starts[(key >> shift & (kBuckets - 1)) + 1];
+    for (std::size_t c = 0; c < kBuckets; ++c) starts[c + 1] += starts[c];
+    for (const std::uint32_t i : other) order[starts[keys[i] >> shift & (kBuckets - 1)]++] = i;
     std::swap(order, other);
   }
   return other;

@@ -9,8 +9,8 @@
 
 namespace pointflight {
 
-/// Indices of the rays so that neighbours in the list point the same way: along a Morton curve over
-/// the sphere (octahedral map) with cells of about 0.35 degrees; equal cells keep their order.
+/// Indices of the rays so that neighbours in the list point the same way: along a Hilbert curve
+/// over the sphere (octahedral map) with cells of about 0.05 degrees; equal cells keep their order.
 /// Beams traced in this order find their part of the map in the cache.
 std::vector<std::uint32_t> direction_order(std::span<const Ray> rays, const Executor& executor);
 

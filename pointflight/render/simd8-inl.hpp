@@ -137,6 +137,17 @@ HWY_INLINE F8 select(const M8& condition, const F8& yes, const F8& no) {
   POINTFLIGHT_EACH(hn::IfThenElse(condition.v[p], yes.v[p], no.v[p]))
   return out;
 }
+HWY_INLINE I8 select(const M8& condition, const I8& yes, const I8& no) {
+  I8 out;
+  POINTFLIGHT_EACH(hn::IfThenElse(hn::RebindMask(kI, condition.v[p]), yes.v[p], no.v[p]))
+  return out;
+}
+/// a and not b
+HWY_INLINE M8 without(const M8& a, const M8& b) {
+  M8 out;
+  POINTFLIGHT_EACH(hn::AndNot(b.v[p], a.v[p]))
+  return out;
+}
 /// Zero where the condition does not hold.
 HWY_INLINE I8 keep(const M8& condition, const I8& a) {
   I8 out;
@@ -228,6 +239,50 @@ HWY_INLINE I8 count_from(std::int32_t first) {
   POINTFLIGHT_EACH(hn::Iota(kI, first + static_cast<std::int32_t>(p * kWidth)))
   return out;
 }
+HWY_INLINE I8 splat_int(std::int32_t x) {
+  I8 out;
+  POINTFLIGHT_EACH(hn::Set(kI, x))
+  return out;
+}
+HWY_INLINE I8 load(const std::int32_t* x) {
+  I8 out;
+  POINTFLIGHT_EACH(hn::Load(kI, x + p * kWidth))
+  return out;
+}
+HWY_INLINE void store(const I8& a, std::int32_t* x) {
+  for (std::size_t p = 0; p < kParts; ++p) hn::Store(a.v[p], kI, x + p * kWidth);
+}
+HWY_INLINE I8 operator+(const I8& a, const I8& b) {
+  I8 out;
+  POINTFLIGHT_EACH(hn::Add(a.v[p], b.v[p]))
+  return out;
+}
+HWY_INLINE I8 operator*(const I8& a, const I8& b) {
+  I8 out;
+  POINTFLIGHT_EACH(hn::Mul(a.v[p], b.v[p]))
+  return out;
+}
+template <int kBits>
+HWY_INLINE I8 right(const I8& a) {
+  I8 out;
+  POINTFLIGHT_EACH(hn::ShiftRight<kBits>(a.v[p]))
+  return out;
+}
+HWY_INLINE M8 operator<(const I8& a, const I8& b) {
+  M8 out;
+  POINTFLIGHT_EACH(hn::RebindMask(kF, hn::Lt(a.v[p], b.v[p])))
+  return out;
+}
+HWY_INLINE M8 operator==(const I8& a, const I8& b) {
+  M8 out;
+  POINTFLIGHT_EACH(hn::RebindMask(kF, hn::Eq(a.v[p], b.v[p])))
+  return out;
+}
+HWY_INLINE F8 to_float(const I8& a) {
+  F8 out;
+  POINTFLIGHT_EACH(hn::ConvertTo(kF, a.v[p]))
+  return out;
+}
 /// Splits eight 64-bit words into their halves.
 HWY_INLINE void load_words(const std::uint64_t* x, U8& low, U8& high) {
   const auto* halves = reinterpret_cast<const std::uint32_t*>(x);
@@ -239,6 +294,11 @@ HWY_INLINE std::int32_t sum(const I8& a) {
   auto all = a.v[0];
   for (std::size_t p = 1; p < kParts; ++p) all = hn::Add(all, a.v[p]);
   return hn::GetLane(hn::SumOfLanes(kI, all));
+}
+HWY_INLINE float greatest(const F8& a) {
+  auto all = a.v[0];
+  for (std::size_t p = 1; p < kParts; ++p) all = hn::Max(all, a.v[p]);
+  return hn::GetLane(hn::MaxOfLanes(kF, all));
 }
 HWY_INLINE float least(const F8& a) {
   auto all = a.v[0];

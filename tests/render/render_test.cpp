@@ -282,6 +282,8 @@ TEST(BeamRenderer, TheSameBitsOnEveryInstructionSetAndInEveryOrder) {
   scene.shapes.emplace_back(Sphere{{2, 2, 0}, 0.5});
   const BeamRenderer renderer(Scene{map_of(scene, 0.1, 6.0, 0.02)});
   auto rays = fan({0.3, 0.2, 0.1}, 179, 80, 0.9);
+  const auto dense = fan({0.3, 0.2, 0.1}, 30, 20, 0.15);  // goes in packets
+  rays.insert(rays.end(), dense.begin(), dense.end());
   for (std::size_t i = 0; i < rays.size(); ++i) {  // a moving sensor
     rays[i].origin_world.x() += 1e-5 * static_cast<double>(i);
   }
@@ -292,6 +294,8 @@ TEST(BeamRenderer, TheSameBitsOnEveryInstructionSetAndInEveryOrder) {
     EXPECT_EQ(bits_of(render(renderer, rays)), expected) << name;
   }
   use_kernel("");
+  const BeamRenderer singly(renderer.scene(), BeamGrouping::kSingly);
+  EXPECT_EQ(bits_of(render(singly, rays)), expected);
   EXPECT_THROW(use_kernel("MMX"), InputError);
   std::vector<Hit> alone;
   for (std::size_t i = 0; i < rays.size(); i += 37) alone.push_back(renderer.trace(rays[i]));

@@ -1,0 +1,508 @@
+// Packets: 64 beams that point nearly the same way go through the tree together, eight groups of
+// eight. Every pair of a beam and a surfel is computed by the same operations as for single rays,
+// so the results are the same bits; what a packet cannot do is traced singly.
+//
+// Included once a target by Highway's foreach_target; see beam_kernel.cpp.
+#if defined(POINTFLIGHT_RENDER_BEAM_PACKETS_INL_HPP) == defined(HWY_TARGET_TOGGLE)
+#ifdef POINTFLIGHT_RENDER_BEAM_PACKETS_INL_HPP
+#undef POINTFLIGHT_RENDER_BEAM_PACKETS_INL_HPP
+#else
+#define POINTFLIGHT_RENDER_BEAM_PACKETS_INL_HPP
+#endif
+
+#include "pointflight/render/beam_kernel-inl.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace pointflight::HWY_NAMESPACE {
+
+inline constexpr std::size_t kGroups = 8;
+inline constexpr std::size_t kPacket = 8 * kGroups;
+/// Rows of hits of one group: beyond, its beams are traced singly.
+inline constexpr std::size_t kRows = 96;
+/// Wider groups (tangent of half the angle) meet so many surfels apart that single rays are faster.
+inline constexpr float kWidestGroup = 0.03f;
+
+/// Hits of eight beams: a row is one surfel, lanes that it does not meet hold kNever and weight 0.
+struct HitRows {
+  std::size_t count;
+  std::size_t evaluated;  ///< Rows that find_surfaces has seen.
+  alignas(32) float t[kRows][8];
+  alignas(32) std::int32_t weight[kRows][8];
+  alignas(32) float cosine[kRows][8];
+  std::uint32_t word[kRows];
+};
+
+/// Eight beams.
+struct Group {
+  alignas(32) float dx[8], dy[8], dz[8];
+  alignas(32) float end[8];
+  alignas(32) float first[8];
+  alignas(32) std::int32_t total[8];
+  double origin[3][8];
+  HitRows rows;
+};
+
+struct Packet {
+  // cones around the groups, seen from the apex: lanes are groups
+  alignas(32) float axis_x[8], axis_y[8], axis_z[8], tangent[8], group_end[8];
+  double apex[3];     ///< From the map's origin.
+  float apex_box[3];  ///< The same in float, for boxes.
+  float spread;       ///< Origins lie so far from the apex at most.
+  bool one_origin;
+  float plane[4][3];               ///< Inward normals of the frustum's sides.
+  float offset[4];                 ///< n . (p - apex) >= offset inside.
+  std::uint32_t plane_side[4][3];  ///< Byte of the node where the corner farthest inside is.
+  int main_axis;
+  std::uint32_t main_side;
+  float main_step;       ///< 1 / (greatest component along the main axis), signed.
+  float main_offset;     ///< Of the origins along the main axis, the one that shortens most.
+  float end;             ///< Farthest end of all beams.
+  std::uint32_t failed;  ///< Groups to be traced singly.
+  Group groups[kGroups];
+};
+
+/// Sets up a packet. False where its beams are better traced singly.
+HWY_INLINE bool gather(const KernelMap& map,
+                       const Ray* rays,
+                       const std::uint32_t* order,
+                       Packet& p) {
+  Vector3f mean = Vector3f::Zero();
+  for (std::size_t i = 0; i < kPacket; ++i) mean += rays[order[i]].direction_world;
+  const float length = mean.norm();
+  if (!(length > 0.9f * kPacket)) return false;
+  mean /= length;
+  const Vector3d& apex = rays[order[0]].origin_world;
+  const Vector3f helper = std::abs(mean.z()) < 0.9f ? Vector3f::UnitZ() : Vector3f::UnitX();
+  const Vector3f u = mean.cross(helper).normalized();
+  const Vector3f v = mean.cross(u);
+  int main_axis = 0;
+  mean.cwiseAbs().maxCoeff(&main_axis);
+
+  float low[2] = {kNever, kNever};
+  float high[2] = {-kNever, -kNever};
+  float spread = 0.0f;
+  float greatest_component = 0.0f;
+  for (std::size_t g = 0; g < kGroups; ++g) {
+    Group& group = p.groups[g];
+    Vector3f axis = Vector3f::Zero();
+    for (std::size_t i = 0; i < 8; ++i) axis += rays[order[8 * g + i]].direction_world;
+    axis.normalize();
+    float tangent = 0.0f;
+    float farthest = 0.0f;
+    for (std::size_t i = 0; i < 8; ++i) {
+      const Ray& ray = rays[order[8 * g + i]];
+      const Vector3f& d = ray.direction_world;
+      const float cosine = d.dot(axis);
+      if (!(cosine > 0.9f)) return false;
+      tangent = std::max(tangent, (d / cosine - axis).norm());
+      const float ahead = d.dot(mean);
+      if (!(ahead > 0.5f)) return false;
+      const float across[2] = {d.dot(u) / ahead, d.dot(v) / ahead};
+      for (int k = 0; k < 2; ++k) {
+        low[k] = std::min(low[k], across[k]);
+        high[k] = std::max(high[k], across[k]);
+      }
+      const Vector3f away = (ray.origin_world - apex).cast<float>();
+      spread = std::max(spread, away.norm());
+      greatest_component = std::max(greatest_component, std::abs(d[main_axis]));
+      group.dx[i] = d.x();
+      group.dy[i] = d.y();
+      group.dz[i] = d.z();
+      group.end[i] = ray.range_max;
+      group.first[i] = kNever;
+      group.total[i] = 0;
+      for (int k = 0; k < 3; ++k) group.origin[k][i] = ray.origin_world[k] - map.origin[k];
+      farthest = std::max(farthest, ray.range_max);
+    }
+    if (tangent > kWidestGroup) return false;
+    p.axis_x[g] = axis.x();
+    p.axis_y[g] = axis.y();
+    p.axis_z[g] = axis.z();
+    p.tangent[g] = tangent * 1.001f + 1e-6f;
+    p.group_end[g] = farthest;
+    group.rows.count = 0;
+    group.rows.evaluated = 0;
+  }
+
+  for (int k = 0; k < 3; ++k) {
+    p.apex[k] = apex[k] - map.origin[k];
+    p.apex_box[k] = static_cast<float>(p.apex[k]);
+  }
+  p.spread = spread;
+  p.one_origin = spread == 0.0f;
+  p.end = *std::max_element(p.group_end, p.group_end + kGroups);
+  p.failed = 0;
+  // a little room for rounding, and for origins beside the apex
+  const float room = 1e-5f;
+  const Vector3f normals[4] = {u - (low[0] - room) * mean,
+                               (high[0] + room) * mean - u,
+                               v - (low[1] - room) * mean,
+                               (high[1] + room) * mean - v};
+  for (int k = 0; k < 4; ++k) {
+    p.offset[k] = -spread * normals[k].norm() * 1.001f;
+    for (int axis = 0; axis < 3; ++axis) {
+      p.plane[k][axis] = normals[k][axis];
+      p.plane_side[k][axis] =
+          static_cast<std::uint32_t>(normals[k][axis] > 0.0f ? offsetof(Bvh8Node, hi)
+                                                             : offsetof(Bvh8Node, lo)) +
+          8u * static_cast<std::uint32_t>(axis);
+    }
+  }
+  p.main_axis = main_axis;
+  const bool forward = mean[main_axis] > 0.0f;
+  p.main_side =
+      static_cast<std::uint32_t>(forward ? offsetof(Bvh8Node, lo) : offsetof(Bvh8Node, hi)) +
+      8u * static_cast<std::uint32_t>(main_axis);
+  p.main_step = (forward ? 1.0f : -1.0f) / (greatest_component * 1.0001f);
+  p.main_offset = (forward ? spread : -spread) * 1.001f;
+  return true;
+}
+
+/// Which children the frustum may touch, and a lower bound of the distance to each.
+HWY_INLINE std::uint32_t test_node(const Packet& p, const Bvh8Node& node, float* distances) {
+  const auto* bytes = reinterpret_cast<const std::uint8_t*>(&node);
+  float corner[3];
+  for (int axis = 0; axis < 3; ++axis) corner[axis] = node.origin[axis] - p.apex_box[axis];
+  const F8 near_plane = load_bytes(bytes + p.main_side);
+  const F8 distance = max(splat(0.0f),
+                          splat((corner[p.main_axis] - p.main_offset) * p.main_step) +
+                              near_plane * splat(node.scale * p.main_step));
+  store(distance, distances);
+  F8 inside = splat(p.end) - distance;
+  for (int k = 0; k < 4; ++k) {
+    const float* n = p.plane[k];
+    const float base = n[0] * corner[0] + n[1] * corner[1] + n[2] * corner[2] - p.offset[k];
+    F8 depth = splat(base);
+    for (int axis = 0; axis < 3; ++axis) {
+      depth = depth + splat(n[axis] * node.scale) * load_bytes(bytes + p.plane_side[k][axis]);
+    }
+    inside = min(inside, depth);
+  }
+  return bits(splat(-1e-4f * node.scale) <= inside);
+}
+
+/// The hit rule for eight beams at once: where the surface of each begins, or kNever.
+HWY_INLINE F8 find_surfaces(const KernelMap& map, const HitRows& rows) {
+  const F8 never = splat(kNever);
+  const F8 window = splat(map.window);
+  const I8 tau = splat_int(map.tau - 1);
+  F8 result = never;
+  F8 tried = splat(-1.0f);
+  while (true) {
+    F8 nearest = never;
+    for (std::size_t i = 0; i < rows.count; ++i) {
+      const F8 t = load(rows.t[i]);
+      nearest = min(nearest, select(tried < t, t, never));
+    }
+    const F8 end = nearest + window;
+    I8 weight = splat_int(0);
+    for (std::size_t i = 0; i < rows.count; ++i) {
+      const F8 t = load(rows.t[i]);
+      weight = weight + keep((nearest <= t) & (t <= end), load(rows.weight[i]));
+    }
+    const M8 found = tau < weight;
+    result = select(found, nearest, result);
+    const M8 pending = without(nearest < never, found);
+    if (bits(pending) == 0) return result;
+    // lanes that are settled look behind everything
+    tried = select(pending, nearest, never);
+  }
+}
+
+/// Forgets rows behind the ends of all beams.
+HWY_INLINE void drop_behind(HitRows& rows, const F8& end) {
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < rows.count; ++i) {
+    const F8 t = load(rows.t[i]);
+    if (bits(t <= end) == 0) continue;
+    if (kept != i) {
+      store(t, rows.t[kept]);
+      store(load(rows.weight[i]), rows.weight[kept]);
+      store(load(rows.cosine[i]), rows.cosine[kept]);
+      rows.word[kept] = rows.word[i];
+    }
+    ++kept;
+  }
+  rows.count = kept;
+}
+
+/// Looks for the surfaces of a group that has new hits.
+HWY_INLINE void shorten(const KernelMap& map, Packet& p, std::size_t g) {
+  Group& group = p.groups[g];
+  const I8 tau = splat_int(map.tau - 1);
+  if (bits(tau < load(group.total)) == 0) return;
+  const F8 first = find_surfaces(map, group.rows);
+  const M8 found = first < splat(kNever);
+  if (bits(found) == 0) return;
+  store(first, group.first);
+  const F8 old_end = load(group.end);
+  const F8 end = select(found, min(first + splat(map.window), old_end), old_end);
+  store(end, group.end);
+  p.group_end[g] = greatest(end);
+  p.end = greatest(load(p.group_end));
+  if (group.rows.count > 12) drop_behind(group.rows, end);
+}
+
+/// What the groups need of a leaf's surfels, one a lane or, behind `decode`, one an index.
+struct PacketLeaf {
+  SurfelLanes lanes;
+  alignas(32) float x[8], y[8], z[8];
+  alignas(32) float shape[12][8];
+  double corner[3];  ///< The leaf's origin from the map's origin, m.
+  std::uint32_t first_word;
+};
+
+HWY_INLINE void decode(const KernelMap& map, PacketLeaf& leaf) {
+  const Shapes e = decode_shapes(map, leaf.lanes);
+  store(leaf.lanes.x, leaf.x);
+  store(leaf.lanes.y, leaf.y);
+  store(leaf.lanes.z, leaf.z);
+  const F8* const all[12] = {&e.e0x,
+                             &e.e0y,
+                             &e.e0z,
+                             &e.e1x,
+                             &e.e1y,
+                             &e.e1z,
+                             &e.e2x,
+                             &e.e2y,
+                             &e.e2z,
+                             &e.inverse0,
+                             &e.inverse1,
+                             &e.inverse2};
+  for (int k = 0; k < 12; ++k) store(*all[k], leaf.shape[k]);
+}
+
+HWY_INLINE Shapes shape_at(const PacketLeaf& leaf, std::size_t i) {
+  const auto& s = leaf.shape;
+  return {splat(s[0][i]),
+          splat(s[1][i]),
+          splat(s[2][i]),
+          splat(s[3][i]),
+          splat(s[4][i]),
+          splat(s[5][i]),
+          splat(s[6][i]),
+          splat(s[7][i]),
+          splat(s[8][i]),
+          splat(s[9][i]),
+          splat(s[10][i]),
+          splat(s[11][i])};
+}
+
+/// Tests the surfels of `which` against the eight beams of a group.
+HWY_INLINE void meet_group(
+    const KernelMap& map, Packet& p, std::size_t g, const PacketLeaf& leaf, std::uint32_t which) {
+  Group& group = p.groups[g];
+  F8 vx;
+  F8 vy;
+  F8 vz;
+  if (p.one_origin) {
+    vx = splat(static_cast<float>(leaf.corner[0] - p.apex[0]));
+    vy = splat(static_cast<float>(leaf.corner[1] - p.apex[1]));
+    vz = splat(static_cast<float>(leaf.corner[2] - p.apex[2]));
+  } else {
+    alignas(32) float v[3][8];
+    for (int axis = 0; axis < 3; ++axis) {
+      for (std::size_t i = 0; i < 8; ++i) {
+        v[axis][i] = static_cast<float>(leaf.corner[axis] - group.origin[axis][i]);
+      }
+    }
+    vx = load(v[0]);
+    vy = load(v[1]);
+    vz = load(v[2]);
+  }
+  const F8 dx = load(group.dx);
+  const F8 dy = load(group.dy);
+  const F8 dz = load(group.dz);
+  const F8 t_leaf = dx * vx + dy * vy + dz * vz;
+  const F8 base_x = dx * t_leaf - vx;
+  const F8 base_y = dy * t_leaf - vy;
+  const F8 base_z = dz * t_leaf - vz;
+  const F8 end = load(group.end);
+  const F8 support = splat(map.support_squared);
+  I8 total = load(group.total);
+  HitRows& rows = group.rows;
+  const std::size_t before = rows.count;
+  for (; which != 0; which &= which - 1) {
+    const auto i = static_cast<std::size_t>(std::countr_zero(which));
+    const Meeting meeting = meet(shape_at(leaf, i),
+                                 splat(leaf.x[i]) - base_x,
+                                 splat(leaf.y[i]) - base_y,
+                                 splat(leaf.z[i]) - base_z,
+                                 dx,
+                                 dy,
+                                 dz);
+    const F8 t = t_leaf + meeting.t;
+    const M8 accepted = (meeting.m2 < support) & (splat(0.0f) <= t) & (t <= end);
+    if (bits(accepted) == 0) continue;
+    if (rows.count == kRows) {
+      p.failed |= 1u << g;
+      return;
+    }
+    const I8 weight = keep(accepted, weights_of(map, meeting.m2));
+    store(select(accepted, t, splat(kNever)), rows.t[rows.count]);
+    store(weight, rows.weight[rows.count]);
+    store(meeting.cosine, rows.cosine[rows.count]);
+    rows.word[rows.count++] = leaf.first_word + static_cast<std::uint32_t>(i);
+    total = total + weight;
+  }
+  if (rows.count == before) return;
+  store(total, group.total);
+  shorten(map, p, g);
+}
+
+HWY_INLINE void visit_leaf(const KernelMap& map, Packet& p, const Entry& entry) {
+  if (entry.meta > 8 || entry.index + entry.meta + kLeafPadding >= map.word_count) return;
+  const LeafHeader header = decode_leaf(map.words[entry.index]);
+  PacketLeaf leaf;  // NOLINT(cppcoreguidelines-pro-type-member-init): written before it is read
+  leaf.lanes = load_surfels(map, map.words + entry.index + 1);
+  leaf.first_word = entry.index + 1;
+  leaf.corner[0] = header.x * map.resolution;
+  leaf.corner[1] = header.y * map.resolution;
+  leaf.corner[2] = header.z * map.resolution;
+  // centres from the apex and how far they reach
+  alignas(32) float cx[8];
+  alignas(32) float cy[8];
+  alignas(32) float cz[8];
+  alignas(32) float reach[8];
+  store(leaf.lanes.x + splat(static_cast<float>(leaf.corner[0] - p.apex[0])), cx);
+  store(leaf.lanes.y + splat(static_cast<float>(leaf.corner[1] - p.apex[1])), cy);
+  store(leaf.lanes.z + splat(static_cast<float>(leaf.corner[2] - p.apex[2])), cz);
+  store(sqrt(leaf.lanes.widest * splat(map.support_squared)) * splat(1.03f) + splat(p.spread),
+        reach);
+  const F8 ax = load(p.axis_x);
+  const F8 ay = load(p.axis_y);
+  const F8 az = load(p.axis_z);
+  const F8 tangent = load(p.tangent);
+  const F8 group_end = load(p.group_end);
+  // bit i of byte g: group g may meet surfel i
+  std::uint64_t pairs = 0;
+  for (std::size_t i = 0; i < entry.meta; ++i) {
+    const F8 x = splat(cx[i]);
+    const F8 y = splat(cy[i]);
+    const F8 z = splat(cz[i]);
+    const F8 far = splat(reach[i]);
+    const F8 along = ax * x + ay * y + az * z;
+    const F8 px = x - along * ax;
+    const F8 py = y - along * ay;
+    const F8 pz = z - along * az;
+    const F8 limit = far + max(along, splat(0.0f)) * tangent;
+    const M8 touched = (px * px + py * py + pz * pz <= limit * limit) & (along - far <= group_end) &
+                       (splat(0.0f) <= along + far);
+    // groups to bytes
+    constexpr std::uint64_t kSpread = 0x0002040810204081ull;  // bit k to bit 8 k, after masking
+    const std::uint64_t mask = bits(touched) & 0xffu;
+    const std::uint64_t low = (mask & 0x7f) * kSpread & 0x0101010101010101ull;
+    pairs |= (low | (mask >> 7) << 56) << i;
+  }
+  if (pairs == 0) return;
+  decode(map, leaf);
+  for (std::size_t g = 0; g < kGroups; ++g) {
+    const auto which = static_cast<std::uint32_t>(pairs >> (8 * g)) & 0xffu;
+    if (which != 0 && (p.failed >> g & 1u) == 0) meet_group(map, p, g, leaf, which);
+  }
+}
+
+HWY_INLINE void walk(const KernelMap& map, Packet& p) {
+  Entry stack[kStack];
+  std::size_t depth = 0;
+  stack[depth++] = {0.0f, 0, Bvh8Node::kInner};
+  std::size_t steps = map.node_count * 8 + 8;  // more visits than children: a cycle
+  alignas(32) float distances[8];
+  while (depth > 0 && steps-- > 0) {
+    const Entry entry = stack[--depth];
+    if (entry.t > p.end) continue;
+    if (entry.meta != Bvh8Node::kInner) {
+      visit_leaf(map, p, entry);
+      continue;
+    }
+    if (entry.index >= map.node_count) continue;
+    const Bvh8Node& node = map.nodes[entry.index];
+    depth = push_children(map, node, test_node(p, node, distances), distances, stack, depth);
+  }
+}
+
+HWY_INLINE void finish(const KernelMap& map,
+                       const Group& group,
+                       const std::uint32_t* order,
+                       KernelHit* hits) {
+  const F8 first = load(group.first);
+  I8 weight = splat_int(0);
+  I8 depth = splat_int(0);
+  I8 cosine = splat_int(0);
+  I8 largest = splat_int(-1);
+  I8 strongest = splat_int(0);
+  const HitRows& rows = group.rows;
+  for (std::size_t i = 0; i < rows.count; ++i) {
+    const F8 t = load(rows.t[i]);
+    const I8 w = load(rows.weight[i]);
+    const Shares shares = shares_of(map, first, t, w, load(rows.cosine[i]));
+    weight = weight + shares.weight;
+    depth = depth + shares.depth;
+    cosine = cosine + shares.cosine;
+    const M8 inside = (first <= t) & (t <= first + splat(map.window));
+    const auto word = static_cast<std::int32_t>(rows.word[i]);
+    const M8 larger = (largest < w) & inside;
+    const M8 same = (largest == w) & (splat_int(word) < strongest) & inside;
+    largest = select(larger, w, largest);
+    strongest = select(larger, splat_int(word), select(same, splat_int(word), strongest));
+  }
+  alignas(32) std::int32_t sums[4][8];
+  store(weight, sums[0]);
+  store(depth, sums[1]);
+  store(cosine, sums[2]);
+  store(strongest, sums[3]);
+  for (std::size_t i = 0; i < 8; ++i) {
+    hits[order[i]] = group.first[i] == kNever ? KernelHit{}
+                                              : return_of(map,
+                                                          group.first[i],
+                                                          sums[0][i],
+                                                          sums[1][i],
+                                                          sums[2][i],
+                                                          static_cast<std::uint32_t>(sums[3][i]));
+  }
+}
+
+static std::uint64_t trace(const KernelMap& map,
+                           const Ray* rays,
+                           const std::uint32_t* order,
+                           std::size_t count,
+                           BeamGrouping grouping,
+                           KernelHit* hits) {
+  std::uint64_t overflows = 0;
+  std::size_t at = 0;
+  std::size_t singly = 0;  // beams before `at` that wait for single rays
+  Packet packet;           // NOLINT(cppcoreguidelines-pro-type-member-init): by gather
+  const auto trace_waiting = [&] {
+    if (singly == 0) return;
+    overflows += trace_singly(map, rays, order + at - singly, singly, hits);
+    singly = 0;
+  };
+  const bool packets = grouping == BeamGrouping::kAsSuits && map.node_count > 0;
+  while (packets && at + kPacket <= count) {
+    if (!gather(map, rays, order + at, packet)) {
+      at += kPacket;
+      singly += kPacket;
+      continue;
+    }
+    trace_waiting();
+    walk(map, packet);
+    for (std::size_t g = 0; g < kGroups; ++g) {
+      const std::uint32_t* beams = order + at + 8 * g;
+      if ((packet.failed >> g & 1u) != 0) {
+        overflows += trace_singly(map, rays, beams, 8, hits);
+      } else {
+        finish(map, packet.groups[g], beams, hits);
+      }
+    }
+    at += kPacket;
+  }
+  singly += count - at;
+  at = count;
+  trace_waiting();
+  return overflows;
+}
+
+}  // namespace pointflight::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif
