@@ -29,7 +29,7 @@ struct FidelityFlags {
   double density_min = 2000.0;
   std::string lidar;
   std::vector<std::string> renderers = {"beam"};
-  double tau = static_cast<double>(RenderModel{}.tau);
+  double tau = 0.0;  ///< 0: by the density.
   std::size_t poses = 8;
   std::size_t beams = 20000;
   std::uint64_t seed = 1;
@@ -118,7 +118,7 @@ std::shared_ptr<const SurfelMap> import_scene(const ExactScene& scene,
                                               const Progress& progress) {
   ImportOptions options;
   options.resolution = sampling.resolution;
-  options.model.tau = static_cast<float>(flags.tau);
+  if (flags.tau > 0.0) options.tau = static_cast<float>(flags.tau);
   const ImportedMap map = build_map(
       {scene.name},
       [&](std::size_t) { return sampled_cloud(scene, sampling); },
@@ -184,7 +184,7 @@ void run_scene(const ExactScene& scene,
                          {"points_per_cell", flags.points_per_cell},
                          {"beams", beams.plan.name},
                          {"renderer", name},
-                         {"tau", flags.tau},
+                         {"tau", map->model().tau},
                          {"seed", flags.seed},
                          {"surfels", map->surfel_count()},
                          {"all", to_json(report.all)},
@@ -263,9 +263,8 @@ void add_fidelity_command(CLI::App& parent, int& /*exit_code*/) {
       ->delimiter(',')
       ->check(CLI::IsMember(renderer_names()))
       ->capture_default_str();
-  app->add_option("--tau", flags->tau, "Coverage that makes a return")
-      ->check(within(0.05, 1.0))
-      ->capture_default_str();
+  app->add_option("--tau", flags->tau, "Coverage that makes a return (default: by the density)")
+      ->check(within(0.05, 1.0));
   app->add_option("--poses", flags->poses, "Random ones where a scene has none of its own")
       ->check(CLI::Range(1, 100000))
       ->capture_default_str();

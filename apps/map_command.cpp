@@ -25,6 +25,7 @@ struct ImportFlags {
   double resolution = 0.0;
   double scale = 1.0;
   std::string up = "z";
+  double tau = 0.0;  ///< 0: by the density.
   bool keep_outliers = false;
   int outlier_neighbours = 8;
   double outlier_sigmas = OutlierOptions{}.sigmas;
@@ -68,6 +69,9 @@ void print_report(const ImportReport& r, const ImportOptions& options) {
   if (r.grown_surfels > 0) {
     log(fmt::format("thin scan     {} surfels widened to close gaps", r.grown_surfels));
   }
+  log(fmt::format("coverage      {:.2f} makes a return ({:.0f} points a planar cell)",
+                  r.tau,
+                  r.points_per_cell));
   log(fmt::format("surfels       {}, {:.0f} % planar{}",
                   short_count(static_cast<double>(r.surfels)),
                   100.0 * static_cast<double>(r.planar_surfels) /
@@ -81,6 +85,7 @@ void import_map(const ImportFlags& flags) {
   if (flags.resolution > 0.0) options.resolution = flags.resolution;
   options.scale = flags.scale;
   options.up = flags.up.front();
+  if (flags.tau > 0.0) options.tau = static_cast<float>(flags.tau);
   options.outliers.enabled = !flags.keep_outliers;
   options.outliers.neighbours = flags.outlier_neighbours;
   options.outliers.sigmas = flags.outlier_sigmas;
@@ -119,6 +124,11 @@ void add_import(CLI::App& parent) {
   app->add_option("--up", flags->up, "The files' up axis; y is turned to z")
       ->check(CLI::IsMember({"y", "z"}))
       ->capture_default_str();
+  app->add_option("--tau",
+                  flags->tau,
+                  "Coverage that makes a return, 0.3 (fewest holes) to 0.5 (sharpest edges); "
+                  "default: by the density of the points")
+      ->check(within(0.05, 1.0));
   app->add_flag("--keep-outliers",
                 flags->keep_outliers,
                 "No outlier removal (thin wires, very uneven clouds)");

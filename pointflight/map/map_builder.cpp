@@ -223,10 +223,29 @@ class Import {
     for (const BuildSurfel& surfel : surfels) {
       report.planar_surfels += surfel.s[0] <= kPlanarThickness ? 1 : 0;
     }
+    choose_tau(surfels);
     if (report.has_intensity) set_intensities(surfels);
     pointflight::report(progress_, "building the hierarchy", 0.5);
     map_.tree = build_bvh8(surfels, report.resolution);
     pointflight::report(progress_, "building the hierarchy", 1.0);
+  }
+
+  /// Dense maps have few holes to bridge and can have sharper edges.
+  void choose_tau(const std::vector<BuildSurfel>& surfels) {
+    constexpr double kThin = 16.0;
+    constexpr double kDense = 40.0;
+    ImportReport& report = map_.report;
+    std::vector<std::uint32_t> counts;
+    for (std::size_t i = 0; i < surfels.size(); ++i) {
+      if (surfels[i].s[0] <= kPlanarThickness) counts.push_back(grid_->cells()[i].n);
+    }
+    if (!counts.empty()) {
+      const auto middle = counts.begin() + static_cast<std::ptrdiff_t>(counts.size() / 2);
+      std::nth_element(counts.begin(), middle, counts.end());
+      report.points_per_cell = *middle;
+    }
+    const double share = std::clamp((report.points_per_cell - kThin) / (kDense - kThin), 0.0, 1.0);
+    report.tau = options_.tau.value_or(static_cast<float>(0.30 + 0.10 * share));
   }
 
   /// Mean intensity of each cell as a byte between the least and the greatest.
@@ -258,7 +277,7 @@ class Import {
     d.origin_world = grid_->base_world() +
                      report.resolution * Vector3d(min_voxel_[0], min_voxel_[1], min_voxel_[2]);
     for (const VoxelCell& cell : grid_->cells()) d.bounds_world.add(grid_->centroid_world(cell));
-    d.model = options_.model;
+    d.model.tau = report.tau;
     d.has_intensity = report.has_intensity;
     d.surfel_count = report.surfels;
     nlohmann::ordered_json json;
@@ -285,6 +304,8 @@ class Import {
                           {"too_thick", report.projection.too_thick}};
     json["surfels"] = report.surfels;
     json["planar_surfels"] = report.planar_surfels;
+    json["points_per_planar_cell"] = report.points_per_cell;
+    json["tau"] = static_cast<double>(report.tau);
     json["grown_surfels"] = report.grown_surfels;
     json["has_intensity"] = report.has_intensity;
     d.metadata = json.dump(1, ' ', false, nlohmann::json::error_handler_t::replace);

@@ -20,7 +20,7 @@ struct ImportOptions {
   double scale = 1.0;                ///< Metres per unit of the file.
   char up = 'z';                     ///< The file's up axis: 'z', or 'y' (turned to z).
   OutlierOptions outliers;
-  RenderModel model;
+  std::optional<float> tau;  ///< Coverage that makes a return; without it by the density.
 };
 
 /// What an import did, for the user and for the map's metadata.
@@ -36,6 +36,8 @@ struct ImportReport {
   std::uint64_t planar_surfels = 0;
   double noise = 0.0;  ///< Deviation of the points across flat surfaces, m.
   ProjectionReport projection;
+  double points_per_cell = 0.0;     ///< Median of the planar cells.
+  float tau = 0.0f;                 ///< Coverage that makes a return.
   std::uint64_t grown_surfels = 0;  ///< Widened where the scan is thin.
   double resolution = 0.0;
   double spacing = 0.0;               ///< Median nearest-neighbour distance, m; 0 if unknown.

@@ -10,6 +10,13 @@ namespace pointflight {
 namespace {
 
 constexpr double kPriorPoints = 8.0;
+// share of the surroundings' spread that a cell without a plane may have: less leaks at thin
+// things, more draws them fatter (docs/fidelity.md)
+constexpr double kLoosePrior = 0.65;
+// planar surroundings with few points: a cell's own spread is chance, and where it comes out small
+// beams get through the wall; above, it tells how much of the cell the surface fills
+constexpr double kWatertight = 0.28;  // r; a filled cell has 0.289
+constexpr double kTrustedPoints = 40.0;
 
 /// Frame with the plane's normal first and the cell's own longest direction last.
 Matrix3d planar_frame(const CovarianceAxes& plane, const CovarianceAxes& own) {
@@ -46,7 +53,7 @@ BuildSurfel fit(const VoxelGrid& grid, const VoxelCell& cell) {
     const double variance = axis.dot(own_covariance * axis);
     double prior = cell_variance;
     if (!planar) {
-      prior = std::min(prior, around.lambda[k] / 2.0);
+      prior = std::min(prior, kLoosePrior * around.lambda[k]);
     } else if (k == 1 && around.lambda[1] < 0.1 * around.lambda[2]) {
       prior = std::min(prior, around.lambda[1]);
     }
@@ -59,8 +66,10 @@ BuildSurfel fit(const VoxelGrid& grid, const VoxelCell& cell) {
     s[k] = std::sqrt(std::max(0.0, shrunk)) / r;
   }
   if (planar) s[0] = static_cast<double>(kPlanarThickness);
-  s[1] = std::clamp(s[1], static_cast<double>(kMinSpread), 0.45);
-  s[2] = std::clamp(s[2], static_cast<double>(kMinSpread), 0.45);
+  const bool surface = neighbours_planar && around.lambda[1] >= 0.1 * around.lambda[2];
+  const double floor = surface && own.n <= kTrustedPoints ? kWatertight : double{kMinSpread};
+  s[1] = std::clamp(s[1], floor, 0.45);
+  s[2] = std::clamp(s[2], floor, 0.45);
   Matrix3d ordered = frame;
   if (s[1] > s[2]) {
     std::swap(s[1], s[2]);

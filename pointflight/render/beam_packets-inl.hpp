@@ -20,12 +20,11 @@ inline constexpr std::size_t kPacket = 8 * kGroups;
 /// Rows of hits of one group: beyond, its beams are traced singly.
 inline constexpr std::size_t kRows = 96;
 /// Wider groups (tangent of half the angle) meet so many surfels apart that single rays are faster.
-inline constexpr float kWidestGroup = 0.03f;
+inline constexpr float kWidestGroup = 0.012f;
 
 /// Hits of eight beams: a row is one surfel, lanes that it does not meet hold kNever and weight 0.
 struct HitRows {
   std::size_t count;
-  std::size_t evaluated;  ///< Rows that find_surfaces has seen.
   alignas(32) float t[kRows][8];
   alignas(32) std::int32_t weight[kRows][8];
   alignas(32) float cosine[kRows][8];
@@ -38,6 +37,7 @@ struct Group {
   alignas(32) float end[8];
   alignas(32) float first[8];
   alignas(32) std::int32_t total[8];
+  alignas(32) float nearest[8];  ///< The least t of all hits.
   double origin[3][8];
   HitRows rows;
 };
@@ -51,7 +51,7 @@ struct Packet {
   bool one_origin;
   float plane[4][3];               ///< Inward normals of the frustum's sides.
   float offset[4];                 ///< n . (p - apex) >= offset inside.
-  std::uint32_t plane_side[4][3];  ///< Byte of the node where the corner farthest inside is.
+  std::uint32_t plane_side[4][3];  ///< Of the box: where its corner farthest inside is.
   int main_axis;
   std::uint32_t main_side;
   float main_step;       ///< 1 / (greatest component along the main axis), signed.
@@ -111,6 +111,7 @@ HWY_INLINE bool gather(const KernelMap& map,
       group.end[i] = ray.range_max;
       group.first[i] = kNever;
       group.total[i] = 0;
+      group.nearest[i] = kNever;
       for (int k = 0; k < 3; ++k) group.origin[k][i] = ray.origin_world[k] - map.origin[k];
       farthest = std::max(farthest, ray.range_max);
     }
@@ -121,7 +122,6 @@ HWY_INLINE bool gather(const KernelMap& map,
     p.tangent[g] = tangent * 1.001f + 1e-6f;
     p.group_end[g] = farthest;
     group.rows.count = 0;
-    group.rows.evaluated = 0;
   }
 
   for (int k = 0; k < 3; ++k) {
@@ -143,16 +143,12 @@ HWY_INLINE bool gather(const KernelMap& map,
     for (int axis = 0; axis < 3; ++axis) {
       p.plane[k][axis] = normals[k][axis];
       p.plane_side[k][axis] =
-          static_cast<std::uint32_t>(normals[k][axis] > 0.0f ? offsetof(Bvh8Node, hi)
-                                                             : offsetof(Bvh8Node, lo)) +
-          8u * static_cast<std::uint32_t>(axis);
+          static_cast<std::uint32_t>(axis) + (normals[k][axis] > 0.0f ? 3u : 0u);
     }
   }
   p.main_axis = main_axis;
   const bool forward = mean[main_axis] > 0.0f;
-  p.main_side =
-      static_cast<std::uint32_t>(forward ? offsetof(Bvh8Node, lo) : offsetof(Bvh8Node, hi)) +
-      8u * static_cast<std::uint32_t>(main_axis);
+  p.main_side = static_cast<std::uint32_t>(main_axis) + (forward ? 0u : 3u);
   p.main_step = (forward ? 1.0f : -1.0f) / (greatest_component * 1.0001f);
   p.main_offset = (forward ? spread : -spread) * 1.001f;
   return true;
@@ -160,23 +156,27 @@ HWY_INLINE bool gather(const KernelMap& map,
 
 /// Which children the frustum may touch, and a lower bound of the distance to each.
 HWY_INLINE std::uint32_t test_node(const Packet& p, const Bvh8Node& node, float* distances) {
-  const auto* bytes = reinterpret_cast<const std::uint8_t*>(&node);
+  // lo x, y, z, hi x, y, z of the children, metres from the node's corner
+  alignas(32) float sides[6][8];
+  const F8 scale = splat(node.scale);
+  for (int k = 0; k < 3; ++k) {
+    store(load_bytes(node.lo[k]) * scale, sides[k]);
+    store(load_bytes(node.hi[k]) * scale, sides[k + 3]);
+  }
   float corner[3];
   for (int axis = 0; axis < 3; ++axis) corner[axis] = node.origin[axis] - p.apex_box[axis];
-  const F8 near_plane = load_bytes(bytes + p.main_side);
-  const F8 distance = max(splat(0.0f),
-                          splat((corner[p.main_axis] - p.main_offset) * p.main_step) +
-                              near_plane * splat(node.scale * p.main_step));
+  const F8 distance = max(
+      splat(0.0f),
+      (splat(corner[p.main_axis] - p.main_offset) + load(sides[p.main_side])) * splat(p.main_step));
   store(distance, distances);
   F8 inside = splat(p.end) - distance;
   for (int k = 0; k < 4; ++k) {
     const float* n = p.plane[k];
-    const float base = n[0] * corner[0] + n[1] * corner[1] + n[2] * corner[2] - p.offset[k];
-    F8 depth = splat(base);
-    for (int axis = 0; axis < 3; ++axis) {
-      depth = depth + splat(n[axis] * node.scale) * load_bytes(bytes + p.plane_side[k][axis]);
-    }
-    inside = min(inside, depth);
+    const std::uint32_t* side = p.plane_side[k];
+    const F8 depth = splat(n[0]) * (splat(corner[0]) + load(sides[side[0]])) +
+                     splat(n[1]) * (splat(corner[1]) + load(sides[side[1]])) +
+                     splat(n[2]) * (splat(corner[2]) + load(sides[side[2]]));
+    inside = min(inside, depth - splat(p.offset[k]));
   }
   return bits(splat(-1e-4f * node.scale) <= inside);
 }
@@ -229,8 +229,9 @@ HWY_INLINE void drop_behind(HitRows& rows, const F8& end) {
 /// Looks for the surfaces of a group that has new hits.
 HWY_INLINE void shorten(const KernelMap& map, Packet& p, std::size_t g) {
   Group& group = p.groups[g];
-  const I8 tau = splat_int(map.tau - 1);
-  if (bits(tau < load(group.total)) == 0) return;
+  // where the nearest hit begins the surface, farther ones cannot move it
+  const M8 open = load(group.nearest) < load(group.first);
+  if (bits(open & (splat_int(map.tau - 1) < load(group.total))) == 0) return;
   const F8 first = find_surfaces(map, group.rows);
   const M8 found = first < splat(kNever);
   if (bits(found) == 0) return;
@@ -243,33 +244,32 @@ HWY_INLINE void shorten(const KernelMap& map, Packet& p, std::size_t g) {
   if (group.rows.count > 12) drop_behind(group.rows, end);
 }
 
-/// What the groups need of a leaf's surfels, one a lane or, behind `decode`, one an index.
+/// What the groups need of a leaf's surfels.
 struct PacketLeaf {
   SurfelLanes lanes;
-  alignas(32) float x[8], y[8], z[8];
-  alignas(32) float shape[12][8];
   double corner[3];  ///< The leaf's origin from the map's origin, m.
   std::uint32_t first_word;
+  // after `decode`: one value a surfel
+  alignas(32) float shape[10][8];
+  alignas(32) float center[3][8];    ///< From the leaf's origin, m.
+  alignas(32) float whitened[3][8];  ///< From the apex: what all beams share where origins agree.
 };
 
-HWY_INLINE void decode(const KernelMap& map, PacketLeaf& leaf) {
+HWY_INLINE void decode(const KernelMap& map, const Packet& p, PacketLeaf& leaf) {
   const Shapes e = decode_shapes(map, leaf.lanes);
-  store(leaf.lanes.x, leaf.x);
-  store(leaf.lanes.y, leaf.y);
-  store(leaf.lanes.z, leaf.z);
-  const F8* const all[12] = {&e.e0x,
-                             &e.e0y,
-                             &e.e0z,
-                             &e.e1x,
-                             &e.e1y,
-                             &e.e1z,
-                             &e.e2x,
-                             &e.e2y,
-                             &e.e2z,
-                             &e.inverse0,
-                             &e.inverse1,
-                             &e.inverse2};
-  for (int k = 0; k < 12; ++k) store(*all[k], leaf.shape[k]);
+  const F8* const all[10] = {
+      &e.m0x, &e.m0y, &e.m0z, &e.m1x, &e.m1y, &e.m1z, &e.m2x, &e.m2y, &e.m2z, &e.s0};
+  for (int k = 0; k < 10; ++k) store(*all[k], leaf.shape[k]);
+  store(leaf.lanes.x, leaf.center[0]);
+  store(leaf.lanes.y, leaf.center[1]);
+  store(leaf.lanes.z, leaf.center[2]);
+  const Whitened u = whiten(e,
+                            leaf.lanes.x + splat(static_cast<float>(leaf.corner[0] - p.apex[0])),
+                            leaf.lanes.y + splat(static_cast<float>(leaf.corner[1] - p.apex[1])),
+                            leaf.lanes.z + splat(static_cast<float>(leaf.corner[2] - p.apex[2])));
+  store(u.x, leaf.whitened[0]);
+  store(u.y, leaf.whitened[1]);
+  store(u.z, leaf.whitened[2]);
 }
 
 HWY_INLINE Shapes shape_at(const PacketLeaf& leaf, std::size_t i) {
@@ -283,63 +283,54 @@ HWY_INLINE Shapes shape_at(const PacketLeaf& leaf, std::size_t i) {
           splat(s[6][i]),
           splat(s[7][i]),
           splat(s[8][i]),
-          splat(s[9][i]),
-          splat(s[10][i]),
-          splat(s[11][i])};
+          splat(s[9][i])};
 }
 
 /// Tests the surfels of `which` against the eight beams of a group.
+template <bool kOneOrigin>
 HWY_INLINE void meet_group(
     const KernelMap& map, Packet& p, std::size_t g, const PacketLeaf& leaf, std::uint32_t which) {
   Group& group = p.groups[g];
-  F8 vx;
-  F8 vy;
-  F8 vz;
-  if (p.one_origin) {
-    vx = splat(static_cast<float>(leaf.corner[0] - p.apex[0]));
-    vy = splat(static_cast<float>(leaf.corner[1] - p.apex[1]));
-    vz = splat(static_cast<float>(leaf.corner[2] - p.apex[2]));
-  } else {
-    alignas(32) float v[3][8];
+  alignas(32) float from[3][8];  // the leaf's origin from the beams'
+  if constexpr (!kOneOrigin) {
     for (int axis = 0; axis < 3; ++axis) {
       for (std::size_t i = 0; i < 8; ++i) {
-        v[axis][i] = static_cast<float>(leaf.corner[axis] - group.origin[axis][i]);
+        from[axis][i] = static_cast<float>(leaf.corner[axis] - group.origin[axis][i]);
       }
     }
-    vx = load(v[0]);
-    vy = load(v[1]);
-    vz = load(v[2]);
   }
   const F8 dx = load(group.dx);
   const F8 dy = load(group.dy);
   const F8 dz = load(group.dz);
-  const F8 t_leaf = dx * vx + dy * vy + dz * vz;
-  const F8 base_x = dx * t_leaf - vx;
-  const F8 base_y = dy * t_leaf - vy;
-  const F8 base_z = dz * t_leaf - vz;
   const F8 end = load(group.end);
   const F8 support = splat(map.support_squared);
   I8 total = load(group.total);
+  F8 nearest = load(group.nearest);
   HitRows& rows = group.rows;
   const std::size_t before = rows.count;
   for (; which != 0; which &= which - 1) {
     const auto i = static_cast<std::size_t>(std::countr_zero(which));
-    const Meeting meeting = meet(shape_at(leaf, i),
-                                 splat(leaf.x[i]) - base_x,
-                                 splat(leaf.y[i]) - base_y,
-                                 splat(leaf.z[i]) - base_z,
-                                 dx,
-                                 dy,
-                                 dz);
-    const F8 t = t_leaf + meeting.t;
-    const M8 accepted = (meeting.m2 < support) & (splat(0.0f) <= t) & (t <= end);
+    const Shapes e = shape_at(leaf, i);
+    Whitened u;  // NOLINT(cppcoreguidelines-pro-type-member-init): written below
+    if constexpr (kOneOrigin) {
+      u = {splat(leaf.whitened[0][i]), splat(leaf.whitened[1][i]), splat(leaf.whitened[2][i])};
+    } else {
+      u = whiten(e,
+                 splat(leaf.center[0][i]) + load(from[0]),
+                 splat(leaf.center[1][i]) + load(from[1]),
+                 splat(leaf.center[2][i]) + load(from[2]));
+    }
+    const Meeting meeting = meet(u, whiten(e, dx, dy, dz), e.s0);
+    const M8 accepted = (meeting.m2 < support) & (splat(0.0f) <= meeting.t) & (meeting.t <= end);
     if (bits(accepted) == 0) continue;
     if (rows.count == kRows) {
       p.failed |= 1u << g;
       return;
     }
     const I8 weight = keep(accepted, weights_of(map, meeting.m2));
-    store(select(accepted, t, splat(kNever)), rows.t[rows.count]);
+    const F8 met = select(accepted, meeting.t, splat(kNever));
+    nearest = min(nearest, met);
+    store(met, rows.t[rows.count]);
     store(weight, rows.weight[rows.count]);
     store(meeting.cosine, rows.cosine[rows.count]);
     rows.word[rows.count++] = leaf.first_word + static_cast<std::uint32_t>(i);
@@ -347,6 +338,7 @@ HWY_INLINE void meet_group(
   }
   if (rows.count == before) return;
   store(total, group.total);
+  store(nearest, group.nearest);
   shorten(map, p, g);
 }
 
@@ -395,10 +387,15 @@ HWY_INLINE void visit_leaf(const KernelMap& map, Packet& p, const Entry& entry) 
     pairs |= (low | (mask >> 7) << 56) << i;
   }
   if (pairs == 0) return;
-  decode(map, leaf);
+  decode(map, p, leaf);
   for (std::size_t g = 0; g < kGroups; ++g) {
     const auto which = static_cast<std::uint32_t>(pairs >> (8 * g)) & 0xffu;
-    if (which != 0 && (p.failed >> g & 1u) == 0) meet_group(map, p, g, leaf, which);
+    if (which == 0 || (p.failed >> g & 1u) != 0) continue;
+    if (p.one_origin) {
+      meet_group<true>(map, p, g, leaf, which);
+    } else {
+      meet_group<false>(map, p, g, leaf, which);
+    }
   }
 }
 
