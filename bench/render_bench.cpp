@@ -28,6 +28,8 @@ struct Flags {
   std::vector<double> resolutions = {0.05};
   std::vector<std::string> patterns = {"avia_grid", "mid360_uniform", "vlp32_grid"};
   std::vector<std::string> contestants;
+  std::string kernel;
+  bool high = false;
   int repeats = 5;
   bool json = false;
 };
@@ -42,11 +44,14 @@ double wall_seconds() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
-std::shared_ptr<const SurfelMap> map_of(const ExactScene& scene, double resolution) {
+std::shared_ptr<const SurfelMap> map_of(const ExactScene& scene,
+                                        double resolution,
+                                        TreeQuality quality) {
   SceneSampling sampling;
   sampling.resolution = resolution;
   ImportOptions options;
   options.resolution = resolution;
+  options.quality = quality;
   const ImportedMap map = build_map(
       {scene.name},
       [&](std::size_t) { return sampled_cloud(scene, sampling); },
@@ -270,7 +275,8 @@ void run(const Flags& flags) {
   for (const std::string& name : flags.scenes) {
     const ExactScene scene = load_scene(name);
     for (const double resolution : flags.resolutions) {
-      const auto map = map_of(scene, resolution);
+      const auto map =
+          map_of(scene, resolution, flags.high ? TreeQuality::kHigh : TreeQuality::kNormal);
       const EmbreeDiscs embree(*map);
       for (const std::string& pattern : flags.patterns) {
         cases.push_back(measure(map, embree, scene, plan_of(pattern), flags));
@@ -292,9 +298,12 @@ int main(int argc, char** argv) {
   app.add_option("--only", flags.contestants, "Some of: beam, embree1, embree8, paper, ...")
       ->delimiter(',');
   app.add_option("--repeats", flags.repeats);
+  app.add_flag("--high", flags.high, "Maps as by import --quality high");
+  app.add_option("--kernel", flags.kernel, "AVX3, AVX2, SSE4 (default: the best)");
   app.add_flag("--json", flags.json, "JSON on stdout");
   CLI11_PARSE(app, argc, argv);
   try {
+    pointflight::use_kernel(flags.kernel);
     pointflight::run(flags);
   } catch (const std::exception& error) {
     fmt::print(stderr, "{}\n", error.what());

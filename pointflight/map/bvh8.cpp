@@ -5,6 +5,7 @@
 #include <bit>
 #include <cassert>
 #include <cmath>
+#include <numeric>
 
 #include "pointflight/geometry/morton.hpp"
 
@@ -31,10 +32,16 @@ struct Box {
 
 class Builder {
  public:
-  Builder(const std::vector<BuildSurfel>& surfels, double resolution)
-      : surfels_(surfels), r_(resolution) {}
+  Builder(const std::vector<BuildSurfel>& surfels, double resolution, TreeQuality quality)
+      : surfels_(surfels), r_(resolution), quality_(quality), order_(surfels.size()) {
+    std::iota(order_.begin(), order_.end(), 0u);
+  }
 
   Bvh8 build() {
+    if (quality_ == TreeQuality::kHigh) {
+      boxes_.reserve(surfels_.size());
+      for (const BuildSurfel& surfel : surfels_) boxes_.push_back(loose_box(surfel));
+    }
     if (!surfels_.empty()) {
       tree_.nodes.emplace_back();
       const Box box = build_node(0, {0, surfels_.size()});
@@ -56,7 +63,7 @@ class Builder {
     while (count < 8) {
       std::size_t largest = count;
       for (std::size_t i = 0; i < count; ++i) {
-        const bool larger = largest == count || children[i].count() > children[largest].count();
+        const bool larger = largest == count || size_of(children[i]) > size_of(children[largest]);
         if (larger && !is_leaf(children[i])) largest = i;
       }
       if (largest == count) break;
@@ -113,10 +120,10 @@ class Builder {
 
   using Voxel = std::array<std::uint32_t, 3>;
   [[nodiscard]] std::pair<Voxel, Voxel> voxel_bounds(const Range& range) const {
-    Voxel min = morton_decode(surfels_[range.begin].morton);
+    Voxel min = morton_decode(at(range.begin).morton);
     Voxel max = min;
     for (std::size_t i = range.begin + 1; i < range.end; ++i) {
-      const Voxel voxel = morton_decode(surfels_[i].morton);
+      const Voxel voxel = morton_decode(at(i).morton);
       for (std::size_t axis = 0; axis < 3; ++axis) {
         min[axis] = std::min(min[axis], voxel[axis]);
         max[axis] = std::max(max[axis], voxel[axis]);
@@ -125,8 +132,109 @@ class Builder {
     return {min, max};
   }
 
+  [[nodiscard]] const BuildSurfel& at(std::size_t i) const { return surfels_[order_[i]]; }
+
+  /// What makes a child worth opening: its surfels, or the chance that a ray comes by.
+  [[nodiscard]] double size_of(const Range& range) const {
+    if (quality_ == TreeQuality::kNormal) return static_cast<double>(range.count());
+    Box box;
+    for (std::size_t i = range.begin; i < range.end; ++i) box.add(boxes_[order_[i]]);
+    return area_of(box);
+  }
+
+  static double area_of(const Box& box) {
+    const Vector3f d = box.max - box.min;
+    return static_cast<double>(d.x() * d.y() + d.y() * d.z() + d.z() * d.x());
+  }
+
+  [[nodiscard]] std::size_t split(const Range& range) {
+    return quality_ == TreeQuality::kHigh ? split_by_area(range) : split_by_key(range);
+  }
+
+  /// Surface area heuristic in 16 bins an axis; a part of n surfels costs its area times the leaves
+  /// that it will have.
+  [[nodiscard]] std::size_t split_by_area(const Range& range) {
+    constexpr std::size_t kBins = 16;
+    Vector3f low = Vector3f::Constant(std::numeric_limits<float>::infinity());
+    Vector3f high = -low;
+    for (std::size_t i = range.begin; i < range.end; ++i) {
+      const Vector3f c = center_of(boxes_[order_[i]]);
+      low = low.cwiseMin(c);
+      high = high.cwiseMax(c);
+    }
+    double best_cost = std::numeric_limits<double>::infinity();
+    int best_axis = -1;
+    std::size_t best_bin = 0;
+    for (int axis = 0; axis < 3; ++axis) {
+      if (!(high[axis] > low[axis])) continue;
+      std::array<Box, kBins> bins;
+      std::array<std::size_t, kBins> counts{};
+      const float scale = bins_per_metre(low[axis], high[axis], kBins);
+      for (std::size_t i = range.begin; i < range.end; ++i) {
+        const Box& box = boxes_[order_[i]];
+        const std::size_t bin = bin_of(center_of(box)[axis], low[axis], scale, kBins);
+        bins[bin].add(box);
+        ++counts[bin];
+      }
+      // costs of the upper parts, then of the lower ones
+      std::array<double, kBins> above{};
+      Box box;
+      std::size_t count = 0;
+      for (std::size_t bin = kBins - 1; bin > 0; --bin) {
+        box.add(bins[bin]);
+        count += counts[bin];
+        above[bin] = count == 0 ? 0.0 : area_of(box) * leaves_of(count);
+      }
+      box = {};
+      count = 0;
+      for (std::size_t bin = 0; bin + 1 < kBins; ++bin) {
+        box.add(bins[bin]);
+        count += counts[bin];
+        if (count == 0 || count == range.count()) continue;
+        const double cost = area_of(box) * leaves_of(count) + above[bin + 1];
+        if (cost < best_cost) {
+          best_cost = cost;
+          best_axis = axis;
+          best_bin = bin;
+        }
+      }
+    }
+    if (best_axis < 0) return split_in_halves(range);
+    const float scale = bins_per_metre(low[best_axis], high[best_axis], kBins);
+    const auto middle = std::stable_partition(
+        order_.begin() + static_cast<std::ptrdiff_t>(range.begin),
+        order_.begin() + static_cast<std::ptrdiff_t>(range.end),
+        [&](std::uint32_t i) {
+          return bin_of(center_of(boxes_[i])[best_axis], low[best_axis], scale, kBins) <= best_bin;
+        });
+    return static_cast<std::size_t>(middle - order_.begin());
+  }
+
+  /// All centres at one place.
+  static std::size_t split_in_halves(const Range& range) { return range.begin + range.count() / 2; }
+
+  static Vector3f center_of(const Box& box) { return 0.5f * (box.min + box.max); }
+  static float bins_per_metre(float low, float high, std::size_t bins) {
+    return static_cast<float>(bins) / (high - low);
+  }
+  static std::size_t bin_of(float x, float low, float scale, std::size_t bins) {
+    return std::min(bins - 1, static_cast<std::size_t>((x - low) * scale));
+  }
+  static double leaves_of(std::size_t count) {
+    return std::ceil(static_cast<double>(count) / static_cast<double>(kMaxLeafSurfels));
+  }
+
+  /// Box of the support before packing, metres from the map's origin.
+  [[nodiscard]] Box loose_box(const BuildSurfel& surfel) const {
+    Surfel whole;
+    whole.center_voxels = surfel.center_in_voxel;
+    whole.axes = surfel.axes;
+    whole.s = surfel.s;
+    return support_box(whole, morton_decode(surfel.morton));
+  }
+
   /// First surfel whose key has the range's highest differing bit set.
-  [[nodiscard]] std::size_t split(const Range& range) const {
+  [[nodiscard]] std::size_t split_by_key(const Range& range) const {
     const std::uint64_t first = surfels_[range.begin].morton;
     const std::uint64_t last = surfels_[range.end - 1].morton;
     assert(first < last);
@@ -147,7 +255,7 @@ class Builder {
     tree_.intensity.push_back(0);
     Box box;
     for (std::size_t i = range.begin; i < range.end; ++i) {
-      const BuildSurfel& surfel = surfels_[i];
+      const BuildSurfel& surfel = at(i);
       const Voxel voxel = morton_decode(surfel.morton);
       Surfel packed;
       for (std::size_t a = 0; a < 3; ++a) {
@@ -207,13 +315,16 @@ class Builder {
 
   const std::vector<BuildSurfel>& surfels_;
   double r_;
+  TreeQuality quality_;
+  std::vector<std::uint32_t> order_;  ///< Of the surfels in the leaves; by Morton code at first.
+  std::vector<Box> boxes_;            ///< For kHigh.
   Bvh8 tree_;
 };
 
 }  // namespace
 
-Bvh8 build_bvh8(const std::vector<BuildSurfel>& surfels, double resolution) {
-  return Builder(surfels, resolution).build();
+Bvh8 build_bvh8(const std::vector<BuildSurfel>& surfels, double resolution, TreeQuality quality) {
+  return Builder(surfels, resolution, quality).build();
 }
 
 }  // namespace pointflight

@@ -45,9 +45,15 @@ struct Bvh8 {
   Aabb bounds;                          ///< Of the support ellipsoids, metres from the origin.
 };
 
+/// How much work goes into the tree: `kHigh` makes rays faster and the build slower.
+enum class TreeQuality { kNormal, kHigh };
+
 /// Builds the hierarchy over surfels sorted by Morton code: a node starts with its range and splits
 /// the child with the most surfels at its highest differing key bit until it has eight children;
-/// eight surfels or fewer within 13 voxels make a leaf. `resolution` is r in metres.
-Bvh8 build_bvh8(const std::vector<BuildSurfel>& surfels, double resolution);
+/// eight surfels or fewer within 13 voxels make a leaf. `kHigh` opens the child with the largest
+/// box and splits where the surface area heuristic says. `resolution` is r in metres.
+Bvh8 build_bvh8(const std::vector<BuildSurfel>& surfels,
+                double resolution,
+                TreeQuality quality = TreeQuality::kNormal);
 
 }  // namespace pointflight

@@ -226,7 +226,7 @@ class Import {
     choose_tau(surfels);
     if (report.has_intensity) set_intensities(surfels);
     pointflight::report(progress_, "building the hierarchy", 0.5);
-    map_.tree = build_bvh8(surfels, report.resolution);
+    map_.tree = build_bvh8(surfels, report.resolution, options_.quality);
     pointflight::report(progress_, "building the hierarchy", 1.0);
   }
 

@@ -49,10 +49,10 @@ struct HitLanes {
 
 /// One beam on its way through the tree.
 struct RayState {
-  alignas(32) float enter[8];  ///< Where it enters the children of the present node.
-  float start[3];              ///< Origin from the map's origin, for boxes.
+  alignas(32) float enter[8];    ///< Where it enters the children of the present node.
+  alignas(16) float start[4];    ///< Origin from the map's origin, for boxes.
+  alignas(16) float inverse[4];  ///< 1 / direction.
   float direction[3];
-  float inverse[3];
   std::uint32_t near_side[3];  ///< Byte of the node at which the nearer planes begin, a axis.
   std::uint32_t far_side[3];
   float end;    ///< Nothing beyond matters.
@@ -67,6 +67,8 @@ struct RayState {
 };
 
 HWY_INLINE void start_ray(const KernelMap& map, const Ray& ray, std::uint32_t index, RayState& s) {
+  s.start[3] = 0.0f;
+  s.inverse[3] = 0.0f;
   s.ray = index;
   s.end = ray.range_max;
   s.first = kNever;
@@ -94,11 +96,21 @@ HWY_INLINE void start_ray(const KernelMap& map, const Ray& ray, std::uint32_t in
 HWY_INLINE std::uint32_t test_node(RayState& s) {
   const Bvh8Node& node = *s.node;
   const auto* bytes = reinterpret_cast<const std::uint8_t*>(&node);
+  // origin and scale of the node as distances along the ray
+  float corner[4];
+  float offsets[4];
+  float steps[4];
+  std::memcpy(corner, node.origin, 12);
+  corner[3] = node.scale;
+  for (int k = 0; k < 4; ++k) {
+    offsets[k] = (corner[k] - s.start[k]) * s.inverse[k];
+    steps[k] = corner[3] * s.inverse[k];
+  }
   F8 enter = splat(0.0f);
   F8 leave = splat(s.end);
   for (int axis = 0; axis < 3; ++axis) {
-    const F8 step = splat(node.scale * s.inverse[axis]);
-    const F8 offset = splat((node.origin[axis] - s.start[axis]) * s.inverse[axis]);
+    const F8 step = splat(steps[axis]);
+    const F8 offset = splat(offsets[axis]);
     enter = max(enter, offset + load_bytes(bytes + s.near_side[axis]) * step);
     leave = min(leave, offset + load_bytes(bytes + s.far_side[axis]) * step);
   }
@@ -112,17 +124,29 @@ HWY_INLINE std::uint64_t meta_of(const Bvh8Node& node) {
   return meta;
 }
 
-/// Where the children of a node lie: byte i is the offset of child i among its kind.
-struct Offsets {
-  std::uint64_t inner;
-  std::uint64_t leaf;
-};
-HWY_INLINE Offsets offsets_of(std::uint64_t meta) {
+/// The child in a lane of a node: inner ones are consecutive, and so are the words of leaves.
+HWY_INLINE Entry child_of(const Bvh8Node& node, std::uint64_t meta, const float* enter, int lane) {
   constexpr std::uint64_t kOnes = 0x0101010101010101ull;
-  const std::uint64_t count = meta & (0x7full * kOnes);
-  const std::uint64_t words = count + (((count + 0x7full * kOnes) >> 7) & kOnes);
-  // sums of all bytes below, by one multiplication each
-  return {((meta >> 7) & kOnes) * (kOnes << 8), words * (kOnes << 8)};
+  const int shift = 8 * lane;
+  const std::uint64_t before = meta & ((1ull << shift) - 1ull);
+  const auto own = static_cast<std::uint32_t>(meta >> shift) & 0xffu;
+  if (own == Bvh8Node::kInner) {
+    const auto nodes_before = static_cast<std::uint32_t>(std::popcount(before & (0x80ull * kOnes)));
+    return {enter[lane], node.first_inner + nodes_before, own};
+  }
+  // a leaf of n surfels has n + 1 words
+  const std::uint64_t counts = before & (0x7full * kOnes);
+  const std::uint64_t words = counts + (((counts + 0x7full * kOnes) >> 7) & kOnes);
+  return {
+      enter[lane], node.first_leaf_word + static_cast<std::uint32_t>((words * kOnes) >> 56), own};
+}
+
+HWY_INLINE void prefetch(const KernelMap& map, const Entry& entry) {
+  const char* place = entry.meta == Bvh8Node::kInner
+                          ? reinterpret_cast<const char*>(map.nodes + entry.index)
+                          : reinterpret_cast<const char*>(map.words + entry.index);
+  hwy::Prefetch(place);
+  hwy::Prefetch(place + 64);
 }
 
 /// Pushes the children of a node that were entered at `enter`, the nearest on top. Returns the new
@@ -133,25 +157,15 @@ HWY_INLINE std::size_t push_children(const KernelMap& map,
                                      const float* enter,
                                      Entry* stack,
                                      std::size_t depth) {
-  if (entered == 0) return depth;
   const std::uint64_t meta = meta_of(node);
-  const Offsets offsets = offsets_of(meta);
   const std::size_t bottom = depth;
   for (; entered != 0 && depth < kStack; entered &= entered - 1) {
-    const int i = std::countr_zero(entered);
-    const auto own = static_cast<std::uint32_t>(meta >> (8 * i)) & 0xffu;
-    if (own == 0) continue;
-    const bool inner = own == Bvh8Node::kInner;
-    const std::uint64_t offset = (inner ? offsets.inner : offsets.leaf) >> (8 * i) & 0xffu;
-    const std::uint32_t index =
-        (inner ? node.first_inner : node.first_leaf_word) + static_cast<std::uint32_t>(offset);
-    const char* place = inner ? reinterpret_cast<const char*>(map.nodes + index)
-                              : reinterpret_cast<const char*>(map.words + index);
-    hwy::Prefetch(place);
-    hwy::Prefetch(place + 64);
+    const Entry child = child_of(node, meta, enter, std::countr_zero(entered));
+    if (child.meta == 0) continue;
+    prefetch(map, child);
     std::size_t at = depth++;
-    for (; at > bottom && stack[at - 1].t < enter[i]; --at) stack[at] = stack[at - 1];
-    stack[at] = {enter[i], index, own};
+    for (; at > bottom && stack[at - 1].t < child.t; --at) stack[at] = stack[at - 1];
+    stack[at] = child;
   }
   return depth;
 }
@@ -167,23 +181,15 @@ struct SurfelLanes {
 HWY_INLINE SurfelLanes load_surfels(const KernelMap& map, const SurfelWord* words) {
   SurfelLanes s;  // NOLINT(cppcoreguidelines-pro-type-member-init): all is written
   load_words(words, s.low, s.high);
-  const F8 step = splat(map.r / 64.0f);
+  const F8 step = splat(map.place_step);
   const F8 half = splat(0.5f);
   const U8 ten = splat_bits(1023u);
   s.x = (to_float(s.low & ten) + half) * step;
   s.y = (to_float(right<10>(s.low) & ten) + half) * step;
   s.z = (to_float(right<20>(s.low) & ten) + half) * step;
   const U8 code = right<27>(s.high) * splat_bits(0x288000u) + splat_bits(0x3b6bedfau);
-  const float r2 = map.r * map.r;
-  s.variance2 = as_float(code) * splat(r2);
-  // the coarse classes of s0 can lie above s2
-  const auto thick = [r2](int k) {
-    return splat(kThicknessClasses[k] * kThicknessClasses[k] * r2);
-  };
-  s.widest = max(s.variance2,
-                 select(any_bit(s.low, 1u << 31),
-                        select(any_bit(s.low, 1u << 30), thick(3), thick(2)),
-                        splat(0.0f)));
+  s.variance2 = as_float(code) * splat(map.r_squared);
+  s.widest = max(s.variance2, look_up4(map.widest, right<30>(s.low)));
   return s;
 }
 
@@ -210,25 +216,10 @@ HWY_INLINE Shapes decode_shapes(const KernelMap& map, const SurfelLanes& s) {
   const F8 wx = qw * qx;
   const F8 wy = qw * qy;
   const F8 wz = qw * qz;
-  // 1 / s_k: thickness by class, s1 = s2 * 0.75^k as three selects
-  const M8 class1 = any_bit(s.low, 1u << 30);
-  const M8 class2 = any_bit(s.low, 1u << 31);
-  const auto by_class = [&](const float(&values)[4]) {
-    return select(class2,
-                  select(class1, splat(values[3]), splat(values[2])),
-                  select(class1, splat(values[1]), splat(values[0])));
-  };
-  float thickness[4];
-  float inverse[4];
-  for (int k = 0; k < 4; ++k) {
-    thickness[k] = kThicknessClasses[k] * map.r;
-    inverse[k] = 1.0f / thickness[k];
-  }
-  const F8 i0 = by_class(inverse);
+  const U8 thickness = right<30>(s.low);
+  const F8 i0 = look_up4(map.inverse_thickness, thickness);
   const F8 i2 = one / sqrt(s.variance2);
-  const F8 i1 = i2 * select(any_bit(s.high, 1u << 24), splat(1.0f / 0.75f), one) *
-                select(any_bit(s.high, 1u << 25), splat(1.0f / 0.5625f), one) *
-                select(any_bit(s.high, 1u << 26), splat(1.0f / 0.31640625f), one);
+  const F8 i1 = i2 * look_up8(map.inverse_ratio, right<24>(s.high) & splat_bits(7u));
   Shapes e;  // NOLINT(cppcoreguidelines-pro-type-member-init): all is written
   e.m0x = (one - two * (yy + zz)) * i0;
   e.m0y = two * (xy + wz) * i0;
@@ -239,7 +230,7 @@ HWY_INLINE Shapes decode_shapes(const KernelMap& map, const SurfelLanes& s) {
   e.m2x = two * (xz + wy) * i2;
   e.m2y = two * (yz - wx) * i2;
   e.m2z = (one - two * (xx + yy)) * i2;
-  e.s0 = by_class(thickness);
+  e.s0 = look_up4(map.thickness, thickness);
   return e;
 }
 
@@ -344,28 +335,34 @@ static HWY_NOINLINE bool make_room(RayState& s) {
   return true;
 }
 
-/// Adds the hits among eight lanes. `first_word` is the word of lane 0.
+/// Adds the hits among eight lanes; `hit` has a bit for each. `first_word` is the word of lane 0.
 HWY_INLINE void add_hits(const KernelMap& map,
                          RayState& s,
-                         const M8& accepted,
+                         std::uint32_t hit,
                          const Meeting& meeting,
-                         const I8& word,
-                         std::uint32_t count,
+                         std::uint32_t first_word,
                          std::uint64_t& overflows) {
   if (s.hits.count + 8 > kHits) {
     shorten(map, s);
     overflows += make_room(s) ? 1 : 0;
   }
+  alignas(32) float t[8];
+  alignas(32) float cosine[8];
+  alignas(32) std::int32_t weight[8];
+  store(meeting.t, t);
+  store(meeting.cosine, cosine);
+  store(weights_of(map, meeting.m2), weight);
   HitLanes& h = s.hits;
-  const I8 weight = weights_of(map, meeting.m2);
-  compress(accepted, meeting.t, h.t + h.count);
-  compress(accepted, weight, h.weight + h.count);
-  compress(accepted, word, h.word + h.count);
-  compress(accepted, meeting.cosine, h.cosine + h.count);
-  h.total += sum(keep(accepted, weight));
-  h.count += count;
+  for (; hit != 0; hit &= hit - 1) {
+    const int lane = std::countr_zero(hit);
+    h.t[h.count] = t[lane];
+    h.weight[h.count] = weight[lane];
+    h.cosine[h.count] = cosine[lane];
+    h.word[h.count++] = static_cast<std::int32_t>(first_word) + lane;
+    h.total += weight[lane];
+    h.nearest = std::min(h.nearest, t[lane]);
+  }
   store_unaligned(splat(kNever), h.t + h.count);
-  h.nearest = std::min(h.nearest, least(select(accepted, meeting.t, splat(kNever))));
   // where the nearest hit begins the surface, farther ones cannot move it
   if (h.nearest < s.first && h.total >= map.tau) shorten(map, s);
 }
@@ -374,7 +371,7 @@ HWY_INLINE void visit_leaf(const KernelMap& map,
                            RayState& s,
                            const Entry& entry,
                            std::uint64_t& overflows) {
-  if (entry.meta > 8 || entry.index + entry.meta + kLeafPadding >= map.word_count) return;
+  if (entry.meta - 1u > 7u || entry.index + entry.meta + kLeafPadding >= map.word_count) return;
   const LeafHeader leaf = decode_leaf(map.words[entry.index]);
   // in double: maps may be kilometres wide; and nothing here depends on the way to the leaf
   const auto vx = static_cast<float>(leaf.x * map.resolution - s.origin[0]);
@@ -399,20 +396,10 @@ HWY_INLINE void visit_leaf(const KernelMap& map,
 
   const Shapes e = decode_shapes(map, surfels);
   const Meeting meeting = meet(whiten(e, x, y, z), whiten(e, dx, dy, dz), e.s0);
-  static constexpr float kNumbers[8] = {0, 1, 2, 3, 4, 5, 6, 7};
-  const F8 number = load_unaligned(kNumbers);
   const M8 accepted = (meeting.m2 < splat(map.support_squared)) & (splat(0.0f) <= meeting.t) &
-                      (meeting.t <= splat(s.end)) &
-                      (number < splat(static_cast<float>(entry.meta)));
-  const std::uint32_t hit = bits(accepted);
-  if (hit == 0) return;
-  add_hits(map,
-           s,
-           accepted,
-           meeting,
-           count_from(static_cast<std::int32_t>(entry.index + 1)),
-           static_cast<std::uint32_t>(std::popcount(hit)),
-           overflows);
+                      (meeting.t <= splat(s.end));
+  const std::uint32_t hit = bits(accepted) & lanes;
+  if (hit != 0) add_hits(map, s, hit, meeting, entry.index + 1, overflows);
 }
 
 /// Shares of a hit in the sums over the surface's window: whole numbers, so that no order shows,
@@ -478,11 +465,26 @@ HWY_INLINE KernelHit finish(const KernelMap& map, const RayState& s) {
 }
 
 /// On to the next inner node, through the leaves on the way. False at the end of the beam's way.
-HWY_INLINE bool advance(const KernelMap& map, RayState& s, std::uint64_t& overflows) {
+HWY_INLINE bool advance(const KernelMap& map,
+                        RayState& s,
+                        std::uint32_t entered,
+                        std::uint64_t& overflows) {
+  if (s.steps == 0) return false;
+  --s.steps;
+  if (std::has_single_bit(entered)) {
+    // most often: straight on
+    const Entry child = child_of(*s.node, meta_of(*s.node), s.enter, std::countr_zero(entered));
+    if (child.meta == Bvh8Node::kInner && child.index < map.node_count) {
+      prefetch(map, child);
+      s.node = map.nodes + child.index;
+      return true;
+    }
+    if (child.meta != Bvh8Node::kInner) visit_leaf(map, s, child, overflows);
+  } else {
+    s.depth = push_children(map, *s.node, entered, s.enter, s.stack, s.depth);
+  }
   while (s.depth > 0) {
     const Entry entry = s.stack[--s.depth];
-    if (s.steps == 0) return false;
-    --s.steps;
     if (entry.t > s.end) continue;
     if (entry.meta != Bvh8Node::kInner) {
       visit_leaf(map, s, entry, overflows);
@@ -521,8 +523,7 @@ static std::uint64_t trace_singly(const KernelMap& map,
     for (std::size_t k = 0; k < flying; ++k) entered[k] = test_node(*active[k]);
     for (std::size_t k = 0; k < flying;) {
       RayState& s = *active[k];
-      s.depth = push_children(map, *s.node, entered[k], s.enter, s.stack, s.depth);
-      if (advance(map, s, overflows)) {
+      if (advance(map, s, entered[k], overflows)) {
         ++k;
         continue;
       }

@@ -343,7 +343,7 @@ HWY_INLINE void meet_group(
 }
 
 HWY_INLINE void visit_leaf(const KernelMap& map, Packet& p, const Entry& entry) {
-  if (entry.meta > 8 || entry.index + entry.meta + kLeafPadding >= map.word_count) return;
+  if (entry.meta - 1u > 7u || entry.index + entry.meta + kLeafPadding >= map.word_count) return;
   const LeafHeader header = decode_leaf(map.words[entry.index]);
   PacketLeaf leaf;  // NOLINT(cppcoreguidelines-pro-type-member-init): written before it is read
   leaf.lanes = load_surfels(map, map.words + entry.index + 1);

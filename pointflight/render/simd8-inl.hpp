@@ -214,6 +214,30 @@ HWY_INLINE F8 as_float(const U8& a) {
   POINTFLIGHT_EACH(hn::BitCast(kF, a.v[p]))
   return out;
 }
+/// table[index], one number after the other: where vectors are shorter than the table.
+HWY_INLINE F8 look_up_each(const float* table, const U8& index) {
+  std::uint32_t places[8];
+  float values[8];
+  for (std::size_t p = 0; p < kParts; ++p) hn::StoreU(index.v[p], kU, places + p * kWidth);
+  for (std::size_t i = 0; i < 8; ++i) values[i] = table[places[i]];
+  return load_unaligned(values);
+}
+/// table[index] for indices below four.
+HWY_INLINE F8 look_up4(const float* table, const U8& index) {
+  if constexpr (kWidth < 4) return look_up_each(table, index);
+  F8 out;
+  const auto values = hn::LoadDup128(kF, table);
+  POINTFLIGHT_EACH(hn::TableLookupLanes(values, hn::IndicesFromVec(kF, index.v[p])))
+  return out;
+}
+/// table[index] for indices below eight.
+HWY_INLINE F8 look_up8(const float* table, const U8& index) {
+  if constexpr (kWidth < 8) return look_up_each(table, index);
+  F8 out;
+  const auto values = hn::LoadU(kF, table);
+  POINTFLIGHT_EACH(hn::TableLookupLanes(values, hn::IndicesFromVec(kF, index.v[p])))
+  return out;
+}
 /// Lanes in which any of the given bits is set.
 HWY_INLINE M8 any_bit(const U8& a, std::uint32_t bits) {
   M8 out;
@@ -304,17 +328,6 @@ HWY_INLINE float least(const F8& a) {
   auto all = a.v[0];
   for (std::size_t p = 1; p < kParts; ++p) all = hn::Min(all, a.v[p]);
   return hn::GetLane(hn::MinOfLanes(kF, all));
-}
-/// Writes the lanes of the condition one after another; may touch seven floats behind them.
-HWY_INLINE void compress(const M8& condition, const F8& a, float* x) {
-  for (std::size_t p = 0; p < kParts; ++p) {
-    x += hn::CompressStore(a.v[p], condition.v[p], kF, x);
-  }
-}
-HWY_INLINE void compress(const M8& condition, const I8& a, std::int32_t* x) {
-  for (std::size_t p = 0; p < kParts; ++p) {
-    x += hn::CompressStore(a.v[p], hn::RebindMask(kI, condition.v[p]), kI, x);
-  }
 }
 // NOLINTEND(cppcoreguidelines-pro-type-member-init)
 
