@@ -3,12 +3,16 @@
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
+#include <cmath>
+#include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 
 #include "apps/commands.hpp"
+#include "apps/error_picture.hpp"
 #include "apps/terminal.hpp"
+#include "pointflight/core/input_error.hpp"
 #include "pointflight/fidelity/scan_comparison.hpp"
 
 namespace pointflight::apps {
@@ -20,6 +24,8 @@ struct CompareFlags {
   std::string poses;
   std::string cloud;
   std::string renderer = "beam";
+  bool floor = false;
+  std::string png;
   bool json = false;
   int threads = 0;
 };
@@ -51,7 +57,45 @@ void print_row(const std::string& name, const ErrorStatistics& s) {
       1e3 * s.bias);
 }
 
+/// A picture of where a scan's errors sit.
+void draw_scan_errors(const RealScan& scan,
+                      const std::vector<ComparedRay>& rays,
+                      bool supported_only,
+                      const std::string& folder) {
+  ErrorPanel panel{supported_only ? "rays that the cloud supports" : "all rays", {}};
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    if (supported_only && !rays[i].supported) continue;
+    const Vector3f& p = scan.points_sensor[i];
+    panel.marks.push_back({std::atan2(p.y(), p.x()),
+                           std::atan2(p.z(), std::hypot(p.x(), p.y())),
+                           rays[i].range,
+                           rays[i].rendered});
+  }
+  const std::string stem = std::filesystem::path(scan.file).stem().string();
+  draw_errors({&panel, 1}, scan.file, folder + "/" + stem + ".png");
+}
+
+/// The real scans among themselves: what no renderer can better.
+ErrorCollector compare_floor(const std::vector<RealScan>& scans,
+                             const Executor& executor,
+                             const Progress& progress) {
+  const ScanPlanes planes(scans);
+  ErrorCollector floor;
+  for (std::size_t i = 0; i < scans.size(); ++i) {
+    report(progress,
+           "scans among themselves",
+           static_cast<double>(i) / static_cast<double>(scans.size()));
+    floor.add(planes.compare(i, executor));
+  }
+  return floor;
+}
+
 void compare(const CompareFlags& flags) {
+  if (!flags.png.empty()) {
+    std::error_code error;
+    std::filesystem::create_directories(flags.png, error);
+    if (error) throw InputError(fmt::format("{}: {}", flags.png, error.message()));
+  }
   const Executor executor(flags.threads);
   const auto map = SurfelMap::open(flags.map);
   const auto scans = read_real_scans(flags.scans, flags.poses);
@@ -86,18 +130,23 @@ void compare(const CompareFlags& flags) {
                     {"all", to_json(scan_all.statistics())},
                     {"supported", to_json(scan_supported.statistics())}});
     if (!flags.json) print_row(scans[i].file, scan_all.statistics());
+    if (!flags.png.empty()) draw_scan_errors(scans[i], rays, cloud.has_value(), flags.png);
   }
+  std::optional<ErrorCollector> floor;
+  if (flags.floor) floor = compare_floor(scans, executor, progress);
   end_progress();
   if (flags.json) {
-    const nlohmann::ordered_json json = {
+    nlohmann::ordered_json json = {
         {"overall",
          {{"all", to_json(all.statistics())}, {"supported", to_json(supported.statistics())}}},
         {"scans", rows}};
+    if (floor) json["floor"] = to_json(floor->statistics());
     fmt::print("{}\n", json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
     return;
   }
   print_row("all", all.statistics());
   if (cloud) print_row("all, supported", supported.statistics());
+  if (floor) print_row("scans among themselves", floor->statistics());
 }
 
 }  // namespace
@@ -116,6 +165,10 @@ void add_compare_command(CLI::App& parent, int& /*exit_code*/) {
   app->add_option("--renderer", flags->renderer, "How ranges are made")
       ->check(CLI::IsMember(renderer_names()))
       ->capture_default_str();
+  app->add_flag("--floor",
+                flags->floor,
+                "Also each scan against the local planes of the others: what the data allow");
+  app->add_option("--png", flags->png, "Folder for a picture of each scan's errors");
   app->add_flag("--json", flags->json, "JSON on stdout");
   app->add_option("--threads", flags->threads, "0: all cores")->check(CLI::Range(0, 1024));
   app->callback([flags] { compare(*flags); });

@@ -3,6 +3,7 @@
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
+#include <algorithm>
 #include <chrono>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -26,12 +27,33 @@ struct ImportFlags {
   double scale = 1.0;
   std::string up = "z";
   double tau = 0.0;  ///< 0: by the density.
+  std::string quality = "normal";
   bool keep_outliers = false;
   int outlier_neighbours = 8;
   double outlier_sigmas = OutlierOptions{}.sigmas;
   std::string outliers_out;
   int threads = 0;
 };
+
+std::string about_spacing(double spacing, double resolution, double supported) {
+  if (spacing <= 0.0) return "unknown";
+  const std::string points = fmt::format("{:.1f} mm", spacing * 1e3);
+  if (resolution >= 2.2 * spacing) return points;
+  return fmt::format("{}: {:.4g} m is finer than the points, {:.2g} m or more is advised",
+                     points,
+                     resolution,
+                     supported);
+}
+
+std::string about_noise(double noise, std::uint64_t projected, std::uint64_t too_thick) {
+  return fmt::format(
+      "{:.1f} mm across flat surfaces; {}",
+      noise * 1e3,
+      projected > 0
+          ? fmt::format(
+                "{} cells moved onto their planes, {} left (two faces?)", projected, too_thick)
+          : "clean enough to be left as it is");
+}
 
 void print_report(const ImportReport& r, const ImportOptions& options) {
   log(fmt::format(
@@ -41,16 +63,10 @@ void print_report(const ImportReport& r, const ImportOptions& options) {
                               : "",
       r.points_out_of_reach > 0 ? fmt::format(", {} too far away dropped", r.points_out_of_reach)
                                 : ""));
-  const bool fine = r.spacing > 0.0 && r.resolution < 2.2 * r.spacing;
-  log(fmt::format("resolution    {:.4g} m{}; point spacing {:.1f} mm{}",
+  log(fmt::format("resolution    {:.4g} m{}",
                   r.resolution,
-                  r.resolution_was_chosen ? " (chosen from the spacing)" : "",
-                  r.spacing * 1e3,
-                  fine ? fmt::format(": {:.4g} m is finer than the points, {:.2g} m or more is "
-                                     "advised",
-                                     r.resolution,
-                                     r.supported_resolution)
-                       : ""));
+                  r.resolution_was_chosen ? " (chosen from the spacing)" : ""));
+  log("spacing       " + about_spacing(r.spacing, r.resolution, r.supported_resolution));
   log(fmt::format("outliers      {}",
                   options.outliers.enabled
                       ? fmt::format("{} of {} cells ({} points) dropped; --keep-outliers keeps "
@@ -59,13 +75,7 @@ void print_report(const ImportReport& r, const ImportOptions& options) {
                                     r.cells,
                                     r.outlier_points)
                       : "kept"));
-  log(fmt::format("noise         {:.1f} mm across flat surfaces; {}",
-                  r.noise * 1e3,
-                  r.projection.projected > 0
-                      ? fmt::format("{} cells moved onto their planes, {} left (two faces?)",
-                                    r.projection.projected,
-                                    r.projection.too_thick)
-                      : "clean enough to be left as it is"));
+  log("noise         " + about_noise(r.noise, r.projection.projected, r.projection.too_thick));
   if (r.grown_surfels > 0) {
     log(fmt::format("thin scan     {} surfels widened to close gaps", r.grown_surfels));
   }
@@ -85,6 +95,7 @@ void import_map(const ImportFlags& flags) {
   if (flags.resolution > 0.0) options.resolution = flags.resolution;
   options.scale = flags.scale;
   options.up = flags.up.front();
+  options.quality = flags.quality == "high" ? TreeQuality::kHigh : TreeQuality::kNormal;
   if (flags.tau > 0.0) options.tau = static_cast<float>(flags.tau);
   options.outliers.enabled = !flags.keep_outliers;
   options.outliers.neighbours = flags.outlier_neighbours;
@@ -124,6 +135,11 @@ void add_import(CLI::App& parent) {
   app->add_option("--up", flags->up, "The files' up axis; y is turned to z")
       ->check(CLI::IsMember({"y", "z"}))
       ->capture_default_str();
+  app->add_option("--quality",
+                  flags->quality,
+                  "Of the hierarchy: high takes longer to build and makes rays faster in foliage")
+      ->check(CLI::IsMember({"normal", "high"}))
+      ->capture_default_str();
   app->add_option("--tau",
                   flags->tau,
                   "Coverage that makes a return, 0.3 (fewest holes) to 0.5 (sharpest edges); "
@@ -158,6 +174,32 @@ struct InfoFlags {
 nlohmann::ordered_json metadata_of(const SurfelMap& map) {
   auto parsed = nlohmann::ordered_json::parse(map.metadata(), nullptr, false);
   return parsed.is_object() ? parsed : nlohmann::ordered_json::object();
+}
+
+/// A number of the metadata, 0 where there is none: the file may hold anything.
+double number_in(const nlohmann::ordered_json& json, const char* key) {
+  if (!json.is_object() || !json.contains(key) || !json[key].is_number()) return 0.0;
+  return json[key].get<double>();
+}
+
+std::uint64_t count_in(const nlohmann::ordered_json& json, const char* key) {
+  return static_cast<std::uint64_t>(std::clamp(number_in(json, key), 0.0, 1e18));
+}
+
+/// What the import found in the points, where the file says it.
+void print_findings(const nlohmann::ordered_json& metadata, double resolution) {
+  if (!metadata.contains("noise")) return;
+  const auto projection = metadata.value("projection", nlohmann::ordered_json::object());
+  fmt::print("  spacing     {}\n",
+             about_spacing(number_in(metadata, "point_spacing"),
+                           resolution,
+                           number_in(metadata, "supported_resolution")));
+  fmt::print("  noise       {}\n",
+             about_noise(number_in(metadata, "noise"),
+                         count_in(projection, "projected"),
+                         count_in(projection, "too_thick")));
+  const std::uint64_t grown = count_in(metadata, "grown_surfels");
+  if (grown > 0) fmt::print("  thin scan   {} surfels widened to close gaps\n", grown);
 }
 
 void print_info(const SurfelMap& map, const InfoFlags& flags) {
@@ -202,6 +244,8 @@ void print_info(const SurfelMap& map, const InfoFlags& flags) {
   fmt::print("  size        {:.1f} MB, {:.1f} bytes a surfel\n",
              static_cast<double>(map.file_size()) * 1e-6,
              bytes_each);
+  print_findings(metadata, map.resolution());
+  fmt::print("  coverage    {:.2f} makes a return\n", map.model().tau);
   fmt::print("  intensity   {}\n", map.has_intensity() ? "yes" : "no");
   if (flags.verify) fmt::print("  checksums   match\n");
   fmt::print("  made\n");

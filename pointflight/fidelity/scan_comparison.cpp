@@ -2,8 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
+#include <limits>
 #include <nanoflann.hpp>
 
 #include "pointflight/core/input_error.hpp"
@@ -160,6 +163,83 @@ std::vector<ComparedRay> compare_scan(const RealScan& scan,
     }
   });
   return compared;
+}
+
+struct ScanPlanes::Tree {
+  std::vector<Vector3f> points;  ///< World, from `origin`.
+  std::vector<std::uint32_t> scan;
+  Vector3d origin = Vector3d::Zero();
+  [[nodiscard]] std::size_t kdtree_get_point_count() const { return points.size(); }
+  [[nodiscard]] double kdtree_get_pt(std::size_t i, std::size_t axis) const {
+    return static_cast<double>(points[i][static_cast<int>(axis)]);
+  }
+  template <class Box>
+  bool kdtree_get_bbox(Box& /*box*/) const {
+    return false;
+  }
+  using Index = nanoflann::
+      KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, Tree>, Tree, 3, std::uint32_t>;
+  std::unique_ptr<Index> index;
+};
+
+ScanPlanes::ScanPlanes(const std::vector<RealScan>& scans)
+    : scans_(scans), tree_(std::make_unique<Tree>()) {
+  if (!scans.empty()) tree_->origin = scans.front().T_world_sensor.translation;
+  for (std::uint32_t i = 0; i < scans.size(); ++i) {
+    for (const Vector3f& p : scans[i].points_sensor) {
+      const Vector3d world = scans[i].T_world_sensor * p.cast<double>();
+      tree_->points.emplace_back((world - tree_->origin).cast<float>());
+      tree_->scan.push_back(i);
+    }
+  }
+  tree_->index =
+      std::make_unique<Tree::Index>(3, *tree_, nanoflann::KDTreeSingleIndexAdaptorParams(16));
+}
+
+ScanPlanes::~ScanPlanes() = default;
+
+ErrorCollector ScanPlanes::compare(std::size_t scan, const Executor& executor) const {
+  constexpr std::size_t kStride = 5;  // a fifth of the rays tells as much
+  constexpr double kFlat = 0.01;      // least over middle variance
+  const RealScan& own = scans_[scan];
+  const std::size_t count = (own.points_sensor.size() + kStride - 1) / kStride;
+  // NaN where there is no plane
+  std::vector<double> ranges(count, std::numeric_limits<double>::quiet_NaN());
+  executor.parallel_for(count, 256, [&](std::size_t begin, std::size_t end) {
+    std::vector<std::pair<std::uint32_t, double>> near;
+    for (std::size_t i = begin; i < end; ++i) {
+      const Vector3d p = own.points_sensor[i * kStride].cast<double>();
+      const Vector3d place = own.T_world_sensor * p - tree_->origin;
+      near.clear();
+      tree_->index->radiusSearch(
+          place.data(), kSupportRadius * kSupportRadius, near, nanoflann::SearchParams());
+      Vector3d sum = Vector3d::Zero();
+      Matrix3d products = Matrix3d::Zero();
+      double n = 0.0;
+      for (const auto& [index, squared] : near) {
+        if (tree_->scan[index] == scan) continue;
+        const Vector3d q = tree_->points[index].cast<double>() - place;
+        sum += q;
+        products += q * q.transpose();
+        n += 1.0;
+      }
+      if (n < static_cast<double>(kSupportPoints)) continue;
+      const Vector3d mean = sum / n;
+      const Eigen::SelfAdjointEigenSolver<Matrix3d> axes(products / n - mean * mean.transpose());
+      if (axes.eigenvalues()[0] > kFlat * axes.eigenvalues()[1]) continue;
+      const Vector3d normal = axes.eigenvectors().col(0);
+      const Vector3d direction = own.T_world_sensor.rotation * p.normalized();
+      const double slope = normal.dot(direction);
+      if (std::abs(slope) < 0.02) continue;
+      ranges[i] = p.norm() + normal.dot(mean) / slope;
+    }
+  });
+  ErrorCollector collector;
+  for (std::size_t i = 0; i < count; ++i) {
+    if (std::isnan(ranges[i])) continue;
+    collector.add(static_cast<double>(own.points_sensor[i * kStride].norm()), ranges[i]);
+  }
+  return collector;
 }
 
 ErrorCollector collect(const std::vector<ComparedRay>& rays, bool supported_only) {

@@ -51,6 +51,24 @@ std::vector<ComparedRay> compare_scan(const RealScan& scan,
                                       const SupportCloud* cloud,
                                       const Executor& executor);
 
+/// Real scans beside each other: how well a ray's range is known from the other scans.
+class ScanPlanes {
+ public:
+  /// Refers to `scans`, which must outlive it.
+  explicit ScanPlanes(const std::vector<RealScan>& scans);
+  ~ScanPlanes();
+
+  /// The rays of one scan against the planes that the other scans' points within 25 cm of the
+  /// return make (16 points or more, flat to a tenth of their extent): right, early or late as in
+  /// ErrorStatistics. Rays without such a plane are left out.
+  [[nodiscard]] ErrorCollector compare(std::size_t scan, const Executor& executor) const;
+
+ private:
+  struct Tree;
+  const std::vector<RealScan>& scans_;
+  std::unique_ptr<Tree> tree_;
+};
+
 /// All rays, or only the supported ones.
 ErrorCollector collect(const std::vector<ComparedRay>& rays, bool supported_only);
 

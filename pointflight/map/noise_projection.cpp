@@ -21,9 +21,9 @@ double full_plane_variance(const VoxelGrid& grid, std::int32_t reach) {
 }
 
 /// Thickness of the planar neighbourhood of a cell, or negative where there is none.
-double thickness_around(const VoxelGrid& grid, const VoxelCell& cell) {
+double thickness_around(const VoxelGrid& grid, NeighbourWindow& window, const VoxelCell& cell) {
   for (const std::int32_t reach : {1, 2}) {
-    const Moments around = grid.neighbourhood(cell, reach);
+    const Moments around = window.moments(cell, reach);
     if (around.n < 6.0) continue;
     const Vector3d l = covariance_axes(around.covariance()).lambda;
     if (l[0] < 0.1 * l[1] && l[1] > 0.25 * full_plane_variance(grid, reach)) {
@@ -42,7 +42,10 @@ struct MovedCell {
   Fate fate = Fate::kUnchanged;
 };
 
-MovedCell moved(const VoxelGrid& grid, const VoxelCell& cell, double thickest) {
+MovedCell moved(const VoxelGrid& grid,
+                NeighbourWindow& window,
+                const VoxelCell& cell,
+                double thickest) {
   const Moments own = cell.moments();
   MovedCell result{grid.centroid_world(cell), own.covariance(), Fate::kUnchanged};
   if (own.n >= 10.0) {
@@ -53,7 +56,7 @@ MovedCell moved(const VoxelGrid& grid, const VoxelCell& cell, double thickest) {
     }
   }
   for (const std::int32_t reach : {1, 2, 3}) {
-    const Moments around = grid.neighbourhood(cell, reach);
+    const Moments around = window.moments(cell, reach);
     if (around.n < 6.0) continue;
     const CovarianceAxes axes = covariance_axes(around.covariance());
     const Vector3d& l = axes.lambda;
@@ -79,8 +82,9 @@ double estimate_noise(const VoxelGrid& grid, const Executor& executor) {
   const std::size_t stride = std::max<std::size_t>(1, cells.size() / kSampledCells);
   std::vector<double> thickness((cells.size() + stride - 1) / stride);
   executor.parallel_for(thickness.size(), 2048, [&](std::size_t begin, std::size_t end) {
+    NeighbourWindow window(grid);
     for (std::size_t i = begin; i < end; ++i) {
-      thickness[i] = thickness_around(grid, cells[i * stride]);
+      thickness[i] = thickness_around(grid, window, cells[i * stride]);
     }
   });
   std::erase_if(thickness, [](double t) { return t < 0.0; });
@@ -103,7 +107,8 @@ VoxelGrid project_noise(const VoxelGrid& grid,
   const double thickest = std::max(2.5 * sigma, kThickest);
   std::vector<MovedCell> results(cells.size());
   executor.parallel_for(cells.size(), 2048, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) results[i] = moved(grid, cells[i], thickest);
+    NeighbourWindow window(grid);
+    for (std::size_t i = begin; i < end; ++i) results[i] = moved(grid, window, cells[i], thickest);
   });
   VoxelGrid projected(grid.base_world(), grid.resolution());
   for (std::size_t i = 0; i < cells.size(); ++i) {

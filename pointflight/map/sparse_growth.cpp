@@ -51,33 +51,30 @@ struct Surroundings {
   std::vector<double> distances;
 };
 
-Surroundings surroundings_of(const VoxelGrid& grid, const VoxelCell& cell, std::int32_t reach) {
+Surroundings surroundings_of(const VoxelGrid& grid,
+                             NeighbourWindow& window,
+                             const VoxelCell& cell,
+                             std::int32_t reach) {
   Surroundings around;
   const Vector3d own = cell.moments().mean();
-  for (std::int32_t dx = -reach; dx <= reach; ++dx) {
-    for (std::int32_t dy = -reach; dy <= reach; ++dy) {
-      for (std::int32_t dz = -reach; dz <= reach; ++dz) {
-        const std::uint32_t at =
-            grid.find({cell.voxel[0] + dx, cell.voxel[1] + dy, cell.voxel[2] + dz});
-        if (at == VoxelGrid::kNone) continue;
-        const Moments m =
-            grid.cells()[at].moments().about(grid.resolution() * -Vector3d(dx, dy, dz));
-        around.moments.add(m);
-        around.distances.push_back((m.mean() - own).norm());
-      }
-    }
-  }
+  window.for_each(cell, reach, [&](const VoxelCell& other, int dx, int dy, int dz) {
+    const Vector3d mean = other.moments().mean() + grid.resolution() * Vector3d(dx, dy, dz);
+    around.distances.push_back((mean - own).norm());
+  });
   return around;
 }
 
 /// The widened surfel, or nothing where the surroundings are not planar.
 std::optional<BuildSurfel> widened(const VoxelGrid& grid,
+                                   NeighbourWindow& window,
                                    const VoxelCell& cell,
                                    const BuildSurfel& surfel) {
   Surroundings around;
   for (std::int32_t reach = 1; reach <= kWidest; ++reach) {
-    around = surroundings_of(grid, cell, reach);
-    if (around.distances.size() >= kEnoughCells) break;
+    around = surroundings_of(grid, window, cell, reach);
+    if (around.distances.size() < kEnoughCells) continue;
+    around.moments = window.moments(cell, reach);
+    break;
   }
   if (around.distances.size() < kEnoughCells) return std::nullopt;
   const CovarianceAxes axes = covariance_axes(around.moments.covariance());
@@ -106,12 +103,13 @@ std::uint64_t grow_sparse_surfels(const VoxelGrid& grid,
   const auto sparse = sparse_blocks(grid, surfels);
   std::atomic<std::uint64_t> grown{0};
   executor.parallel_for(surfels.size(), 2048, [&](std::size_t begin, std::size_t end) {
+    NeighbourWindow window(grid);
     for (std::size_t i = begin; i < end; ++i) {
       const VoxelCell& cell = grid.cells()[i];
       if (cell.n >= kSparse) continue;
       const auto block = sparse.find(block_of(grid, cell));
       if (block == sparse.end() || !block->second) continue;
-      if (const auto wide = widened(grid, cell, surfels[i])) {
+      if (const auto wide = widened(grid, window, cell, surfels[i])) {
         surfels[i] = *wide;
         ++grown;
       }

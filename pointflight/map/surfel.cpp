@@ -1,6 +1,7 @@
 #include "pointflight/map/surfel.hpp"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 
@@ -16,13 +17,15 @@ float spread_of_code(std::uint32_t code) {
 }
 
 std::uint64_t code_of_spread(float spread) {
-  std::uint32_t best = 0;
-  for (std::uint32_t code = 1; code < 32; ++code) {
-    if (std::abs(spread_of_code(code) - spread) < std::abs(spread_of_code(best) - spread)) {
-      best = code;
-    }
-  }
-  return best;
+  static const std::array<float, 32> spreads = [] {
+    std::array<float, 32> all{};
+    for (std::uint32_t code = 0; code < 32; ++code) all[code] = spread_of_code(code);
+    return all;
+  }();
+  // the nearer of the two around it
+  const auto above = std::lower_bound(spreads.begin() + 1, spreads.end() - 1, spread);
+  const bool lower = spread - *(above - 1) <= *above - spread;
+  return static_cast<std::uint64_t>(above - spreads.begin()) - (lower ? 1 : 0);
 }
 
 std::uint64_t code_of_ratio(float ratio) {

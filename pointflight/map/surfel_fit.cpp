@@ -29,11 +29,11 @@ Matrix3d planar_frame(const CovarianceAxes& plane, const CovarianceAxes& own) {
   return frame;
 }
 
-BuildSurfel fit(const VoxelGrid& grid, const VoxelCell& cell) {
+BuildSurfel fit(const VoxelGrid& grid, NeighbourWindow& window, const VoxelCell& cell) {
   const double r = grid.resolution();
   const double cell_variance = r * r / 12.0;  // of a plane that fills the cell, per axis
   const Moments own = cell.moments();
-  Moments near = grid.neighbourhood(cell, 1);
+  const Moments near = window.moments(cell, 1);
   const CovarianceAxes around = covariance_axes(near.covariance());
   Matrix3d own_covariance = own.covariance();
   if (!own_covariance.allFinite()) own_covariance.setZero();
@@ -91,8 +91,9 @@ std::vector<BuildSurfel> fit_surfels(const VoxelGrid& grid,
   const auto& cells = grid.cells();
   std::vector<BuildSurfel> surfels(cells.size());
   executor.parallel_for(cells.size(), 2048, [&](std::size_t begin, std::size_t end) {
+    NeighbourWindow window(grid);
     for (std::size_t i = begin; i < end; ++i) {
-      surfels[i] = fit(grid, cells[i]);
+      surfels[i] = fit(grid, window, cells[i]);
       const auto& v = cells[i].voxel;
       surfels[i].morton = morton_encode(static_cast<std::uint32_t>(v[0] - min_voxel[0]),
                                         static_cast<std::uint32_t>(v[1] - min_voxel[1]),

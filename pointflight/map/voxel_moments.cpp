@@ -7,13 +7,14 @@ namespace {
 
 constexpr double kMaxCells = 1 << 20;
 
-std::uint64_t hash_voxel(const std::array<std::int32_t, 3>& voxel) {
-  // large odd constants, then a finaliser (Murmur3's) so that neighbours scatter
-  std::uint64_t h = static_cast<std::uint32_t>(voxel[0]) * 0x9e3779b97f4a7c15ull;
-  h ^= static_cast<std::uint32_t>(voxel[1]) * 0xc2b2ae3d27d4eb4full;
-  h ^= static_cast<std::uint32_t>(voxel[2]) * 0x165667b19e3779f9ull;
+constexpr std::size_t kSlotsMin = 1 << 12;
+
+/// Murmur3's finaliser: neighbours scatter.
+std::uint64_t hash_key(std::uint64_t h) {
   h ^= h >> 33;
   h *= 0xff51afd7ed558ccdull;
+  h ^= h >> 33;
+  h *= 0xc4ceb9fe1a85ec53ull;
   h ^= h >> 33;
   return h;
 }
@@ -40,18 +41,39 @@ Moments VoxelCell::moments() const {
 }
 
 VoxelGrid::VoxelGrid(const Vector3d& base_world, double resolution)
-    : base_(base_world), resolution_(resolution), slots_(1 << 16, kNone) {}
+    : base_(base_world), resolution_(resolution), slots_(kSlotsMin, kNone) {}
 
-std::size_t VoxelGrid::slot_of(const std::array<std::int32_t, 3>& voxel) const {
+std::uint64_t VoxelGrid::brick_key(std::int32_t x, std::int32_t y, std::int32_t z) {
+  // 19 bits and a sign each
+  constexpr std::uint64_t kMask = (1u << 21) - 1;
+  const auto part = [](std::int32_t v) { return static_cast<std::uint64_t>(v >> 2) & kMask; };
+  return part(x) | part(y) << 21 | part(z) << 42;
+}
+
+std::size_t VoxelGrid::slot_of(std::uint64_t key) const {
   const std::size_t mask = slots_.size() - 1;
-  std::size_t slot = hash_voxel(voxel) & mask;
-  while (slots_[slot] != kNone && cells_[slots_[slot]].voxel != voxel) slot = (slot + 1) & mask;
+  std::size_t slot = hash_key(key) & mask;
+  while (slots_[slot] != kNone && bricks_[slots_[slot]].key != key) slot = (slot + 1) & mask;
   return slot;
 }
 
-void VoxelGrid::grow(std::size_t slots) {
+std::uint32_t VoxelGrid::find_brick(std::uint64_t key) const {
+  return slots_[slot_of(key)];
+}
+
+void VoxelGrid::resize_table(std::size_t slots) {
   slots_.assign(slots, kNone);
-  for (std::uint32_t i = 0; i < cells_.size(); ++i) slots_[slot_of(cells_[i].voxel)] = i;
+  for (std::uint32_t i = 0; i < bricks_.size(); ++i) slots_[slot_of(bricks_[i].key)] = i;
+}
+
+std::uint32_t VoxelGrid::add_brick(std::uint64_t key) {
+  if (2 * (bricks_.size() + 1) > slots_.size()) resize_table(2 * slots_.size());
+  const auto index = static_cast<std::uint32_t>(bricks_.size());
+  slots_[slot_of(key)] = index;
+  Brick& brick = bricks_.emplace_back();
+  brick.key = key;
+  brick.cells.fill(kNone);
+  return index;
 }
 
 VoxelCell* VoxelGrid::cell_at(const Vector3d& cells) {
@@ -60,16 +82,17 @@ VoxelCell* VoxelGrid::cell_at(const Vector3d& cells) {
   const std::array<std::int32_t, 3> voxel = {static_cast<std::int32_t>(low.x()),
                                              static_cast<std::int32_t>(low.y()),
                                              static_cast<std::int32_t>(low.z())};
-  std::size_t slot = slot_of(voxel);
-  if (slots_[slot] == kNone) {
-    if (2 * (cells_.size() + 1) > slots_.size()) {
-      grow(2 * slots_.size());
-      slot = slot_of(voxel);
-    }
-    slots_[slot] = static_cast<std::uint32_t>(cells_.size());
+  const std::uint64_t key = brick_key(voxel[0], voxel[1], voxel[2]);
+  if (last_brick_ == kNone || bricks_[last_brick_].key != key) {
+    last_brick_ = find_brick(key);
+    if (last_brick_ == kNone) last_brick_ = add_brick(key);
+  }
+  std::uint32_t& cell = bricks_[last_brick_].cells[place_in_brick(voxel[0], voxel[1], voxel[2])];
+  if (cell == kNone) {
+    cell = static_cast<std::uint32_t>(cells_.size());
     cells_.emplace_back().voxel = voxel;
   }
-  return &cells_[slots_[slot]];
+  return &cells_[cell];
 }
 
 bool VoxelGrid::add(const Vector3d& point_world, float intensity) {
@@ -114,22 +137,61 @@ bool VoxelGrid::add(const Vector3d& mean_world,
   return true;
 }
 
-Moments VoxelGrid::neighbourhood(const VoxelCell& cell, std::int32_t reach) const {
-  Moments all;
-  for (std::int32_t dx = -reach; dx <= reach; ++dx) {
-    for (std::int32_t dy = -reach; dy <= reach; ++dy) {
-      for (std::int32_t dz = -reach; dz <= reach; ++dz) {
-        const std::uint32_t at = find({cell.voxel[0] + dx, cell.voxel[1] + dy, cell.voxel[2] + dz});
-        if (at == kNone) continue;
-        all.add(cells_[at].moments().about(resolution_ * -Vector3d(dx, dy, dz)));
+std::uint32_t VoxelGrid::find(const std::array<std::int32_t, 3>& voxel) const {
+  const std::uint32_t brick = find_brick(brick_key(voxel[0], voxel[1], voxel[2]));
+  return brick == kNone ? kNone
+                        : bricks_[brick].cells[place_in_brick(voxel[0], voxel[1], voxel[2])];
+}
+
+void NeighbourWindow::move_to(const VoxelCell& cell) {
+  const auto& v = cell.voxel;
+  const std::uint64_t key = VoxelGrid::brick_key(v[0], v[1], v[2]);
+  if (key == key_) return;
+  key_ = key;
+  std::size_t i = 0;
+  for (const std::int32_t dx : {-4, 0, 4}) {
+    for (const std::int32_t dy : {-4, 0, 4}) {
+      for (const std::int32_t dz : {-4, 0, 4}) {
+        const std::uint32_t at =
+            grid_.find_brick(VoxelGrid::brick_key(v[0] + dx, v[1] + dy, v[2] + dz));
+        around_[i++] = at == VoxelGrid::kNone ? nullptr : &grid_.bricks_[at];
       }
     }
   }
-  return all;
 }
 
-std::uint32_t VoxelGrid::find(const std::array<std::int32_t, 3>& voxel) const {
-  return slots_[slot_of(voxel)];
+Moments NeighbourWindow::moments(const VoxelCell& cell, std::int32_t reach) {
+  double n = 0.0;
+  std::array<double, 3> sum{};
+  std::array<double, 6> products{};
+  const double r = grid_.resolution();
+  for_each(cell, reach, [&](const VoxelCell& other, int dx, int dy, int dz) {
+    // sum of (q + d) and (q + d)(q + d)^T over the points q of the other cell
+    const double count = other.n;
+    const std::array<double, 3> d = {r * dx, r * dy, r * dz};
+    const std::array<double, 3> s = {static_cast<double>(other.sum[0]),
+                                     static_cast<double>(other.sum[1]),
+                                     static_cast<double>(other.sum[2])};
+    const std::array<double, 3> t = {s[0] + count * d[0], s[1] + count * d[1], s[2] + count * d[2]};
+    n += count;
+    for (std::size_t k = 0; k < 3; ++k) sum[k] += t[k];
+    const auto product = [&](std::size_t k, std::size_t a, std::size_t b) {
+      products[k] += static_cast<double>(other.products[k]) + s[a] * d[b] + t[b] * d[a];
+    };
+    product(0, 0, 0);
+    product(1, 0, 1);
+    product(2, 0, 2);
+    product(3, 1, 1);
+    product(4, 1, 2);
+    product(5, 2, 2);
+  });
+  Moments all;
+  all.n = n;
+  all.sum = {sum[0], sum[1], sum[2]};
+  all.products << products[0], products[1], products[2],  //
+      products[1], products[3], products[4],              //
+      products[2], products[4], products[5];
+  return all;
 }
 
 Vector3d VoxelGrid::centroid_world(const VoxelCell& cell) const {
@@ -143,7 +205,16 @@ void VoxelGrid::reorder(const std::vector<std::uint32_t>& indices) {
   kept.reserve(indices.size());
   for (const std::uint32_t i : indices) kept.push_back(cells_[i]);
   cells_ = std::move(kept);
-  grow(slots_.size());
+  bricks_.clear();
+  slots_.assign(kSlotsMin, kNone);
+  last_brick_ = kNone;
+  for (std::uint32_t i = 0; i < cells_.size(); ++i) {
+    const auto& v = cells_[i].voxel;
+    const std::uint64_t key = brick_key(v[0], v[1], v[2]);
+    std::uint32_t brick = find_brick(key);
+    if (brick == kNone) brick = add_brick(key);
+    bricks_[brick].cells[place_in_brick(v[0], v[1], v[2])] = i;
+  }
 }
 
 }  // namespace pointflight

@@ -64,9 +64,6 @@ class VoxelGrid {
   [[nodiscard]] std::uint32_t find(const std::array<std::int32_t, 3>& voxel) const;
   static constexpr std::uint32_t kNone = 0xffffffffu;
 
-  /// Moments of the (2 reach + 1)^3 cells around one, relative to its centre.
-  [[nodiscard]] Moments neighbourhood(const VoxelCell& cell, std::int32_t reach) const;
-
   /// World position of the cell's mean point.
   [[nodiscard]] Vector3d centroid_world(const VoxelCell& cell) const;
 
@@ -76,13 +73,72 @@ class VoxelGrid {
  private:
   /// The cell of a place given in cells from the base, made where it is new; null out of reach.
   VoxelCell* cell_at(const Vector3d& cells);
-  [[nodiscard]] std::size_t slot_of(const std::array<std::int32_t, 3>& voxel) const;
-  void grow(std::size_t slots);
+  friend class NeighbourWindow;
+
+  /// 4 x 4 x 4 voxels: neighbours lie together, so that few look-ups in the table are needed.
+  struct Brick {
+    std::uint64_t key = 0;
+    std::array<std::uint32_t, 64>
+        cells{};  ///< Indices into cells_, or kNone; x, y, z fastest last.
+  };
+  static std::uint64_t brick_key(std::int32_t x, std::int32_t y, std::int32_t z);
+  static std::size_t place_in_brick(std::int32_t x, std::int32_t y, std::int32_t z) {
+    return static_cast<std::size_t>((x & 3) << 4 | (y & 3) << 2 | (z & 3));
+  }
+  /// Index of a brick in bricks_, or kNone.
+  [[nodiscard]] std::uint32_t find_brick(std::uint64_t key) const;
+  [[nodiscard]] std::size_t slot_of(std::uint64_t key) const;
+  std::uint32_t add_brick(std::uint64_t key);
+  void resize_table(std::size_t slots);
 
   Vector3d base_;
   double resolution_;
   std::vector<VoxelCell> cells_;
-  std::vector<std::uint32_t> slots_;  ///< Open addressing: indices into cells_, or kNone.
+  std::vector<Brick> bricks_;
+  std::vector<std::uint32_t> slots_;  ///< Open addressing: indices into bricks_, or kNone.
+  std::uint32_t last_brick_ = kNone;  ///< The one added to last: scans stay in one for a while.
+};
+
+/// Looks around cells of a grid that does not change. One a thread; fast where consecutive cells
+/// lie near each other.
+class NeighbourWindow {
+ public:
+  static constexpr std::int32_t kReachMax = 4;
+
+  explicit NeighbourWindow(const VoxelGrid& grid) : grid_(grid) {}
+
+  /// Moments of the (2 reach + 1)^3 cells around one, relative to its centre; `reach` up to
+  /// kReachMax.
+  [[nodiscard]] Moments moments(const VoxelCell& cell, std::int32_t reach);
+
+  /// Calls `visit(neighbour, dx, dy, dz)` for the occupied cells around one, itself included, with
+  /// their distances in voxels.
+  template <class Visit>
+  void for_each(const VoxelCell& cell, std::int32_t reach, const Visit& visit) {
+    move_to(cell);
+    const auto& v = cell.voxel;
+    for (std::int32_t dx = -reach; dx <= reach; ++dx) {
+      for (std::int32_t dy = -reach; dy <= reach; ++dy) {
+        for (std::int32_t dz = -reach; dz <= reach; ++dz) {
+          const std::int32_t x = (v[0] & 3) + dx;
+          const std::int32_t y = (v[1] & 3) + dy;
+          const std::int32_t z = (v[2] & 3) + dz;
+          const VoxelGrid::Brick* brick =
+              around_[static_cast<std::size_t>((x >> 2) * 9 + (y >> 2) * 3 + (z >> 2) + 13)];
+          if (brick == nullptr) continue;
+          const std::uint32_t at = brick->cells[VoxelGrid::place_in_brick(x, y, z)];
+          if (at != VoxelGrid::kNone) visit(grid_.cells_[at], dx, dy, dz);
+        }
+      }
+    }
+  }
+
+ private:
+  void move_to(const VoxelCell& cell);
+
+  const VoxelGrid& grid_;
+  std::uint64_t key_ = ~0ull;                         ///< Of the brick in the middle.
+  std::array<const VoxelGrid::Brick*, 27> around_{};  ///< Null where empty.
 };
 
 }  // namespace pointflight
