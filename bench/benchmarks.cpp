@@ -56,6 +56,7 @@ const Bench& bench() {
 }
 
 void scan(benchmark::State& state, const char* lidar_name, const char* renderer_name) {
+  bench();
   const Lidar lidar(load_lidar(lidar_name), 0);
   const auto renderer = make_renderer(renderer_name, Scene{bench().map});
   const Executor executor(static_cast<int>(state.range(0)));
@@ -101,13 +102,14 @@ void pattern(benchmark::State& state) {
 BENCHMARK(pattern)->Unit(benchmark::kMillisecond);
 
 void nearest(benchmark::State& state) {
+  bench();
   const RandomStream random(1, StreamId::kTest, 0);
   std::uint64_t i = 0;
   for (auto _ : state) {
     const Vector3d p(random.uniform(3 * i, 5, 55),
                      random.uniform(3 * i + 1, 5, 55),
                      random.uniform(3 * i + 2, 0.5, 4));
-    benchmark::DoNotOptimize(bench().map->nearest(p, 10.0));
+    benchmark::DoNotOptimize(bench().map->nearest(p, 1.0));
     ++i;
   }
   state.SetItemsProcessed(state.iterations());

@@ -5,7 +5,7 @@ get_property(modules GLOBAL PROPERTY POINTFLIGHT_MODULES)
 install(TARGETS ${modules} EXPORT pointflight ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
 install(TARGETS pointflight RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 install(DIRECTORY pointflight DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}
-        FILES_MATCHING PATTERN "*.hpp")
+        FILES_MATCHING PATTERN "*.hpp" PATTERN "*-inl.hpp" EXCLUDE)
 install(FILES ${PROJECT_BINARY_DIR}/generated/pointflight/core/version.hpp
         DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/pointflight/core)
 install(DIRECTORY data/ DESTINATION ${CMAKE_INSTALL_DATADIR}/pointflight)

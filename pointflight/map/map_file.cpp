@@ -186,6 +186,7 @@ void SurfelMap::attach(std::span<const std::byte> bytes, const std::string& name
   bytes_ = bytes;
   file_size_ = bytes.size();
   resolution_ = header.resolution;
+  scale_ = SurfelScale(static_cast<float>(resolution_));
   for (int axis = 0; axis < 3; ++axis) {
     origin_[axis] = header.origin[axis];
     bounds_.min[axis] = header.bounds_min[axis];

@@ -9,6 +9,7 @@
 
 #include "pointflight/geometry/types.hpp"
 #include "pointflight/map/bvh8.hpp"
+#include "pointflight/map/surfel_scale.hpp"
 
 namespace pointflight {
 
@@ -100,6 +101,7 @@ class SurfelMap {
   std::span<const std::uint8_t> intensity_;
   std::string_view metadata_;
   double resolution_ = 0.0;
+  SurfelScale scale_;
   Vector3d origin_ = Vector3d::Zero();
   Aabb bounds_;
   RenderModel model_;

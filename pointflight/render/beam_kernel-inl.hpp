@@ -17,14 +17,15 @@
 #include <cstddef>
 #include <cstring>
 
+#include "pointflight/core/simd8-inl.hpp"
+#include "pointflight/map/surfel_lanes-inl.hpp"
 #include "pointflight/render/beam_kernel.hpp"
-#include "pointflight/render/simd8-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace pointflight::HWY_NAMESPACE {
 
 /// Rays that one thread follows at the same time: while one waits for its node, others compute.
-inline constexpr std::size_t kInFlight = 8;
+inline constexpr std::size_t kInFlight = 16;
 /// 7 siblings a level and 60 levels of Morton bits; a corrupt map stops being followed here.
 inline constexpr std::size_t kStack = 512;
 inline constexpr std::size_t kHits = 256;
@@ -168,70 +169,6 @@ HWY_INLINE std::size_t push_children(const KernelMap& map,
     stack[at] = child;
   }
   return depth;
-}
-
-/// The surfels of a leaf, one a lane, decoded: what does not depend on the beam.
-struct SurfelLanes {
-  F8 x, y, z;    ///< Centre from the leaf's origin, m.
-  F8 variance2;  ///< s2^2, m^2
-  F8 widest;     ///< The largest variance: the surfel reaches M times its root.
-  U8 low, high;
-};
-
-HWY_INLINE SurfelLanes load_surfels(const KernelMap& map, const SurfelWord* words) {
-  SurfelLanes s;  // NOLINT(cppcoreguidelines-pro-type-member-init): all is written
-  load_words(words, s.low, s.high);
-  const F8 step = splat(map.place_step);
-  const F8 half = splat(0.5f);
-  const U8 ten = splat_bits(1023u);
-  s.x = (to_float(s.low & ten) + half) * step;
-  s.y = (to_float(right<10>(s.low) & ten) + half) * step;
-  s.z = (to_float(right<20>(s.low) & ten) + half) * step;
-  const U8 code = right<27>(s.high) * splat_bits(0x288000u) + splat_bits(0x3b6bedfau);
-  s.variance2 = as_float(code) * splat(map.r_squared);
-  s.widest = max(s.variance2, look_up4(map.widest, right<30>(s.low)));
-  return s;
-}
-
-/// S R: the axes as rows, each divided by its standard deviation; and s0, m.
-struct Shapes {
-  F8 m0x, m0y, m0z, m1x, m1y, m1z, m2x, m2y, m2z;
-  F8 s0;
-};
-
-HWY_INLINE Shapes decode_shapes(const KernelMap& map, const SurfelLanes& s) {
-  const F8 one = splat(1.0f);
-  const F8 two = splat(2.0f);
-  const F8 step = splat(0.70711f / 127.0f);
-  const F8 qx = signed_top_byte(left<24>(s.high)) * step;
-  const F8 qy = signed_top_byte(left<16>(s.high)) * step;
-  const F8 qz = signed_top_byte(left<8>(s.high)) * step;
-  const F8 xx = qx * qx;
-  const F8 yy = qy * qy;
-  const F8 zz = qz * qz;
-  const F8 qw = sqrt(max(splat(0.0f), one - xx - yy - zz));
-  const F8 xy = qx * qy;
-  const F8 xz = qx * qz;
-  const F8 yz = qy * qz;
-  const F8 wx = qw * qx;
-  const F8 wy = qw * qy;
-  const F8 wz = qw * qz;
-  const U8 thickness = right<30>(s.low);
-  const F8 i0 = look_up4(map.inverse_thickness, thickness);
-  const F8 i2 = one / sqrt(s.variance2);
-  const F8 i1 = i2 * look_up8(map.inverse_ratio, right<24>(s.high) & splat_bits(7u));
-  Shapes e;  // NOLINT(cppcoreguidelines-pro-type-member-init): all is written
-  e.m0x = (one - two * (yy + zz)) * i0;
-  e.m0y = two * (xy + wz) * i0;
-  e.m0z = two * (xz - wy) * i0;
-  e.m1x = two * (xy - wz) * i1;
-  e.m1y = (one - two * (xx + zz)) * i1;
-  e.m1z = two * (yz + wx) * i1;
-  e.m2x = two * (xz + wy) * i2;
-  e.m2y = two * (yz - wx) * i2;
-  e.m2z = (one - two * (xx + yy)) * i2;
-  e.s0 = look_up4(map.thickness, thickness);
-  return e;
 }
 
 /// A place in the frames of eight surfels, in their standard deviations.
@@ -380,7 +317,7 @@ HWY_INLINE void visit_leaf(const KernelMap& map,
   const F8 dx = splat(s.direction[0]);
   const F8 dy = splat(s.direction[1]);
   const F8 dz = splat(s.direction[2]);
-  const SurfelLanes surfels = load_surfels(map, map.words + entry.index + 1);
+  const SurfelLanes surfels = load_surfels(map.scale, map.words + entry.index + 1);
   const F8 x = surfels.x + splat(vx);
   const F8 y = surfels.y + splat(vy);
   const F8 z = surfels.z + splat(vz);
@@ -394,7 +331,7 @@ HWY_INLINE void visit_leaf(const KernelMap& map,
       px * px + py * py + pz * pz <= surfels.widest * splat(map.support_squared * 1.01f);
   if ((bits(near_by) & lanes) == 0) return;
 
-  const Shapes e = decode_shapes(map, surfels);
+  const Shapes e = decode_shapes(map.scale, surfels);
   const Meeting meeting = meet(whiten(e, x, y, z), whiten(e, dx, dy, dz), e.s0);
   const M8 accepted = (meeting.m2 < splat(map.support_squared)) & (splat(0.0f) <= meeting.t) &
                       (meeting.t <= splat(s.end));

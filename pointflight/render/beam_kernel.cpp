@@ -34,24 +34,12 @@ KernelMap kernel_map_of(const SurfelMap& map) {
   k.word_count = map.words().size();
   for (int axis = 0; axis < 3; ++axis) k.origin[axis] = map.origin_world()[axis];
   k.resolution = map.resolution();
-  k.r = static_cast<float>(map.resolution());
   k.support_squared = m.support * m.support;
   k.inverse_support = 1.0f / k.support_squared;
   // c = 36 / (pi M^2): the weights of a covered plane average 1
   k.weight_scale = kWeightOne * 36.0f / (static_cast<float>(kPi) * k.support_squared);
-  k.r_squared = k.r * k.r;
-  k.place_step = k.r / 64.0f;
-  for (int i = 0; i < 4; ++i) {
-    k.thickness[i] = kThicknessClasses[i] * k.r;
-    k.inverse_thickness[i] = 1.0f / k.thickness[i];
-    k.widest[i] = i < 2 ? 0.0f : k.thickness[i] * k.thickness[i];
-  }
-  float ratio = 1.0f;
-  for (float& inverse : k.inverse_ratio) {
-    inverse = 1.0f / ratio;
-    ratio *= 0.75f;
-  }
-  k.window = m.window * k.r;
+  k.scale = SurfelScale(static_cast<float>(map.resolution()));
+  k.window = m.window * static_cast<float>(map.resolution());
   k.tau = static_cast<std::int32_t>(m.tau * kWeightOne);
   return k;
 }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "pointflight/map/surfel_map.hpp"
+#include "pointflight/map/surfel_scale.hpp"
 #include "pointflight/render/renderer.hpp"
 
 namespace pointflight {
@@ -19,18 +20,12 @@ struct KernelMap {
   std::size_t word_count;
   double origin[3];  ///< World position of voxel (0, 0, 0), m.
   double resolution;
-  float r;                ///< The same.
   float support_squared;  ///< M^2
   float inverse_support;  ///< 1 / M^2
   float weight_scale;     ///< Weight of a hit in the middle, in steps of kWeightOne.
-  float r_squared;
-  float place_step;                ///< r / 64: of the surfels' places.
-  alignas(16) float thickness[4];  ///< s0 of each class, m.
-  alignas(16) float inverse_thickness[4];
-  alignas(16) float widest[4];         ///< s0^2 of the classes that can lie above s2^2, else 0.
-  alignas(32) float inverse_ratio[8];  ///< s2 / s1 of each code.
-  float window;                        ///< m
-  std::int32_t tau;                    ///< In steps of kWeightOne.
+  SurfelScale scale;
+  float window;      ///< m
+  std::int32_t tau;  ///< In steps of kWeightOne.
 };
 
 /// Weights are whole numbers of 2^-20: their sums do not depend on the order of adding.

@@ -256,7 +256,7 @@ struct PacketLeaf {
 };
 
 HWY_INLINE void decode(const KernelMap& map, const Packet& p, PacketLeaf& leaf) {
-  const Shapes e = decode_shapes(map, leaf.lanes);
+  const Shapes e = decode_shapes(map.scale, leaf.lanes);
   const F8* const all[10] = {
       &e.m0x, &e.m0y, &e.m0z, &e.m1x, &e.m1y, &e.m1z, &e.m2x, &e.m2y, &e.m2z, &e.s0};
   for (int k = 0; k < 10; ++k) store(*all[k], leaf.shape[k]);
@@ -346,7 +346,7 @@ HWY_INLINE void visit_leaf(const KernelMap& map, Packet& p, const Entry& entry) 
   if (entry.meta - 1u > 7u || entry.index + entry.meta + kLeafPadding >= map.word_count) return;
   const LeafHeader header = decode_leaf(map.words[entry.index]);
   PacketLeaf leaf;  // NOLINT(cppcoreguidelines-pro-type-member-init): written before it is read
-  leaf.lanes = load_surfels(map, map.words + entry.index + 1);
+  leaf.lanes = load_surfels(map.scale, map.words + entry.index + 1);
   leaf.first_word = entry.index + 1;
   leaf.corner[0] = header.x * map.resolution;
   leaf.corner[1] = header.y * map.resolution;

@@ -2,12 +2,12 @@
 // halves on SSE4 and NEON. Only operations that IEEE 754 rounds the same everywhere, no fused
 // multiply-add and no approximate reciprocal: results are the same bits on every target.
 //
-// Included once a target by Highway's foreach_target; see beam_kernel.cpp.
-#if defined(POINTFLIGHT_RENDER_SIMD8_INL_HPP) == defined(HWY_TARGET_TOGGLE)
-#ifdef POINTFLIGHT_RENDER_SIMD8_INL_HPP
-#undef POINTFLIGHT_RENDER_SIMD8_INL_HPP
+// Included once a target by Highway's foreach_target; see render/beam_kernel.cpp.
+#if defined(POINTFLIGHT_CORE_SIMD8_INL_HPP) == defined(HWY_TARGET_TOGGLE)
+#ifdef POINTFLIGHT_CORE_SIMD8_INL_HPP
+#undef POINTFLIGHT_CORE_SIMD8_INL_HPP
 #else
-#define POINTFLIGHT_RENDER_SIMD8_INL_HPP
+#define POINTFLIGHT_CORE_SIMD8_INL_HPP
 #endif
 
 #include <hwy/highway.h>
