@@ -8,6 +8,9 @@ function(pointflight_target_options target)
     $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
   # Random123 and gcc 12's own headers as others' code
   target_include_directories(${target} SYSTEM PRIVATE ${POINTFLIGHT_RANDOM123})
+  if(CMAKE_SYSTEM_PROCESSOR MATCHES "aarch64|arm64")
+    target_compile_options(${target} PRIVATE -march=armv8-a+crypto)  # Highway's NEON counts on it
+  endif()
   if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
     # false alarms of gcc 12 inside Eigen and libstdc++ at -O3
     target_compile_options(${target} PRIVATE -Wno-maybe-uninitialized -Wno-array-bounds

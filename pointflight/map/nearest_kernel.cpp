@@ -4,8 +4,8 @@
 #include <bit>
 #include <cstring>
 
-// as in render/beam_kernel.cpp
-#define HWY_DISABLED_TARGETS (HWY_AVX3_DL | HWY_SSSE3 | HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_RVV)
+#include "pointflight/core/simd_targets.hpp"
+// for foreach_target
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "pointflight/map/nearest_kernel.cpp"
 #include <hwy/foreach_target.h>

@@ -8,9 +8,8 @@
 
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/input_error.hpp"
-
-// AVX3_DL brings nothing that the kernel uses; vectors without a fixed size cannot be members
-#define HWY_DISABLED_TARGETS (HWY_AVX3_DL | HWY_SSSE3 | HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_RVV)
+#include "pointflight/core/simd_targets.hpp"
+// for foreach_target
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "pointflight/render/beam_kernel.cpp"
 #include <hwy/foreach_target.h>

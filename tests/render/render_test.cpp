@@ -17,6 +17,7 @@
 namespace pointflight {
 namespace {
 
+using testing::import_points;
 using testing::map_of;
 
 /// A grid of rays from one origin, `step_deg` apart.
@@ -303,6 +304,37 @@ TEST(BeamRenderer, TheSameBitsOnEveryInstructionSetAndInEveryOrder) {
   for (std::size_t i = 0; i < bits.size(); ++i) {
     ASSERT_EQ(bits[i], expected[i / 3 * 37 * 3 + i % 3]);
   }
+}
+
+TEST(BeamRenderer, TheShapeOfTheTreeDoesNotShow) {
+  ShapeScene scene;
+  scene.add_box({-4, -4, -2}, {4, 4, 2});
+  scene.shapes.emplace_back(Sphere{{2, 2, 0}, 0.5});
+  std::vector<CloudPoint> points;
+  scene.sample(800.0, 0.01, 1, [&](const Vector3d& p) { points.push_back({p, 0.0f}); });
+  ImportOptions options;
+  options.resolution = 0.1;
+  const ImportedMap normal = import_points(points, options);
+  options.quality = TreeQuality::kHigh;
+  const ImportedMap high = import_points(points, options);
+  EXPECT_EQ(normal.report.surfels, high.report.surfels);
+  EXPECT_LT(high.tree.nodes.size(), 2 * normal.tree.nodes.size());
+  const auto rays = fan({0.3, 0.2, 0.1}, 170, 70, 1.3);
+  const auto map_from = [](const ImportedMap& map) {
+    const auto opened = SurfelMap::from_bytes(map_bytes(map.tree, map.description), "memory");
+    opened->verify();
+    return opened;
+  };
+  const auto a = render(BeamRenderer(Scene{map_from(normal)}), rays);
+  const auto b = render(BeamRenderer(Scene{map_from(high)}), rays);
+  std::size_t differing = 0;
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    // places are rounded from another leaf's corner
+    const bool same =
+        a[i].is_return() == b[i].is_return() && std::abs(a[i].range - b[i].range) < 1e-4f;
+    differing += same ? 0 : 1;
+  }
+  EXPECT_LE(differing, rays.size() / 1000);
 }
 
 TEST(BeamRenderer, BeamsAlongAWallDoNotOverflowUnseen) {
