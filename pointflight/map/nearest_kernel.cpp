@@ -15,6 +15,9 @@
 HWY_BEFORE_NAMESPACE();
 namespace pointflight::HWY_NAMESPACE {
 
+/// 7 siblings a level and 60 levels of Morton bits; a corrupt map stops being followed here.
+inline constexpr std::size_t kStack = 512;
+
 /// A subtree or leaf that may hold something nearer.
 struct Waiting {
   float bound;  ///< Lower bound of the squared distance.
@@ -55,6 +58,31 @@ HWY_INLINE F8 surfel_distances(const SurfelScale& scale, const SurfelWord* words
          outside(e.m2x * x + e.m2y * y + e.m2z * z, s2);
 }
 
+/// Pushes the children of a node that lie nearer than `limit`, the nearest on top. Returns the new
+/// depth of the stack.
+HWY_INLINE std::size_t push_near(
+    const Bvh8Node& node, const float* p, float limit, Waiting* stack, std::size_t depth) {
+  alignas(32) float bounds[8];
+  const F8 all = child_bounds(node, p);
+  store(all, bounds);
+  const std::uint32_t near_by = bits(all <= splat(limit));
+  std::uint32_t inner = node.first_inner;
+  std::uint32_t word = node.first_leaf_word;
+  const std::size_t bottom = depth;
+  for (std::uint32_t i = 0; i < 8 && near_by >> i != 0; ++i) {
+    const std::uint32_t meta = node.meta[i];
+    const bool is_inner = meta == Bvh8Node::kInner;
+    const std::uint32_t index = is_inner ? inner : word;
+    inner += is_inner ? 1u : 0u;
+    word += is_inner || meta == 0 ? 0u : meta + 1u;
+    if ((near_by >> i & 1u) == 0 || meta == 0 || depth == kStack) continue;
+    std::size_t at = depth++;
+    for (; at > bottom && stack[at - 1].bound < bounds[i]; --at) stack[at] = stack[at - 1];
+    stack[at] = {bounds[i], index, meta};
+  }
+  return depth;
+}
+
 static NearestWord nearest(const Bvh8Node* nodes,
                            std::size_t node_count,
                            const SurfelWord* words,
@@ -63,8 +91,6 @@ static NearestWord nearest(const Bvh8Node* nodes,
                            double resolution,
                            const double* point,
                            float limit) {
-  // 7 siblings a level and 60 levels of Morton bits; a corrupt map stops being followed here
-  constexpr std::size_t kStack = 512;
   Waiting stack[kStack];
   std::size_t depth = 0;
   NearestWord best;
@@ -93,25 +119,7 @@ static NearestWord nearest(const Bvh8Node* nodes,
       continue;
     }
     if (entry.index >= node_count) continue;
-    const Bvh8Node& node = nodes[entry.index];
-    const F8 all = child_bounds(node, p);
-    store(all, bounds);
-    std::uint32_t near_by = bits(all <= splat(best.squared_distance));
-    std::uint32_t inner = node.first_inner;
-    std::uint32_t word = node.first_leaf_word;
-    const std::size_t bottom = depth;
-    for (std::uint32_t i = 0; i < 8 && near_by >> i != 0; ++i) {
-      const std::uint32_t meta = node.meta[i];
-      const bool is_inner = meta == Bvh8Node::kInner;
-      const std::uint32_t index = is_inner ? inner : word;
-      inner += is_inner ? 1u : 0u;
-      word += is_inner || meta == 0 ? 0u : meta + 1u;
-      if ((near_by >> i & 1u) == 0 || meta == 0 || depth == kStack) continue;
-      // insertion by distance, the nearest on top
-      std::size_t at = depth++;
-      for (; at > bottom && stack[at - 1].bound < bounds[i]; --at) stack[at] = stack[at - 1];
-      stack[at] = {bounds[i], index, meta};
-    }
+    depth = push_near(nodes[entry.index], p, best.squared_distance, stack, depth);
   }
   return best;
 }

@@ -21,12 +21,12 @@ struct SurfelScale {
   }
 
   float r_squared;
-  float place_step;                ///< Of the surfels' places, m.
-  alignas(16) float thickness[4];  ///< s0 of each class, m.
-  alignas(16) float inverse_thickness[4];
-  alignas(16) float widest[4];  ///< s0^2 of the classes that can lie above s2^2, else 0.
-  alignas(32) float ratio[8];   ///< s1 / s2 of each code.
-  alignas(32) float inverse_ratio[8];
+  float place_step;                     ///< Of the surfels' places, m.
+  alignas(16) float thickness[4] = {};  ///< s0 of each class, m.
+  alignas(16) float inverse_thickness[4] = {};
+  alignas(16) float widest[4] = {};  ///< s0^2 of the classes that can lie above s2^2, else 0.
+  alignas(32) float ratio[8] = {};   ///< s1 / s2 of each code.
+  alignas(32) float inverse_ratio[8] = {};
 };
 
 }  // namespace pointflight

@@ -123,8 +123,8 @@ class NeighbourWindow {
           const std::int32_t x = (v[0] & 3) + dx;
           const std::int32_t y = (v[1] & 3) + dy;
           const std::int32_t z = (v[2] & 3) + dz;
-          const VoxelGrid::Brick* brick =
-              around_[static_cast<std::size_t>((x >> 2) * 9 + (y >> 2) * 3 + (z >> 2) + 13)];
+          const std::int32_t place = (x >> 2) * 9 + (y >> 2) * 3 + (z >> 2) + 13;
+          const VoxelGrid::Brick* brick = around_[static_cast<std::size_t>(place)];
           if (brick == nullptr) continue;
           const std::uint32_t at = brick->cells[VoxelGrid::place_in_brick(x, y, z)];
           if (at != VoxelGrid::kNone) visit(grid_.cells_[at], dx, dy, dz);

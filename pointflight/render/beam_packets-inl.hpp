@@ -245,6 +245,7 @@ HWY_INLINE void shorten(const KernelMap& map, Packet& p, std::size_t g) {
 }
 
 /// What the groups need of a leaf's surfels.
+// NOLINTNEXTLINE(cppcoreguidelines-pro-type-member-init): written before it is read
 struct PacketLeaf {
   SurfelLanes lanes;
   double corner[3];  ///< The leaf's origin from the map's origin, m.
