@@ -49,6 +49,30 @@ RealScan read_scan(const std::string& folder, const std::string& name, const Pos
   return scan;
 }
 
+/// Points in nanoflann's tree, as it asks for them.
+struct PointTree {
+  std::vector<Vector3f> points;  ///< World, from `origin`.
+  Vector3d origin = Vector3d::Zero();
+
+  [[nodiscard]] std::size_t kdtree_get_point_count() const { return points.size(); }
+  [[nodiscard]] double kdtree_get_pt(std::size_t i, std::size_t axis) const {
+    return static_cast<double>(points[i][static_cast<int>(axis)]);
+  }
+  template <class Box>
+  bool kdtree_get_bbox(Box& /*box*/) const {
+    return false;
+  }
+  using Index = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, PointTree>,
+                                                    PointTree,
+                                                    3,
+                                                    std::uint32_t>;
+  std::unique_ptr<Index> index;
+
+  void build() {
+    index = std::make_unique<Index>(3, *this, nanoflann::KDTreeSingleIndexAdaptorParams(16));
+  }
+};
+
 /// nanoflann's result set that stops once enough points are found.
 // NOLINTBEGIN(readability-identifier-naming): nanoflann asks for these names
 class EnoughPoints {
@@ -95,21 +119,7 @@ std::vector<RealScan> read_real_scans(const std::string& folder, const std::stri
   return scans;
 }
 
-struct SupportCloud::Tree {
-  std::vector<Vector3f> points;
-  Vector3d origin = Vector3d::Zero();
-  [[nodiscard]] std::size_t kdtree_get_point_count() const { return points.size(); }
-  [[nodiscard]] double kdtree_get_pt(std::size_t i, std::size_t axis) const {
-    return static_cast<double>(points[i][static_cast<int>(axis)]);
-  }
-  template <class Box>
-  bool kdtree_get_bbox(Box& /*box*/) const {
-    return false;
-  }
-  using Index = nanoflann::
-      KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, Tree>, Tree, 3, std::uint32_t>;
-  std::unique_ptr<Index> index;
-};
+struct SupportCloud::Tree : PointTree {};
 
 SupportCloud::SupportCloud(const std::string& path) : tree_(std::make_unique<Tree>()) {
   const auto reader = open_cloud(path);
@@ -122,8 +132,7 @@ SupportCloud::SupportCloud(const std::string& path) : tree_(std::make_unique<Tre
     }
   }
   if (tree_->points.empty()) throw InputError(fmt::format("{}: no points", path));
-  tree_->index =
-      std::make_unique<Tree::Index>(3, *tree_, nanoflann::KDTreeSingleIndexAdaptorParams(16));
+  tree_->build();
 }
 
 SupportCloud::~SupportCloud() = default;
@@ -165,21 +174,8 @@ std::vector<ComparedRay> compare_scan(const RealScan& scan,
   return compared;
 }
 
-struct ScanPlanes::Tree {
-  std::vector<Vector3f> points;  ///< World, from `origin`.
-  std::vector<std::uint32_t> scan;
-  Vector3d origin = Vector3d::Zero();
-  [[nodiscard]] std::size_t kdtree_get_point_count() const { return points.size(); }
-  [[nodiscard]] double kdtree_get_pt(std::size_t i, std::size_t axis) const {
-    return static_cast<double>(points[i][static_cast<int>(axis)]);
-  }
-  template <class Box>
-  bool kdtree_get_bbox(Box& /*box*/) const {
-    return false;
-  }
-  using Index = nanoflann::
-      KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, Tree>, Tree, 3, std::uint32_t>;
-  std::unique_ptr<Index> index;
+struct ScanPlanes::Tree : PointTree {
+  std::vector<std::uint32_t> scan;  ///< Of each point.
 };
 
 ScanPlanes::ScanPlanes(const std::vector<RealScan>& scans)
@@ -192,8 +188,7 @@ ScanPlanes::ScanPlanes(const std::vector<RealScan>& scans)
       tree_->scan.push_back(i);
     }
   }
-  tree_->index =
-      std::make_unique<Tree::Index>(3, *tree_, nanoflann::KDTreeSingleIndexAdaptorParams(16));
+  tree_->build();
 }
 
 ScanPlanes::~ScanPlanes() = default;
