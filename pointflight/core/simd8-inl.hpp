@@ -15,6 +15,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "pointflight/core/simd_targets.hpp"
+
 HWY_BEFORE_NAMESPACE();
 namespace pointflight::HWY_NAMESPACE {
 
@@ -48,114 +50,114 @@ struct M8 {
 };
 
 // NOLINTBEGIN(cppcoreguidelines-pro-type-member-init): each part is written
-HWY_INLINE F8 splat(float x) {
+POINTFLIGHT_INLINE F8 splat(float x) {
   F8 out;
   POINTFLIGHT_EACH(hn::Set(kF, x))
   return out;
 }
 /// From eight floats on a 32-byte border.
-HWY_INLINE F8 load(const float* x) {
+POINTFLIGHT_INLINE F8 load(const float* x) {
   F8 out;
   POINTFLIGHT_EACH(hn::Load(kF, x + p * kWidth))
   return out;
 }
-HWY_INLINE F8 load_unaligned(const float* x) {
+POINTFLIGHT_INLINE F8 load_unaligned(const float* x) {
   F8 out;
   POINTFLIGHT_EACH(hn::LoadU(kF, x + p * kWidth))
   return out;
 }
-HWY_INLINE void store(const F8& a, float* x) {
+POINTFLIGHT_INLINE void store(const F8& a, float* x) {
   for (std::size_t p = 0; p < kParts; ++p) hn::Store(a.v[p], kF, x + p * kWidth);
 }
-HWY_INLINE void store_unaligned(const F8& a, float* x) {
+POINTFLIGHT_INLINE void store_unaligned(const F8& a, float* x) {
   for (std::size_t p = 0; p < kParts; ++p) hn::StoreU(a.v[p], kF, x + p * kWidth);
 }
 /// Eight bytes as floats.
-HWY_INLINE F8 load_bytes(const std::uint8_t* x) {
+POINTFLIGHT_INLINE F8 load_bytes(const std::uint8_t* x) {
   F8 out;
   const hn::Rebind<std::uint8_t, FloatTag> bytes;
   POINTFLIGHT_EACH(hn::ConvertTo(kF, hn::PromoteTo(kI, hn::LoadU(bytes, x + p * kWidth))))
   return out;
 }
-HWY_INLINE F8 operator+(const F8& a, const F8& b) {
+POINTFLIGHT_INLINE F8 operator+(const F8& a, const F8& b) {
   F8 out;
   POINTFLIGHT_EACH(hn::Add(a.v[p], b.v[p]))
   return out;
 }
-HWY_INLINE F8 operator-(const F8& a, const F8& b) {
+POINTFLIGHT_INLINE F8 operator-(const F8& a, const F8& b) {
   F8 out;
   POINTFLIGHT_EACH(hn::Sub(a.v[p], b.v[p]))
   return out;
 }
-HWY_INLINE F8 operator*(const F8& a, const F8& b) {
+POINTFLIGHT_INLINE F8 operator*(const F8& a, const F8& b) {
   F8 out;
   POINTFLIGHT_EACH(hn::Mul(a.v[p], b.v[p]))
   return out;
 }
-HWY_INLINE F8 operator/(const F8& a, const F8& b) {
+POINTFLIGHT_INLINE F8 operator/(const F8& a, const F8& b) {
   F8 out;
   POINTFLIGHT_EACH(hn::Div(a.v[p], b.v[p]))
   return out;
 }
-HWY_INLINE F8 sqrt(const F8& a) {
+POINTFLIGHT_INLINE F8 sqrt(const F8& a) {
   F8 out;
   POINTFLIGHT_EACH(hn::Sqrt(a.v[p]))
   return out;
 }
-HWY_INLINE F8 abs(const F8& a) {
+POINTFLIGHT_INLINE F8 abs(const F8& a) {
   F8 out;
   POINTFLIGHT_EACH(hn::Abs(a.v[p]))
   return out;
 }
-HWY_INLINE F8 max(const F8& a, const F8& b) {
+POINTFLIGHT_INLINE F8 max(const F8& a, const F8& b) {
   F8 out;
   POINTFLIGHT_EACH(hn::Max(a.v[p], b.v[p]))
   return out;
 }
-HWY_INLINE F8 min(const F8& a, const F8& b) {
+POINTFLIGHT_INLINE F8 min(const F8& a, const F8& b) {
   F8 out;
   POINTFLIGHT_EACH(hn::Min(a.v[p], b.v[p]))
   return out;
 }
-HWY_INLINE M8 operator<=(const F8& a, const F8& b) {
+POINTFLIGHT_INLINE M8 operator<=(const F8& a, const F8& b) {
   M8 out;
   POINTFLIGHT_EACH(hn::Le(a.v[p], b.v[p]))
   return out;
 }
-HWY_INLINE M8 operator<(const F8& a, const F8& b) {
+POINTFLIGHT_INLINE M8 operator<(const F8& a, const F8& b) {
   M8 out;
   POINTFLIGHT_EACH(hn::Lt(a.v[p], b.v[p]))
   return out;
 }
-HWY_INLINE M8 operator&(const M8& a, const M8& b) {
+POINTFLIGHT_INLINE M8 operator&(const M8& a, const M8& b) {
   M8 out;
   POINTFLIGHT_EACH(hn::And(a.v[p], b.v[p]))
   return out;
 }
-HWY_INLINE F8 select(const M8& condition, const F8& yes, const F8& no) {
+POINTFLIGHT_INLINE F8 select(const M8& condition, const F8& yes, const F8& no) {
   F8 out;
   POINTFLIGHT_EACH(hn::IfThenElse(condition.v[p], yes.v[p], no.v[p]))
   return out;
 }
-HWY_INLINE I8 select(const M8& condition, const I8& yes, const I8& no) {
+POINTFLIGHT_INLINE I8 select(const M8& condition, const I8& yes, const I8& no) {
   I8 out;
   POINTFLIGHT_EACH(hn::IfThenElse(hn::RebindMask(kI, condition.v[p]), yes.v[p], no.v[p]))
   return out;
 }
 /// a and not b
-HWY_INLINE M8 without(const M8& a, const M8& b) {
+POINTFLIGHT_INLINE M8 without(const M8& a, const M8& b) {
   M8 out;
   POINTFLIGHT_EACH(hn::AndNot(b.v[p], a.v[p]))
   return out;
 }
 /// Zero where the condition does not hold.
-HWY_INLINE I8 keep(const M8& condition, const I8& a) {
+POINTFLIGHT_INLINE I8 keep(const M8& condition, const I8& a) {
   I8 out;
   POINTFLIGHT_EACH(hn::IfThenElseZero(hn::RebindMask(kI, condition.v[p]), a.v[p]))
   return out;
 }
 /// Bit i is lane i.
-HWY_INLINE std::uint32_t bits(const M8& a) {
+POINTFLIGHT_INLINE std::uint32_t bits(const M8& a) {
   std::uint32_t all = 0;
   for (std::size_t p = 0; p < kParts; ++p) {
     std::uint8_t part[8];
@@ -165,57 +167,57 @@ HWY_INLINE std::uint32_t bits(const M8& a) {
   return all;
 }
 
-HWY_INLINE U8 splat_bits(std::uint32_t x) {
+POINTFLIGHT_INLINE U8 splat_bits(std::uint32_t x) {
   U8 out;
   POINTFLIGHT_EACH(hn::Set(kU, x))
   return out;
 }
-HWY_INLINE U8 operator&(const U8& a, const U8& b) {
+POINTFLIGHT_INLINE U8 operator&(const U8& a, const U8& b) {
   U8 out;
   POINTFLIGHT_EACH(hn::And(a.v[p], b.v[p]))
   return out;
 }
-HWY_INLINE U8 operator+(const U8& a, const U8& b) {
+POINTFLIGHT_INLINE U8 operator+(const U8& a, const U8& b) {
   U8 out;
   POINTFLIGHT_EACH(hn::Add(a.v[p], b.v[p]))
   return out;
 }
-HWY_INLINE U8 operator*(const U8& a, const U8& b) {
+POINTFLIGHT_INLINE U8 operator*(const U8& a, const U8& b) {
   U8 out;
   POINTFLIGHT_EACH(hn::Mul(a.v[p], b.v[p]))
   return out;
 }
 template <int kBits>
-HWY_INLINE U8 right(const U8& a) {
+POINTFLIGHT_INLINE U8 right(const U8& a) {
   U8 out;
   POINTFLIGHT_EACH(hn::ShiftRight<kBits>(a.v[p]))
   return out;
 }
 template <int kBits>
-HWY_INLINE U8 left(const U8& a) {
+POINTFLIGHT_INLINE U8 left(const U8& a) {
   U8 out;
   POINTFLIGHT_EACH(hn::ShiftLeft<kBits>(a.v[p]))
   return out;
 }
 /// The upper eight bits as a signed number.
-HWY_INLINE F8 signed_top_byte(const U8& a) {
+POINTFLIGHT_INLINE F8 signed_top_byte(const U8& a) {
   F8 out;
   POINTFLIGHT_EACH(hn::ConvertTo(kF, hn::ShiftRight<24>(hn::BitCast(kI, a.v[p]))))
   return out;
 }
 /// Numbers below 2^31 as floats.
-HWY_INLINE F8 to_float(const U8& a) {
+POINTFLIGHT_INLINE F8 to_float(const U8& a) {
   F8 out;
   POINTFLIGHT_EACH(hn::ConvertTo(kF, hn::BitCast(kI, a.v[p])))
   return out;
 }
-HWY_INLINE F8 as_float(const U8& a) {
+POINTFLIGHT_INLINE F8 as_float(const U8& a) {
   F8 out;
   POINTFLIGHT_EACH(hn::BitCast(kF, a.v[p]))
   return out;
 }
 /// table[index], one number after the other: where vectors are shorter than the table.
-HWY_INLINE F8 look_up_each(const float* table, const U8& index) {
+POINTFLIGHT_INLINE F8 look_up_each(const float* table, const U8& index) {
   std::uint32_t places[8];
   float values[8];
   for (std::size_t p = 0; p < kParts; ++p) hn::StoreU(index.v[p], kU, places + p * kWidth);
@@ -223,7 +225,7 @@ HWY_INLINE F8 look_up_each(const float* table, const U8& index) {
   return load_unaligned(values);
 }
 /// table[index] for indices below four.
-HWY_INLINE F8 look_up4(const float* table, const U8& index) {
+POINTFLIGHT_INLINE F8 look_up4(const float* table, const U8& index) {
   if constexpr (kWidth < 4) return look_up_each(table, index);
   F8 out;
   const auto values = hn::LoadDup128(kF, table);
@@ -231,7 +233,7 @@ HWY_INLINE F8 look_up4(const float* table, const U8& index) {
   return out;
 }
 /// table[index] for indices below eight.
-HWY_INLINE F8 look_up8(const float* table, const U8& index) {
+POINTFLIGHT_INLINE F8 look_up8(const float* table, const U8& index) {
   if constexpr (kWidth < 8) return look_up_each(table, index);
   F8 out;
   const auto values = hn::LoadU(kF, table);
@@ -239,7 +241,7 @@ HWY_INLINE F8 look_up8(const float* table, const U8& index) {
   return out;
 }
 /// Lanes in which any of the given bits is set.
-HWY_INLINE M8 any_bit(const U8& a, std::uint32_t bits) {
+POINTFLIGHT_INLINE M8 any_bit(const U8& a, std::uint32_t bits) {
   M8 out;
   const auto wanted = hn::Set(kU, bits);
   POINTFLIGHT_EACH(hn::RebindMask(kF, hn::TestBit(a.v[p], wanted)))
@@ -247,84 +249,84 @@ HWY_INLINE M8 any_bit(const U8& a, std::uint32_t bits) {
 }
 
 /// Towards zero.
-HWY_INLINE I8 to_int(const F8& a) {
+POINTFLIGHT_INLINE I8 to_int(const F8& a) {
   I8 out;
   POINTFLIGHT_EACH(hn::ConvertTo(kI, a.v[p]))
   return out;
 }
-HWY_INLINE I8 load_unaligned(const std::int32_t* x) {
+POINTFLIGHT_INLINE I8 load_unaligned(const std::int32_t* x) {
   I8 out;
   POINTFLIGHT_EACH(hn::LoadU(kI, x + p * kWidth))
   return out;
 }
 /// first, first + 1, ... first + 7
-HWY_INLINE I8 count_from(std::int32_t first) {
+POINTFLIGHT_INLINE I8 count_from(std::int32_t first) {
   I8 out;
   POINTFLIGHT_EACH(hn::Iota(kI, first + static_cast<std::int32_t>(p * kWidth)))
   return out;
 }
-HWY_INLINE I8 splat_int(std::int32_t x) {
+POINTFLIGHT_INLINE I8 splat_int(std::int32_t x) {
   I8 out;
   POINTFLIGHT_EACH(hn::Set(kI, x))
   return out;
 }
-HWY_INLINE I8 load(const std::int32_t* x) {
+POINTFLIGHT_INLINE I8 load(const std::int32_t* x) {
   I8 out;
   POINTFLIGHT_EACH(hn::Load(kI, x + p * kWidth))
   return out;
 }
-HWY_INLINE void store(const I8& a, std::int32_t* x) {
+POINTFLIGHT_INLINE void store(const I8& a, std::int32_t* x) {
   for (std::size_t p = 0; p < kParts; ++p) hn::Store(a.v[p], kI, x + p * kWidth);
 }
-HWY_INLINE I8 operator+(const I8& a, const I8& b) {
+POINTFLIGHT_INLINE I8 operator+(const I8& a, const I8& b) {
   I8 out;
   POINTFLIGHT_EACH(hn::Add(a.v[p], b.v[p]))
   return out;
 }
-HWY_INLINE I8 operator*(const I8& a, const I8& b) {
+POINTFLIGHT_INLINE I8 operator*(const I8& a, const I8& b) {
   I8 out;
   POINTFLIGHT_EACH(hn::Mul(a.v[p], b.v[p]))
   return out;
 }
 template <int kBits>
-HWY_INLINE I8 right(const I8& a) {
+POINTFLIGHT_INLINE I8 right(const I8& a) {
   I8 out;
   POINTFLIGHT_EACH(hn::ShiftRight<kBits>(a.v[p]))
   return out;
 }
-HWY_INLINE M8 operator<(const I8& a, const I8& b) {
+POINTFLIGHT_INLINE M8 operator<(const I8& a, const I8& b) {
   M8 out;
   POINTFLIGHT_EACH(hn::RebindMask(kF, hn::Lt(a.v[p], b.v[p])))
   return out;
 }
-HWY_INLINE M8 operator==(const I8& a, const I8& b) {
+POINTFLIGHT_INLINE M8 operator==(const I8& a, const I8& b) {
   M8 out;
   POINTFLIGHT_EACH(hn::RebindMask(kF, hn::Eq(a.v[p], b.v[p])))
   return out;
 }
-HWY_INLINE F8 to_float(const I8& a) {
+POINTFLIGHT_INLINE F8 to_float(const I8& a) {
   F8 out;
   POINTFLIGHT_EACH(hn::ConvertTo(kF, a.v[p]))
   return out;
 }
 /// Splits eight 64-bit words into their halves.
-HWY_INLINE void load_words(const std::uint64_t* x, U8& low, U8& high) {
+POINTFLIGHT_INLINE void load_words(const std::uint64_t* x, U8& low, U8& high) {
   const auto* halves = reinterpret_cast<const std::uint32_t*>(x);
   for (std::size_t p = 0; p < kParts; ++p) {
     hn::LoadInterleaved2(kU, halves + 2 * p * kWidth, low.v[p], high.v[p]);
   }
 }
-HWY_INLINE std::int32_t sum(const I8& a) {
+POINTFLIGHT_INLINE std::int32_t sum(const I8& a) {
   auto all = a.v[0];
   for (std::size_t p = 1; p < kParts; ++p) all = hn::Add(all, a.v[p]);
   return hn::GetLane(hn::SumOfLanes(kI, all));
 }
-HWY_INLINE float greatest(const F8& a) {
+POINTFLIGHT_INLINE float greatest(const F8& a) {
   auto all = a.v[0];
   for (std::size_t p = 1; p < kParts; ++p) all = hn::Max(all, a.v[p]);
   return hn::GetLane(hn::MaxOfLanes(kF, all));
 }
-HWY_INLINE float least(const F8& a) {
+POINTFLIGHT_INLINE float least(const F8& a) {
   auto all = a.v[0];
   for (std::size_t p = 1; p < kParts; ++p) all = hn::Min(all, a.v[p]);
   return hn::GetLane(hn::MinOfLanes(kF, all));

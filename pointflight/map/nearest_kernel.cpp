@@ -26,7 +26,7 @@ struct Waiting {
 };
 
 /// Squared distances from a point to the boxes of eight children.
-HWY_INLINE F8 child_bounds(const Bvh8Node& node, const float* p) {
+POINTFLIGHT_INLINE F8 child_bounds(const Bvh8Node& node, const float* p) {
   const F8 scale = splat(node.scale);
   F8 sum = splat(0.0f);
   for (int axis = 0; axis < 3; ++axis) {
@@ -40,7 +40,9 @@ HWY_INLINE F8 child_bounds(const Bvh8Node& node, const float* p) {
 }
 
 /// Squared distances from a point to eight surfels' oriented boxes with half sides sqrt(3) s_k.
-HWY_INLINE F8 surfel_distances(const SurfelScale& scale, const SurfelWord* words, const float* v) {
+POINTFLIGHT_INLINE F8 surfel_distances(const SurfelScale& scale,
+                                       const SurfelWord* words,
+                                       const float* v) {
   const SurfelLanes s = load_surfels(scale, words);
   const Shapes e = decode_shapes(scale, s);
   const F8 x = s.x + splat(v[0]);
@@ -60,7 +62,7 @@ HWY_INLINE F8 surfel_distances(const SurfelScale& scale, const SurfelWord* words
 
 /// Pushes the children of a node that lie nearer than `limit`, the nearest on top. Returns the new
 /// depth of the stack.
-HWY_INLINE std::size_t push_near(
+POINTFLIGHT_INLINE std::size_t push_near(
     const Bvh8Node& node, const float* p, float limit, Waiting* stack, std::size_t depth) {
   alignas(32) float bounds[8];
   const F8 all = child_bounds(node, p);

@@ -22,7 +22,7 @@ struct SurfelLanes {
   U8 low, high;
 };
 
-HWY_INLINE SurfelLanes load_surfels(const SurfelScale& scale, const SurfelWord* words) {
+POINTFLIGHT_INLINE SurfelLanes load_surfels(const SurfelScale& scale, const SurfelWord* words) {
   SurfelLanes s;  // NOLINT(cppcoreguidelines-pro-type-member-init): all is written
   load_words(words, s.low, s.high);
   const F8 step = splat(scale.place_step);
@@ -43,7 +43,7 @@ struct Shapes {
   F8 s0;
 };
 
-HWY_INLINE Shapes decode_shapes(const SurfelScale& scale, const SurfelLanes& s) {
+POINTFLIGHT_INLINE Shapes decode_shapes(const SurfelScale& scale, const SurfelLanes& s) {
   const F8 one = splat(1.0f);
   const F8 two = splat(2.0f);
   const F8 step = splat(0.70711f / 127.0f);

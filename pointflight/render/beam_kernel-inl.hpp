@@ -67,7 +67,10 @@ struct RayState {
   HitLanes hits;
 };
 
-HWY_INLINE void start_ray(const KernelMap& map, const Ray& ray, std::uint32_t index, RayState& s) {
+POINTFLIGHT_INLINE void start_ray(const KernelMap& map,
+                                  const Ray& ray,
+                                  std::uint32_t index,
+                                  RayState& s) {
   s.start[3] = 0.0f;
   s.inverse[3] = 0.0f;
   s.ray = index;
@@ -94,7 +97,7 @@ HWY_INLINE void start_ray(const KernelMap& map, const Ray& ray, std::uint32_t in
 }
 
 /// Which children of the present node the ray enters before its end; `s.enter` says where.
-HWY_INLINE std::uint32_t test_node(RayState& s) {
+POINTFLIGHT_INLINE std::uint32_t test_node(RayState& s) {
   const Bvh8Node& node = *s.node;
   const auto* bytes = reinterpret_cast<const std::uint8_t*>(&node);
   // origin and scale of the node as distances along the ray
@@ -119,14 +122,17 @@ HWY_INLINE std::uint32_t test_node(RayState& s) {
   return bits(enter <= leave);
 }
 
-HWY_INLINE std::uint64_t meta_of(const Bvh8Node& node) {
+POINTFLIGHT_INLINE std::uint64_t meta_of(const Bvh8Node& node) {
   std::uint64_t meta = 0;
   std::memcpy(&meta, node.meta, 8);
   return meta;
 }
 
 /// The child in a lane of a node: inner ones are consecutive, and so are the words of leaves.
-HWY_INLINE Entry child_of(const Bvh8Node& node, std::uint64_t meta, const float* enter, int lane) {
+POINTFLIGHT_INLINE Entry child_of(const Bvh8Node& node,
+                                  std::uint64_t meta,
+                                  const float* enter,
+                                  int lane) {
   constexpr std::uint64_t kOnes = 0x0101010101010101ull;
   const int shift = 8 * lane;
   const std::uint64_t before = meta & ((1ull << shift) - 1ull);
@@ -142,7 +148,7 @@ HWY_INLINE Entry child_of(const Bvh8Node& node, std::uint64_t meta, const float*
       enter[lane], node.first_leaf_word + static_cast<std::uint32_t>((words * kOnes) >> 56), own};
 }
 
-HWY_INLINE void prefetch(const KernelMap& map, const Entry& entry) {
+POINTFLIGHT_INLINE void prefetch(const KernelMap& map, const Entry& entry) {
   const char* place = entry.meta == Bvh8Node::kInner
                           ? reinterpret_cast<const char*>(map.nodes + entry.index)
                           : reinterpret_cast<const char*>(map.words + entry.index);
@@ -152,12 +158,12 @@ HWY_INLINE void prefetch(const KernelMap& map, const Entry& entry) {
 
 /// Pushes the children of a node that were entered at `enter`, the nearest on top. Returns the new
 /// depth of the stack.
-HWY_INLINE std::size_t push_children(const KernelMap& map,
-                                     const Bvh8Node& node,
-                                     std::uint32_t entered,
-                                     const float* enter,
-                                     Entry* stack,
-                                     std::size_t depth) {
+POINTFLIGHT_INLINE std::size_t push_children(const KernelMap& map,
+                                             const Bvh8Node& node,
+                                             std::uint32_t entered,
+                                             const float* enter,
+                                             Entry* stack,
+                                             std::size_t depth) {
   const std::uint64_t meta = meta_of(node);
   const std::size_t bottom = depth;
   for (; entered != 0 && depth < kStack; entered &= entered - 1) {
@@ -176,7 +182,7 @@ struct Whitened {
   F8 x, y, z;
 };
 
-HWY_INLINE Whitened whiten(const Shapes& e, const F8& x, const F8& y, const F8& z) {
+POINTFLIGHT_INLINE Whitened whiten(const Shapes& e, const F8& x, const F8& y, const F8& z) {
   return {e.m0x * x + e.m0y * y + e.m0z * z,
           e.m1x * x + e.m1y * y + e.m1z * z,
           e.m2x * x + e.m2y * y + e.m2z * z};
@@ -191,7 +197,7 @@ struct Meeting {
   F8 cosine;  ///< |e0 . d|
 };
 
-HWY_INLINE Meeting meet(const Whitened& u, const Whitened& v, const F8& s0) {
+POINTFLIGHT_INLINE Meeting meet(const Whitened& u, const Whitened& v, const F8& s0) {
   Meeting result;  // NOLINT(cppcoreguidelines-pro-type-member-init): all is written
   result.t = (u.x * v.x + u.y * v.y + u.z * v.z) / (v.x * v.x + v.y * v.y + v.z * v.z);
   const F8 a0 = u.x - result.t * v.x;
@@ -203,14 +209,14 @@ HWY_INLINE Meeting meet(const Whitened& u, const Whitened& v, const F8& s0) {
 }
 
 /// Weights c (1 - m^2 / M^2)^2 in whole steps.
-HWY_INLINE I8 weights_of(const KernelMap& map, const F8& m2) {
+POINTFLIGHT_INLINE I8 weights_of(const KernelMap& map, const F8& m2) {
   const F8 share = splat(1.0f) - m2 * splat(map.inverse_support);
   return to_int(splat(map.weight_scale) * share * share);
 }
 
 /// The hit rule: the nearest hit a for which the weights within [t_a, t_a + window] reach tau.
 /// Returns its t, or kNever.
-HWY_INLINE float find_surface(const KernelMap& map, const HitLanes& hits) {
+POINTFLIGHT_INLINE float find_surface(const KernelMap& map, const HitLanes& hits) {
   float tried = -1.0f;
   while (true) {
     F8 nearest = splat(kNever);
@@ -233,7 +239,7 @@ HWY_INLINE float find_surface(const KernelMap& map, const HitLanes& hits) {
 }
 
 /// Looks for the surface; what lies behind it no longer matters.
-HWY_INLINE void shorten(const KernelMap& map, RayState& s) {
+POINTFLIGHT_INLINE void shorten(const KernelMap& map, RayState& s) {
   const float a = find_surface(map, s.hits);
   if (a == kNever) return;
   s.first = a;
@@ -273,12 +279,12 @@ static HWY_NOINLINE bool make_room(RayState& s) {
 }
 
 /// Adds the hits among eight lanes; `hit` has a bit for each. `first_word` is the word of lane 0.
-HWY_INLINE void add_hits(const KernelMap& map,
-                         RayState& s,
-                         std::uint32_t hit,
-                         const Meeting& meeting,
-                         std::uint32_t first_word,
-                         std::uint64_t& overflows) {
+POINTFLIGHT_INLINE void add_hits(const KernelMap& map,
+                                 RayState& s,
+                                 std::uint32_t hit,
+                                 const Meeting& meeting,
+                                 std::uint32_t first_word,
+                                 std::uint64_t& overflows) {
   if (s.hits.count + 8 > kHits) {
     shorten(map, s);
     overflows += make_room(s) ? 1 : 0;
@@ -304,10 +310,10 @@ HWY_INLINE void add_hits(const KernelMap& map,
   if (h.nearest < s.first && h.total >= map.tau) shorten(map, s);
 }
 
-HWY_INLINE void visit_leaf(const KernelMap& map,
-                           RayState& s,
-                           const Entry& entry,
-                           std::uint64_t& overflows) {
+POINTFLIGHT_INLINE void visit_leaf(const KernelMap& map,
+                                   RayState& s,
+                                   const Entry& entry,
+                                   std::uint64_t& overflows) {
   if (entry.meta - 1u > 7u || entry.index + entry.meta + kLeafPadding >= map.word_count) return;
   const LeafHeader leaf = decode_leaf(map.words[entry.index]);
   // in double: maps may be kilometres wide; and nothing here depends on the way to the leaf
@@ -346,7 +352,7 @@ struct Shares {
 };
 inline constexpr float kShareSteps = 4096.0f;
 
-HWY_INLINE Shares
+POINTFLIGHT_INLINE Shares
 shares_of(const KernelMap& map, const F8& first, const F8& t, const I8& weight, const F8& cosine) {
   const M8 inside = (first <= t) & (t <= first + splat(map.window));
   Shares s;  // NOLINT(cppcoreguidelines-pro-type-member-init): all is written
@@ -358,12 +364,12 @@ shares_of(const KernelMap& map, const F8& first, const F8& t, const I8& weight, 
   return s;
 }
 
-HWY_INLINE KernelHit return_of(const KernelMap& map,
-                               float first,
-                               std::int32_t weight,
-                               std::int32_t depth,
-                               std::int32_t cosine,
-                               std::uint32_t strongest) {
+POINTFLIGHT_INLINE KernelHit return_of(const KernelMap& map,
+                                       float first,
+                                       std::int32_t weight,
+                                       std::int32_t depth,
+                                       std::int32_t cosine,
+                                       std::uint32_t strongest) {
   const float total = static_cast<float>(weight) * kShareSteps;
   KernelHit hit;
   hit.range = first + static_cast<float>(depth) / total * map.window;
@@ -373,7 +379,7 @@ HWY_INLINE KernelHit return_of(const KernelMap& map,
 }
 
 /// The return: weighted means over the window.
-HWY_INLINE KernelHit finish(const KernelMap& map, const RayState& s) {
+POINTFLIGHT_INLINE KernelHit finish(const KernelMap& map, const RayState& s) {
   if (s.first == kNever) return {};
   const F8 first = splat(s.first);
   std::int32_t weight = 0;
@@ -402,10 +408,10 @@ HWY_INLINE KernelHit finish(const KernelMap& map, const RayState& s) {
 }
 
 /// On to the next inner node, through the leaves on the way. False at the end of the beam's way.
-HWY_INLINE bool advance(const KernelMap& map,
-                        RayState& s,
-                        std::uint32_t entered,
-                        std::uint64_t& overflows) {
+POINTFLIGHT_INLINE bool advance(const KernelMap& map,
+                                RayState& s,
+                                std::uint32_t entered,
+                                std::uint64_t& overflows) {
   if (s.steps == 0) return false;
   --s.steps;
   if (std::has_single_bit(entered)) {

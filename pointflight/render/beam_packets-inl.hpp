@@ -62,10 +62,10 @@ struct Packet {
 };
 
 /// Sets up a packet. False where its beams are better traced singly.
-HWY_INLINE bool gather(const KernelMap& map,
-                       const Ray* rays,
-                       const std::uint32_t* order,
-                       Packet& p) {
+POINTFLIGHT_INLINE bool gather(const KernelMap& map,
+                               const Ray* rays,
+                               const std::uint32_t* order,
+                               Packet& p) {
   Vector3f mean = Vector3f::Zero();
   for (std::size_t i = 0; i < kPacket; ++i) mean += rays[order[i]].direction_world;
   const float length = mean.norm();
@@ -155,7 +155,9 @@ HWY_INLINE bool gather(const KernelMap& map,
 }
 
 /// Which children the frustum may touch, and a lower bound of the distance to each.
-HWY_INLINE std::uint32_t test_node(const Packet& p, const Bvh8Node& node, float* distances) {
+POINTFLIGHT_INLINE std::uint32_t test_node(const Packet& p,
+                                           const Bvh8Node& node,
+                                           float* distances) {
   // lo x, y, z, hi x, y, z of the children, metres from the node's corner
   alignas(32) float sides[6][8];
   const F8 scale = splat(node.scale);
@@ -182,7 +184,7 @@ HWY_INLINE std::uint32_t test_node(const Packet& p, const Bvh8Node& node, float*
 }
 
 /// The hit rule for eight beams at once: where the surface of each begins, or kNever.
-HWY_INLINE F8 find_surfaces(const KernelMap& map, const HitRows& rows) {
+POINTFLIGHT_INLINE F8 find_surfaces(const KernelMap& map, const HitRows& rows) {
   const F8 never = splat(kNever);
   const F8 window = splat(map.window);
   const I8 tau = splat_int(map.tau - 1);
@@ -210,7 +212,7 @@ HWY_INLINE F8 find_surfaces(const KernelMap& map, const HitRows& rows) {
 }
 
 /// Forgets rows behind the ends of all beams.
-HWY_INLINE void drop_behind(HitRows& rows, const F8& end) {
+POINTFLIGHT_INLINE void drop_behind(HitRows& rows, const F8& end) {
   std::size_t kept = 0;
   for (std::size_t i = 0; i < rows.count; ++i) {
     const F8 t = load(rows.t[i]);
@@ -227,7 +229,7 @@ HWY_INLINE void drop_behind(HitRows& rows, const F8& end) {
 }
 
 /// Looks for the surfaces of a group that has new hits.
-HWY_INLINE void shorten(const KernelMap& map, Packet& p, std::size_t g) {
+POINTFLIGHT_INLINE void shorten(const KernelMap& map, Packet& p, std::size_t g) {
   Group& group = p.groups[g];
   // where the nearest hit begins the surface, farther ones cannot move it
   const M8 open = load(group.nearest) < load(group.first);
@@ -256,7 +258,7 @@ struct PacketLeaf {
   alignas(32) float whitened[3][8];  ///< From the apex: what all beams share where origins agree.
 };
 
-HWY_INLINE void decode(const KernelMap& map, const Packet& p, PacketLeaf& leaf) {
+POINTFLIGHT_INLINE void decode(const KernelMap& map, const Packet& p, PacketLeaf& leaf) {
   const Shapes e = decode_shapes(map.scale, leaf.lanes);
   const F8* const all[10] = {
       &e.m0x, &e.m0y, &e.m0z, &e.m1x, &e.m1y, &e.m1z, &e.m2x, &e.m2y, &e.m2z, &e.s0};
@@ -273,7 +275,7 @@ HWY_INLINE void decode(const KernelMap& map, const Packet& p, PacketLeaf& leaf) 
   store(u.z, leaf.whitened[2]);
 }
 
-HWY_INLINE Shapes shape_at(const PacketLeaf& leaf, std::size_t i) {
+POINTFLIGHT_INLINE Shapes shape_at(const PacketLeaf& leaf, std::size_t i) {
   const auto& s = leaf.shape;
   return {splat(s[0][i]),
           splat(s[1][i]),
@@ -289,7 +291,7 @@ HWY_INLINE Shapes shape_at(const PacketLeaf& leaf, std::size_t i) {
 
 /// Tests the surfels of `which` against the eight beams of a group.
 template <bool kOneOrigin>
-HWY_INLINE void meet_group(
+POINTFLIGHT_INLINE void meet_group(
     const KernelMap& map, Packet& p, std::size_t g, const PacketLeaf& leaf, std::uint32_t which) {
   Group& group = p.groups[g];
   alignas(32) float from[3][8];  // the leaf's origin from the beams'
@@ -343,7 +345,7 @@ HWY_INLINE void meet_group(
   shorten(map, p, g);
 }
 
-HWY_INLINE void visit_leaf(const KernelMap& map, Packet& p, const Entry& entry) {
+POINTFLIGHT_INLINE void visit_leaf(const KernelMap& map, Packet& p, const Entry& entry) {
   if (entry.meta - 1u > 7u || entry.index + entry.meta + kLeafPadding >= map.word_count) return;
   const LeafHeader header = decode_leaf(map.words[entry.index]);
   PacketLeaf leaf;  // NOLINT(cppcoreguidelines-pro-type-member-init): written before it is read
@@ -400,7 +402,7 @@ HWY_INLINE void visit_leaf(const KernelMap& map, Packet& p, const Entry& entry) 
   }
 }
 
-HWY_INLINE void walk(const KernelMap& map, Packet& p) {
+POINTFLIGHT_INLINE void walk(const KernelMap& map, Packet& p) {
   Entry stack[kStack];
   std::size_t depth = 0;
   stack[depth++] = {0.0f, 0, Bvh8Node::kInner};
@@ -419,10 +421,10 @@ HWY_INLINE void walk(const KernelMap& map, Packet& p) {
   }
 }
 
-HWY_INLINE void finish(const KernelMap& map,
-                       const Group& group,
-                       const std::uint32_t* order,
-                       KernelHit* hits) {
+POINTFLIGHT_INLINE void finish(const KernelMap& map,
+                               const Group& group,
+                               const std::uint32_t* order,
+                               KernelHit* hits) {
   const F8 first = load(group.first);
   I8 weight = splat_int(0);
   I8 depth = splat_int(0);
