@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <optional>
 
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/math.hpp"
@@ -50,6 +51,14 @@ class PaperRenderer::Image {
     columns_ = static_cast<int>(std::ceil(width / step_ - 1e-9)) + (full_turn_ ? 0 : 1);
     rows_ = static_cast<int>(std::floor((elevation_max_ - elevation_min_) / step_ + 1e-9)) + 1;
     column_step_ = full_turn_ ? width / columns_ : step_;
+    // half a pixel more, for points that round to the outermost
+    sin_low_ = math::sin(std::max(-kPi / 2, elevation_min_ - step_));
+    sin_high_ = math::sin(std::min(kPi / 2, elevation_max_ + step_));
+    narrow_ = !full_turn_ && width < 0.9 * kPi;
+    const auto from = math::sincos(azimuth_min_ - step_);
+    const auto to = math::sincos(azimuth_min_ + width + step_);
+    left_ = {-from.sin, from.cos};
+    right_ = {to.sin, -to.cos};
     pixels_.assign(static_cast<std::size_t>(rows_) * static_cast<std::size_t>(columns_),
                    {kEmpty, 0.0f, 0.0f});
     for (int c = 0; c < columns_; ++c) {
@@ -85,22 +94,56 @@ class PaperRenderer::Image {
     return off <= 0.5 * columns_ * column_step_ + half / cosine;
   }
 
-  /// Fills the pixels of rows [row_begin, row_end) within theta_max of the point.
-  void splat(const Vector3d& p,
-             const Vector3d& normal,
-             bool planar,
-             float intensity,
-             double radius,
-             int row_begin,
-             int row_end) {
+  /// A point on its way into the image.
+  struct Splat {
+    Vector3f p;  ///< Sensor frame, m.
+    Vector3f normal;
+    float intensity;
+    bool planar;
+    int first_row, last_row;  ///< Within theta_max, and the row that it projects to.
+    double row_at;
+    double azimuth;
+    double distance;
+    double theta_max;
+  };
+
+  /// False for a point that certainly fills no pixel, without trigonometry.
+  [[nodiscard]] bool in_view(const Vector3d& p, double distance, double radius) const {
+    const double beside = 1.6 * radius;  // theta_max is at most pi / 2 of the sine's angle
+    if (distance > range_max_ + radius || distance < 1e-6) return false;
+    if (p.z() > distance * sin_high_ + beside || p.z() < distance * sin_low_ - beside) return false;
+    if (full_turn_ || !narrow_) return true;
+    return left_.dot(p.head<2>()) >= -beside && right_.dot(p.head<2>()) >= -beside;
+  }
+
+  [[nodiscard]] std::optional<Splat> project(const Vector3d& p,
+                                             const Vector3d& normal,
+                                             bool planar,
+                                             float intensity,
+                                             double radius) const {
     const double distance = p.norm();
-    if (distance > range_max_ + radius || distance < 1e-6) return;
-    const double theta_max = distance > radius ? math::asin(radius / distance) : kPi / 2;
+    if (!in_view(p, distance, radius)) return std::nullopt;
+    Splat splat{p.cast<float>(), normal.cast<float>(), intensity, planar, 0, 0, 0, 0, distance, 0};
+    splat.theta_max = distance > radius ? math::asin(radius / distance) : kPi / 2;
     const Angles a = angles_of(p);
-    const double row_at = (a.elevation - elevation_min_) / step_;
-    const double reach = theta_max / step_;
-    const int first = std::max(row_begin, static_cast<int>(std::ceil(row_at - reach)));
-    const int last = std::min(row_end - 1, static_cast<int>(std::floor(row_at + reach)));
+    splat.azimuth = a.azimuth;
+    splat.row_at = (a.elevation - elevation_min_) / step_;
+    const double reach = splat.theta_max / step_;
+    const int nearest = static_cast<int>(std::lround(splat.row_at));
+    splat.first_row = std::min(nearest, static_cast<int>(std::ceil(splat.row_at - reach)));
+    splat.last_row = std::max(nearest, static_cast<int>(std::floor(splat.row_at + reach)));
+    if (splat.last_row < 0 || splat.first_row >= rows_) return std::nullopt;
+    return splat;
+  }
+
+  /// Fills the pixels of rows [row_begin, row_end) within theta_max of the point.
+  void fill(const Splat& splat, double radius, int row_begin, int row_end) {
+    const Vector3d p = splat.p.cast<double>();
+    const Vector3d normal = splat.normal.cast<double>();
+    const double distance = splat.distance;
+    const Angles a{splat.azimuth, 0.0};
+    const int first = std::max(row_begin, splat.first_row);
+    const int last = std::min(row_end - 1, splat.last_row);
     const Vector3d axis = p / distance;
     const double cos_max =
         std::sqrt(std::max(0.0, 1.0 - std::min(1.0, radius * radius / (distance * distance))));
@@ -109,21 +152,21 @@ class PaperRenderer::Image {
     for (int row = first; row <= last; ++row) {
       touched = fill_row(row,
                          a,
-                         theta_max,
+                         splat.theta_max,
                          axis,
                          cos_max,
                          normal,
                          plane_offset,
-                         planar,
+                         splat.planar,
                          distance,
-                         intensity) ||
+                         splat.intensity) ||
                 touched;
     }
     // smaller than a pixel: the pixel it projects to
-    const int nearest_row = static_cast<int>(std::lround(row_at));
+    const int nearest_row = static_cast<int>(std::lround(splat.row_at));
     if (!touched && nearest_row >= row_begin && nearest_row < row_end) {
       const int column = column_of(a.azimuth);
-      if (column >= 0) put(nearest_row, column, distance, 1.0, intensity);
+      if (column >= 0) put(nearest_row, column, distance, 1.0, splat.intensity);
     }
   }
 
@@ -204,6 +247,11 @@ class PaperRenderer::Image {
   double azimuth_min_ = 0.0;
   double elevation_min_ = 0.0;
   double elevation_max_ = 0.0;
+  double sin_low_ = -1.0;  ///< Of the elevations.
+  double sin_high_ = 1.0;
+  Eigen::Vector2d left_ = Eigen::Vector2d::Zero();  ///< Inward normals of the azimuths' wedge.
+  Eigen::Vector2d right_ = Eigen::Vector2d::Zero();
+  bool narrow_ = false;  ///< The wedge is less than half a turn.
   bool full_turn_ = false;
   int rows_ = 0;
   int columns_ = 0;
@@ -248,28 +296,39 @@ void PaperRenderer::render(const RayBatch& batch,
   const double ball = std::sqrt(3.0) / 2.0 * options_.voxel_length + radius;
   Image image(batch, angles, 2.0 * radius);
 
+  const Matrix3d turn = T_sensor_world.rotation.toRotationMatrix();
   std::vector<std::size_t> seen;
   const Vector3d half = Vector3d::Constant(0.5 * options_.voxel_length);
   for (std::size_t v = 0; v < voxels_.size(); ++v) {
     if (image.may_see(T_sensor_world * (voxels_[v].corner_world + half), ball)) seen.push_back(v);
   }
-  // bands of rows: each pixel belongs to one chunk, so the result does not depend on threads
-  const auto band = static_cast<std::size_t>(std::max(16, image.rows() / (2 * executor.threads())));
+  // first every point once, then bands of rows: each pixel belongs to one band, each band takes the
+  // points in the same order, so the result does not depend on threads
+  constexpr std::size_t kVoxels = 16;
+  std::vector<std::vector<Image::Splat>> splats((seen.size() + kVoxels - 1) / kVoxels);
+  executor.parallel_for(seen.size(), kVoxels, [&](std::size_t begin, std::size_t end) {
+    auto& own = splats[begin / kVoxels];
+    for (std::size_t v = begin; v < end; ++v) {
+      const Voxel& voxel = voxels_[seen[v]];
+      const Vector3d corner = T_sensor_world * voxel.corner_world;
+      for (const Point& point : voxel.points) {
+        const Vector3d p = corner + turn * point.position.cast<double>();
+        const Vector3d n = turn * point.normal.cast<double>();
+        if (const auto splat = image.project(p, n, point.planar, point.intensity, radius)) {
+          own.push_back(*splat);
+        }
+      }
+    }
+  });
+  constexpr std::size_t kBand = 32;
   executor.parallel_for(
-      static_cast<std::size_t>(image.rows()), band, [&](std::size_t begin, std::size_t end) {
-        for (const std::size_t v : seen) {
-          const Voxel& voxel = voxels_[v];
-          const Vector3d corner = T_sensor_world * voxel.corner_world;
-          for (const Point& point : voxel.points) {
-            const Vector3d p = corner + T_sensor_world.rotation * point.position.cast<double>();
-            const Vector3d n = T_sensor_world.rotation * point.normal.cast<double>();
-            image.splat(p,
-                        n,
-                        point.planar,
-                        point.intensity,
-                        radius,
-                        static_cast<int>(begin),
-                        static_cast<int>(end));
+      static_cast<std::size_t>(image.rows()), kBand, [&](std::size_t begin, std::size_t end) {
+        const int first = static_cast<int>(begin);
+        const int last = static_cast<int>(end) - 1;
+        for (const auto& chunk : splats) {
+          for (const Image::Splat& splat : chunk) {
+            if (splat.last_row < first || splat.first_row > last) continue;
+            image.fill(splat, radius, first, last + 1);
           }
         }
       });
