@@ -64,7 +64,7 @@ std::shared_ptr<const SurfelMap> map_of(const ExactScene& scene,
 class EmbreeDiscs {
  public:
   explicit EmbreeDiscs(const SurfelMap& map)
-      : device_(rtcNewDevice("threads=1")), scene_(rtcNewScene(device_)) {
+      : device_(rtcNewDevice(nullptr)), scene_(rtcNewScene(device_)) {
     const RTCGeometry discs = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_ORIENTED_DISC_POINT);
     const std::size_t n = map.surfel_count();
     auto* places = static_cast<float*>(rtcSetNewGeometryBuffer(

@@ -28,7 +28,8 @@ struct Executor::Arena {
 
 Executor::Executor(int threads)
     : threads_(threads > 0 ? threads : tbb::info::default_concurrency()),
-      arena_(std::make_unique<Arena>(threads_)) {}
+      // one thread needs none, and its limit would hold for every other executor too
+      arena_(threads_ > 1 ? std::make_unique<Arena>(threads_) : nullptr) {}
 
 void Executor::parallel_for(std::size_t count,
                             std::size_t chunk,
