@@ -346,7 +346,7 @@ POINTFLIGHT_INLINE void visit_leaf(const KernelMap& map,
 }
 
 /// Shares of a hit in the sums over the surface's window: whole numbers, so that no order shows,
-/// and small enough that 128 full weights fit.
+/// and small enough that 128 full weights fit 32 bits (a group of a packet holds kRows).
 struct Shares {
   I8 weight, depth, cosine;
 };
@@ -366,9 +366,9 @@ shares_of(const KernelMap& map, const F8& first, const F8& t, const I8& weight, 
 
 POINTFLIGHT_INLINE KernelHit return_of(const KernelMap& map,
                                        float first,
-                                       std::int32_t weight,
-                                       std::int32_t depth,
-                                       std::int32_t cosine,
+                                       std::int64_t weight,
+                                       std::int64_t depth,
+                                       std::int64_t cosine,
                                        std::uint32_t strongest) {
   const float total = static_cast<float>(weight) * kShareSteps;
   KernelHit hit;
@@ -382,9 +382,10 @@ POINTFLIGHT_INLINE KernelHit return_of(const KernelMap& map,
 POINTFLIGHT_INLINE KernelHit finish(const KernelMap& map, const RayState& s) {
   if (s.first == kNever) return {};
   const F8 first = splat(s.first);
-  std::int32_t weight = 0;
-  std::int32_t depth = 0;
-  std::int32_t cosine = 0;
+  // a full list can pass 32 bits; eight lanes of it cannot
+  std::int64_t weight = 0;
+  std::int64_t depth = 0;
+  std::int64_t cosine = 0;
   std::int32_t largest = -1;
   std::uint32_t strongest = 0;
   for (std::size_t i = 0; i < s.hits.count; i += 8) {

@@ -1,70 +1,20 @@
-#include <fmt/format.h>
-#include <gtest/gtest.h>
-#include <sys/wait.h>
+#include "tests/integration/program.hpp"
 
-#include <csignal>
-#include <cstdio>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <vector>
 
-#include "pointflight/core/resources.hpp"
-#include "tests/support.hpp"
-
-// Runs the program as a user would: exit codes, messages, files.
 namespace pointflight {
 namespace {
 
 using testing::expect_contains;
+using testing::expect_user_error;
+using testing::Program;
 using testing::read_file;
+using testing::Result;
+using testing::run;
 using testing::TemporaryFolder;
 using testing::write_file;
-
-struct Result {
-  int code = -1;
-  std::string out;
-  std::string err;
-};
-
-Result run(const std::string& arguments, const std::string& before = "") {
-  const TemporaryFolder folder;
-  const std::string command = fmt::format("{} '{}' {} >'{}' 2>'{}'",
-                                          before,
-                                          POINTFLIGHT_PROGRAM,
-                                          arguments,
-                                          folder / "out",
-                                          folder / "err");
-  const int status = std::system(command.c_str());  // NOLINT(concurrency-mt-unsafe)
-  Result result;
-  result.code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
-  result.out = read_file(folder / "out");
-  result.err = read_file(folder / "err");
-  return result;
-}
-
-/// One line on stderr that starts with the program's name, exit code 2.
-void expect_user_error(const Result& result, const std::string& words) {
-  EXPECT_EQ(result.code, 2) << result.err;
-  EXPECT_EQ(result.err.rfind("pointflight: ", 0), 0u) << result.err;
-  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
-  expect_contains(result.err, words);
-}
-
-/// A small forest, imported once for all tests of this file.
-class Program : public ::testing::Test {
- protected:
-  static void SetUpTestSuite() {
-    folder_ = new TemporaryFolder;
-    ASSERT_EQ(
-        run(fmt::format("map forest --size-x 24 --size-y 20 --density 300 -o {}", cloud())).code,
-        0);
-    ASSERT_EQ(run(fmt::format("map import {} -o {} --resolution 0.1", cloud(), map())).code, 0);
-  }
-  static void TearDownTestSuite() { delete folder_; }
-  static std::string cloud() { return *folder_ / "forest.pcd"; }
-  static std::string map() { return *folder_ / "forest.pfmap"; }
-  static TemporaryFolder* folder_;
-};
-TemporaryFolder* Program::folder_ = nullptr;
 
 TEST_F(Program, HelpAndVersionEverywhere) {
   expect_contains(run("--version").out, "pointflight 0.");
@@ -74,6 +24,8 @@ TEST_F(Program, HelpAndVersionEverywhere) {
                               "map info",
                               "map forest",
                               "scan",
+                              "compare",
+                              "fidelity",
                               "fly",
                               "scenario new",
                               "scenario check",
@@ -243,21 +195,6 @@ TEST_F(Program, ExportsTheOutliersThatItDropped) {
   expect_contains(read_file(folder / "dropped.pcd"), fmt::format("POINTS {}\n", dropped));
 }
 
-TEST_F(Program, FliesAMapWithoutAScenario) {
-  const TemporaryFolder folder;
-  const std::string small = folder / "small.pfmap";
-  ASSERT_EQ(run(fmt::format("map forest --size-x 8 --size-y 8 --trees 150 --density 300 -o {}",
-                            folder / "small.pcd"))
-                .code,
-            0);
-  ASSERT_EQ(
-      run(fmt::format("map import {} -o {} --resolution 0.1", folder / "small.pcd", small)).code,
-      0);
-  const Result fly = run(fmt::format("fly {} -o {}", small, folder / "run"));
-  EXPECT_EQ(fly.code, 0) << fly.err;
-  EXPECT_FALSE(read_file(folder / "run/summary.json").empty());
-}
-
 TEST_F(Program, ImportsEveryBadCloudWithOneLine) {
   const TemporaryFolder folder;
   const auto import = [&](const std::string& name, const std::string& bytes) {
@@ -314,61 +251,6 @@ TEST_F(Program, NothingIsLeftWhereAFileCannotBeWritten) {
   EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
 }
 
-TEST_F(Program, ScenarioNewCheckAndFly) {
-  const TemporaryFolder folder;
-  const std::string yaml = folder / "s.yaml";
-  ASSERT_EQ(run(fmt::format("scenario new {} -o {} --length 5", map(), yaml)).code, 0);
-  expect_contains(read_file(yaml), "# [m/s] greatest speed");
-  const Result check = run(fmt::format("scenario check {}", yaml));
-  EXPECT_EQ(check.code, 0) << check.err;
-  expect_contains(check.out, "ready:");
-  const Result fly = run(fmt::format("fly {} -o {}", yaml, folder / "run"));
-  ASSERT_EQ(fly.code, 0) << fly.err;
-  expect_contains(fly.out, "closest approach");
-  for (const char* name : {"trajectory.csv",
-                           "trajectory.tum",
-                           "imu.csv",
-                           "events.csv",
-                           "scans.csv",
-                           "summary.json",
-                           "timing.json",
-                           "overview.png",
-                           "scans/0_000000.pcd"}) {
-    EXPECT_FALSE(read_file(folder / (std::string("run/") + name)).empty()) << name;
-  }
-  const auto summary = nlohmann::json::parse(read_file(folder / "run/summary.json"));
-  EXPECT_EQ(summary["end"], "completed");
-  EXPECT_EQ(summary["collisions"], 0);
-  // a second run into the same folder needs --force
-  expect_user_error(run(fmt::format("fly {} -o {}", yaml, folder / "run")), "--force");
-  EXPECT_EQ(run(fmt::format("fly {} -o {} --force", yaml, folder / "run")).code, 0);
-}
-
-TEST_F(Program, AScenarioFindsItsFilesFromItsOwnFolder) {
-  const TemporaryFolder folder;
-  for (const char* name : {"a", "x"}) std::filesystem::create_directory(folder / name);
-  std::filesystem::copy_file(map(), folder / "a/m.pfmap");
-  std::filesystem::copy_file(data_folder() + "/lidars/marsim_grid.yaml", folder / "a/my.yaml");
-  const Result made = run("scenario new m.pfmap --lidar my.yaml --length 3 -o ../x/s.yaml",
-                          fmt::format("cd {} &&", folder / "a"));
-  ASSERT_EQ(made.code, 0) << made.err;
-  const Result check = run(fmt::format("scenario check {}", folder / "x/s.yaml"));
-  EXPECT_EQ(check.code, 0) << check.err;
-}
-
-TEST_F(Program, ForceLeavesWhatOthersHavePutThere) {
-  const TemporaryFolder folder;
-  std::filesystem::create_directories(folder / "run/scans");
-  write_file(folder / "run/scans/mine.txt", "data");
-  write_file(folder / "run/scans/0_000099.pcd", "an old scan");
-  write_file(folder / "s.yaml",
-             fmt::format("map: {}\nduration: 0.3\nvehicle:\n  start: [12, 10, 4]\n", map()));
-  EXPECT_EQ(run(fmt::format("fly {} -o {} --force", folder / "s.yaml", folder / "run")).code, 0);
-  EXPECT_EQ(read_file(folder / "run/scans/mine.txt"), "data");
-  EXPECT_FALSE(std::filesystem::exists(folder / "run/scans/0_000099.pcd"));
-  EXPECT_TRUE(std::filesystem::exists(folder / "run/scans/0_000002.pcd"));  // the last one too
-}
-
 TEST_F(Program, RefusesToOverwriteWhatItReads) {
   const TemporaryFolder folder;
   const std::string copy = folder / "c.pcd";
@@ -397,167 +279,10 @@ TEST_F(Program, AnInterruptedImportLeavesNothing) {
   EXPECT_FALSE(std::filesystem::exists(folder / "f.pfmap.partial"));
 }
 
-TEST_F(Program, MeasuresFidelityInExactScenes) {
-  const TemporaryFolder folder;
-  const Result result =
-      run(fmt::format("fidelity box partition_5cm --resolution 0.1 --noise 0,0.005 --poses 3 "
-                      "--beams 3000 --renderer beam,paper --json --png {}",
-                      folder / "pictures"));
-  ASSERT_EQ(result.code, 0) << result.err;
-  const auto cases = nlohmann::json::parse(result.out)["cases"];
-  ASSERT_EQ(cases.size(), 8u);
-  for (const auto& row : cases) {
-    EXPECT_EQ(row["all"]["rays"], 9000);
-    EXPECT_EQ(row["by_kind"].size(), 1u);
-    if (row["scene"] != "box" || row["renderer"] != "beam") continue;
-    EXPECT_LT(row["all"]["leak_fraction"].get<double>(), 2e-3);
-    EXPECT_LT(row["all"]["early_fraction"].get<double>(), 2e-3);
-    EXPECT_LT(row["all"]["median_abs_error"].get<double>(), 0.003);
-  }
-  EXPECT_TRUE(std::filesystem::exists(folder / "pictures/box_0.1_0mm_beam.png"));
-  EXPECT_TRUE(std::filesystem::exists(folder / "pictures/partition_5cm_0.1_5mm_paper.png"));
-  expect_user_error(run("fidelity nowhere"), "known: hall, forest, box");
-  expect_user_error(run("fidelity box --resolution 0"), "--resolution");
-  expect_user_error(run("fidelity box --lidar nosuch"), "nosuch");
-}
-
-TEST_F(Program, ComparesRealScansWithAMap) {
-  // scans that the program itself takes stand for real ones
-  const TemporaryFolder folder;
-  std::string poses = "# time tx ty tz qx qy qz qw file\n";
-  for (int i = 0; i < 2; ++i) {
-    const std::string name = fmt::format("scan{}.pcd", i);
-    ASSERT_EQ(run(fmt::format("scan {} --lidar marsim_grid --pose {},10,4,0,0,90 --no-noise -o {}",
-                              map(),
-                              10 + 2 * i,
-                              folder / name))
-                  .code,
-              0);
-    poses += fmt::format("{} {} 10 4 0 0 0.70710678 0.70710678 {}\n", i, 10 + 2 * i, name);
-  }
-  write_file(folder / "poses.tum", poses);
-  const Result compared =
-      run(fmt::format("compare {} --scans {} --poses {} --cloud {} --floor --png {} --json",
-                      map(),
-                      folder.path(),
-                      folder / "poses.tum",
-                      cloud(),
-                      folder / "pictures"));
-  ASSERT_EQ(compared.code, 0) << compared.err;
-  const auto json = nlohmann::json::parse(compared.out);
-  ASSERT_EQ(json["scans"].size(), 2u);
-  const auto& all = json["overall"]["all"];
-  EXPECT_GT(all["rays"].get<int>(), 50000);
-  // the same rays but for the rounding of directions to float
-  EXPECT_LT(all["median_abs_error"].get<double>(), 1e-4);
-  EXPECT_LT(all["missing_fraction"].get<double>(), 0.01);
-  EXPECT_LT(all["wrong_fraction"].get<double>(), 0.01);
-  EXPECT_GT(json["overall"]["supported"]["rays"].get<int>(), 1000);
-  // one scan beside the other: the ground is flat to a centimetre or two
-  const auto& floor = json["floor"];
-  EXPECT_GT(floor["rays"].get<int>(), 500);
-  EXPECT_LT(floor["median_abs_error"].get<double>(), 0.03);
-  EXPECT_TRUE(std::filesystem::exists(folder / "pictures/scan0.png"));
-  EXPECT_TRUE(std::filesystem::exists(folder / "pictures/scan1.png"));
-  // a pose that is wrong is seen
-  write_file(folder / "shifted.tum", "0 10 10 4.5 0 0 0.70710678 0.70710678 scan0.pcd\n");
-  const auto shifted =
-      nlohmann::json::parse(run(fmt::format("compare {} --scans {} --poses {} --json",
-                                            map(),
-                                            folder.path(),
-                                            folder / "shifted.tum"))
-                                .out);
-  EXPECT_GT(shifted["overall"]["all"]["late_fraction"].get<double>(), 0.2);
-  write_file(folder / "bad.tum", "0 1 2 3 0 0 0\n");
-  expect_user_error(
-      run(fmt::format(
-          "compare {} --scans {} --poses {}", map(), folder.path(), folder / "bad.tum")),
-      "bad.tum:1: ");
-}
-
 TEST_F(Program, AFullTerminalIsNoCrash) {
   const Result lost = run(fmt::format("map info {} --json >/dev/full #", map()));
   EXPECT_EQ(lost.code, 2);
   EXPECT_EQ(run("map info nothing.pfmap 2>/dev/full #").code, 2);
-}
-
-TEST_F(Program, BadScenariosSayFileAndLine) {
-  const TemporaryFolder folder;
-  const auto check = [&](const std::string& text) {
-    write_file(folder / "s.yaml", text);
-    const Result fly = run(fmt::format("fly {} -o {}", folder / "s.yaml", folder / "run"));
-    EXPECT_FALSE(std::filesystem::exists(folder / "run"));
-    return fly;
-  };
-  const std::string map_line = fmt::format("map: {}\n", map());
-  expect_user_error(check("seed: 1\n"), "map: missing");
-  expect_user_error(check("map: absent.pfmap\n"), "s.yaml:1: map: ");
-  expect_user_error(check("map: absent.pfmap\n"), "absent.pfmap: cannot open");
-  expect_user_error(check(map_line + "sede: 1\n"),
-                    "s.yaml:2: sede: unknown key; did you mean 'seed'");
-  expect_user_error(check(map_line + "output:\n  trajectory_rate: -5\n"),
-                    "s.yaml:3: output.trajectory_rate");
-  expect_user_error(check(map_line + "mission:\n  speed: 2 km/h\n"), "plain number in m/s");
-  expect_user_error(check(map_line + "vehicle: {model: helicopter}\n"), "quad_330");
-  expect_user_error(check(map_line + "lidars:\n  - model: mid3600\n"),
-                    "s.yaml:3: lidars[0].model: ");
-  expect_user_error(check(map_line + "vehicle:\n  start: [12, 10, 0.3]\n"),
-                    "s.yaml:3: vehicle.start");
-  expect_user_error(check(map_line + "vehicle: [\n"), "not valid YAML");
-}
-
-TEST_F(Program, EndsOneForAMissionCutShortAndForACollisionUnderStop) {
-  const TemporaryFolder folder;
-  write_file(folder / "s.yaml",
-             fmt::format("map: {}\nduration: 1\nlidars: []\nvehicle:\n  start: [12, 10, 4]\n"
-                         "mission:\n  waypoints:\n    - [12, 14, 4]\n",
-                         map()));
-  EXPECT_EQ(run(fmt::format("fly {} -o {}", folder / "s.yaml", folder / "a")).code, 1);
-  // into the ground
-  write_file(
-      folder / "t.yaml",
-      fmt::format("map: {}\nlidars: []\nvehicle:\n  start: [12, 10, 3]\n  on_collision: stop\n"
-                  "mission:\n  waypoints:\n    - [12, 10, -3]\n",
-                  map()));
-  const Result crash = run(fmt::format("fly {} -o {}", folder / "t.yaml", folder / "b"));
-  EXPECT_EQ(crash.code, 1);
-  expect_contains(crash.err, "t.yaml:8: warning: the leg to waypoint 1 passes through the map");
-  expect_contains(crash.err, "warning: collision at");
-  const auto summary = nlohmann::json::parse(read_file(folder / "b/summary.json"));
-  EXPECT_EQ(summary["end"], "collision");
-}
-
-TEST_F(Program, AFullDiskWhileFlyingIsSaid) {
-  const TemporaryFolder folder;
-  write_file(folder / "s.yaml",
-             fmt::format("map: {}\nduration: 3\nvehicle:\n  start: [12, 10, 4]\n", map()));
-  const Result full =
-      run(fmt::format("fly {} -o {}", folder / "s.yaml", folder / "run"), "ulimit -f 64;");
-  EXPECT_EQ(full.code, 2);
-  expect_contains(full.err, "cannot write: File too large");
-  EXPECT_FALSE(std::filesystem::exists(folder / "run/summary.json"));
-  EXPECT_FALSE(std::filesystem::exists(folder / "run/trajectory.csv"));
-  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder / "run")) {
-    EXPECT_NE(entry.path().extension(), ".partial") << entry.path();
-  }
-  expect_user_error(run(fmt::format("fly {} -o /proc/nowhere", folder / "s.yaml")),
-                    "/proc/nowhere");
-}
-
-TEST_F(Program, AnInterruptClosesTheFilesAndEnds130) {
-  const TemporaryFolder folder;
-  write_file(folder / "s.yaml",
-             fmt::format("map: {}\nduration: 100\nvehicle:\n  start: [12, 10, 4]\n", map()));
-  const Result result =
-      run(fmt::format("fly {} -o {} --rate 1.0", folder / "s.yaml", folder / "run"),
-          "timeout --preserve-status -s INT 2");
-  EXPECT_EQ(result.code, 130) << result.err;
-  const auto summary = nlohmann::json::parse(read_file(folder / "run/summary.json"));
-  EXPECT_EQ(summary["end"], "interrupted");
-  // two seconds at real time, less where the machine is slow
-  EXPECT_GT(summary["simulated_time"].get<double>(), 0.0);
-  EXPECT_LT(summary["simulated_time"].get<double>(), 2.5);
-  EXPECT_FALSE(read_file(folder / "run/trajectory.csv").empty());
 }
 
 }  // namespace

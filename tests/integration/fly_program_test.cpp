@@ -1,0 +1,170 @@
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <vector>
+
+#include "pointflight/core/resources.hpp"
+#include "tests/integration/program.hpp"
+
+namespace pointflight {
+namespace {
+
+using testing::expect_contains;
+using testing::expect_user_error;
+using testing::Program;
+using testing::read_file;
+using testing::Result;
+using testing::run;
+using testing::TemporaryFolder;
+using testing::write_file;
+
+TEST_F(Program, FliesAMapWithoutAScenario) {
+  const TemporaryFolder folder;
+  const std::string small = folder / "small.pfmap";
+  ASSERT_EQ(run(fmt::format("map forest --size-x 8 --size-y 8 --trees 150 --density 300 -o {}",
+                            folder / "small.pcd"))
+                .code,
+            0);
+  ASSERT_EQ(
+      run(fmt::format("map import {} -o {} --resolution 0.1", folder / "small.pcd", small)).code,
+      0);
+  const Result fly = run(fmt::format("fly {} -o {}", small, folder / "run"));
+  EXPECT_EQ(fly.code, 0) << fly.err;
+  EXPECT_FALSE(read_file(folder / "run/summary.json").empty());
+}
+
+TEST_F(Program, ScenarioNewCheckAndFly) {
+  const TemporaryFolder folder;
+  const std::string yaml = folder / "s.yaml";
+  ASSERT_EQ(run(fmt::format("scenario new {} -o {} --length 5", map(), yaml)).code, 0);
+  expect_contains(read_file(yaml), "# [m/s] greatest speed");
+  const Result check = run(fmt::format("scenario check {}", yaml));
+  EXPECT_EQ(check.code, 0) << check.err;
+  expect_contains(check.out, "ready:");
+  const Result fly = run(fmt::format("fly {} -o {}", yaml, folder / "run"));
+  ASSERT_EQ(fly.code, 0) << fly.err;
+  expect_contains(fly.out, "closest approach");
+  for (const char* name : {"trajectory.csv",
+                           "trajectory.tum",
+                           "imu.csv",
+                           "events.csv",
+                           "scans.csv",
+                           "summary.json",
+                           "timing.json",
+                           "overview.png",
+                           "scans/0_000000.pcd"}) {
+    EXPECT_FALSE(read_file(folder / (std::string("run/") + name)).empty()) << name;
+  }
+  const auto summary = nlohmann::json::parse(read_file(folder / "run/summary.json"));
+  EXPECT_EQ(summary["end"], "completed");
+  EXPECT_EQ(summary["collisions"], 0);
+  // a second run into the same folder needs --force
+  expect_user_error(run(fmt::format("fly {} -o {}", yaml, folder / "run")), "--force");
+  EXPECT_EQ(run(fmt::format("fly {} -o {} --force", yaml, folder / "run")).code, 0);
+}
+
+TEST_F(Program, AScenarioFindsItsFilesFromItsOwnFolder) {
+  const TemporaryFolder folder;
+  for (const char* name : {"a", "x"}) std::filesystem::create_directory(folder / name);
+  std::filesystem::copy_file(map(), folder / "a/m.pfmap");
+  std::filesystem::copy_file(data_folder() + "/lidars/marsim_grid.yaml", folder / "a/my.yaml");
+  const Result made = run("scenario new m.pfmap --lidar my.yaml --length 3 -o ../x/s.yaml",
+                          fmt::format("cd {} &&", folder / "a"));
+  ASSERT_EQ(made.code, 0) << made.err;
+  const Result check = run(fmt::format("scenario check {}", folder / "x/s.yaml"));
+  EXPECT_EQ(check.code, 0) << check.err;
+}
+
+TEST_F(Program, ForceLeavesWhatOthersHavePutThere) {
+  const TemporaryFolder folder;
+  std::filesystem::create_directories(folder / "run/scans");
+  write_file(folder / "run/scans/mine.txt", "data");
+  write_file(folder / "run/scans/0_000099.pcd", "an old scan");
+  write_file(folder / "s.yaml",
+             fmt::format("map: {}\nduration: 0.3\nvehicle:\n  start: [12, 10, 4]\n", map()));
+  EXPECT_EQ(run(fmt::format("fly {} -o {} --force", folder / "s.yaml", folder / "run")).code, 0);
+  EXPECT_EQ(read_file(folder / "run/scans/mine.txt"), "data");
+  EXPECT_FALSE(std::filesystem::exists(folder / "run/scans/0_000099.pcd"));
+  EXPECT_TRUE(std::filesystem::exists(folder / "run/scans/0_000002.pcd"));  // the last one too
+}
+
+TEST_F(Program, BadScenariosSayFileAndLine) {
+  const TemporaryFolder folder;
+  const auto check = [&](const std::string& text) {
+    write_file(folder / "s.yaml", text);
+    const Result fly = run(fmt::format("fly {} -o {}", folder / "s.yaml", folder / "run"));
+    EXPECT_FALSE(std::filesystem::exists(folder / "run"));
+    return fly;
+  };
+  const std::string map_line = fmt::format("map: {}\n", map());
+  expect_user_error(check("seed: 1\n"), "map: missing");
+  expect_user_error(check("map: absent.pfmap\n"), "s.yaml:1: map: ");
+  expect_user_error(check("map: absent.pfmap\n"), "absent.pfmap: cannot open");
+  expect_user_error(check(map_line + "sede: 1\n"),
+                    "s.yaml:2: sede: unknown key; did you mean 'seed'");
+  expect_user_error(check(map_line + "output:\n  trajectory_rate: -5\n"),
+                    "s.yaml:3: output.trajectory_rate");
+  expect_user_error(check(map_line + "mission:\n  speed: 2 km/h\n"), "plain number in m/s");
+  expect_user_error(check(map_line + "vehicle: {model: helicopter}\n"), "quad_330");
+  expect_user_error(check(map_line + "lidars:\n  - model: mid3600\n"),
+                    "s.yaml:3: lidars[0].model: ");
+  expect_user_error(check(map_line + "vehicle:\n  start: [12, 10, 0.3]\n"),
+                    "s.yaml:3: vehicle.start");
+  expect_user_error(check(map_line + "vehicle: [\n"), "not valid YAML");
+}
+
+TEST_F(Program, EndsOneForAMissionCutShortAndForACollisionUnderStop) {
+  const TemporaryFolder folder;
+  write_file(folder / "s.yaml",
+             fmt::format("map: {}\nduration: 1\nlidars: []\nvehicle:\n  start: [12, 10, 4]\n"
+                         "mission:\n  waypoints:\n    - [12, 14, 4]\n",
+                         map()));
+  EXPECT_EQ(run(fmt::format("fly {} -o {}", folder / "s.yaml", folder / "a")).code, 1);
+  // into the ground
+  write_file(
+      folder / "t.yaml",
+      fmt::format("map: {}\nlidars: []\nvehicle:\n  start: [12, 10, 3]\n  on_collision: stop\n"
+                  "mission:\n  waypoints:\n    - [12, 10, -3]\n",
+                  map()));
+  const Result crash = run(fmt::format("fly {} -o {}", folder / "t.yaml", folder / "b"));
+  EXPECT_EQ(crash.code, 1);
+  expect_contains(crash.err, "t.yaml:8: warning: the leg to waypoint 1 passes through the map");
+  expect_contains(crash.err, "warning: collision at");
+  const auto summary = nlohmann::json::parse(read_file(folder / "b/summary.json"));
+  EXPECT_EQ(summary["end"], "collision");
+}
+
+TEST_F(Program, AFullDiskWhileFlyingIsSaid) {
+  const TemporaryFolder folder;
+  write_file(folder / "s.yaml",
+             fmt::format("map: {}\nduration: 3\nvehicle:\n  start: [12, 10, 4]\n", map()));
+  const Result full =
+      run(fmt::format("fly {} -o {}", folder / "s.yaml", folder / "run"), "ulimit -f 64;");
+  EXPECT_EQ(full.code, 2);
+  expect_contains(full.err, "cannot write: File too large");
+  EXPECT_FALSE(std::filesystem::exists(folder / "run/summary.json"));
+  EXPECT_FALSE(std::filesystem::exists(folder / "run/trajectory.csv"));
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder / "run")) {
+    EXPECT_NE(entry.path().extension(), ".partial") << entry.path();
+  }
+  expect_user_error(run(fmt::format("fly {} -o /proc/nowhere", folder / "s.yaml")),
+                    "/proc/nowhere");
+}
+
+TEST_F(Program, AnInterruptClosesTheFilesAndEnds130) {
+  const TemporaryFolder folder;
+  write_file(folder / "s.yaml",
+             fmt::format("map: {}\nduration: 100\nvehicle:\n  start: [12, 10, 4]\n", map()));
+  const Result result =
+      run(fmt::format("fly {} -o {} --rate 1.0", folder / "s.yaml", folder / "run"),
+          "timeout --preserve-status -s INT 2");
+  EXPECT_EQ(result.code, 130) << result.err;
+  const auto summary = nlohmann::json::parse(read_file(folder / "run/summary.json"));
+  EXPECT_EQ(summary["end"], "interrupted");
+  // two seconds at real time, less where the machine is slow
+  EXPECT_GT(summary["simulated_time"].get<double>(), 0.0);
+  EXPECT_LT(summary["simulated_time"].get<double>(), 2.5);
+  EXPECT_FALSE(read_file(folder / "run/trajectory.csv").empty());
+}
+
+}  // namespace
+}  // namespace pointflight
