@@ -5,6 +5,7 @@
 #include <CLI/Formatter.hpp>
 #include <algorithm>
 #include <chrono>
+#include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 
@@ -32,6 +33,7 @@ struct ImportFlags {
   int outlier_neighbours = 8;
   double outlier_sigmas = OutlierOptions{}.sigmas;
   std::string outliers_out;
+  std::string scratch;
   int threads = 0;
 };
 
@@ -89,6 +91,11 @@ void print_report(const ImportReport& r, const ImportOptions& options) {
                   r.has_intensity ? ", with intensity" : ""));
 }
 
+std::string folder_of(const std::string& path) {
+  const std::filesystem::path folder = std::filesystem::path(path).parent_path();
+  return folder.empty() ? "." : folder.string();
+}
+
 void import_map(const ImportFlags& flags) {
   const auto start = std::chrono::steady_clock::now();
   ImportOptions options;
@@ -100,6 +107,7 @@ void import_map(const ImportFlags& flags) {
   options.outliers.enabled = !flags.keep_outliers;
   options.outliers.neighbours = flags.outlier_neighbours;
   options.outliers.sigmas = flags.outlier_sigmas;
+  options.scratch_folder = flags.scratch.empty() ? folder_of(flags.output) : flags.scratch;
   for (const std::string& input : flags.inputs) refuse_same_file(flags.output, input);
   std::optional<OutputFile> outliers;
   if (!flags.outliers_out.empty()) {
@@ -132,6 +140,10 @@ void add_import(CLI::App& parent) {
   app->add_option("--scale", flags->scale, "Metres per unit of the files")
       ->check(within(1e-9, 1e9))
       ->capture_default_str();
+  app->add_option("--scratch",
+                  flags->scratch,
+                  "Folder for what does not fit in 2.5 GB of memory; without it that of the output")
+      ->check(CLI::ExistingDirectory);
   app->add_option("--up", flags->up, "The files' up axis; y is turned to z")
       ->check(CLI::IsMember({"y", "z"}))
       ->capture_default_str();

@@ -16,10 +16,10 @@ enum class StreamId : std::uint32_t {
   kForest = 6,           ///< layout of the parametric forest; index: draw number
   kCloudSampling = 7,    ///< points on analytic shapes; entity: shape, index: point
   kMissionSearch = 8,    ///< candidate places in `scenario new`; index: candidate
-  kSpacingSample = 9,    ///< which blocks of a cloud measure its point spacing; index: block key
-  kScenePoses = 10,      ///< where sensors stand in an exact scene; index: try
-  kAimedBeams = 11,      ///< beams at the targets of a small scene; entity: pose, index: beam
-  kTest = 1000,          ///< inputs of tests and benchmarks
+  // 9: was blocks of a cloud, now a plain hash
+  kScenePoses = 10,  ///< where sensors stand in an exact scene; index: try
+  kAimedBeams = 11,  ///< beams at the targets of a small scene; entity: pose, index: beam
+  kTest = 1000,      ///< inputs of tests and benchmarks
 };
 
 /// Random numbers addressed by (seed, stream, entity, index): Philox 4x32-10 as a pure function.

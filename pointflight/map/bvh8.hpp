@@ -1,8 +1,10 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
-#include <vector>
 
+#include "pointflight/core/parallel.hpp"
+#include "pointflight/core/scratch.hpp"
 #include "pointflight/map/surfel.hpp"
 
 namespace pointflight {
@@ -31,29 +33,35 @@ inline constexpr float kSupport = 3.8f;
 
 /// One surfel on its way into the tree.
 struct BuildSurfel {
-  std::uint64_t morton = 0;  ///< Of its voxel; the input is sorted by it and has no equal ones.
-  Vector3f center_in_voxel;  ///< In voxels, each in [0, 1).
-  Matrix3f axes;
-  Vector3f s;  ///< Standard deviations in units of r.
-  std::uint8_t intensity = 0;
+  std::uint64_t morton = 0;  ///< voxel_key of its voxel; the input ascends by it, strictly.
+  SurfelWord word = 0;       ///< With its centre in voxels from the voxel's low corner, in [0, 1].
 };
 
 struct Bvh8 {
-  std::vector<Bvh8Node> nodes;
-  std::vector<SurfelWord> words;        ///< Leaf header and surfels, plus kLeafPadding.
-  std::vector<std::uint8_t> intensity;  ///< Beside `words`, one byte a word.
-  Aabb bounds;                          ///< Of the support ellipsoids, metres from the origin.
+  ScratchArray<Bvh8Node> nodes;
+  ScratchArray<SurfelWord> words;        ///< Leaf header and surfels, plus kLeafPadding.
+  ScratchArray<std::uint8_t> intensity;  ///< Beside `words`, one byte a word; empty without.
 };
 
 /// How much work goes into the tree: `kHigh` makes rays faster and the build slower.
 enum class TreeQuality { kNormal, kHigh };
 
+/// What a tree is built of.
+struct TreeInput {
+  const ScratchArray<BuildSurfel>& surfels;
+  const ScratchArray<std::uint8_t>& intensity;  ///< Beside them, or empty.
+  std::array<std::uint32_t, 3> low{};           ///< Decoded key that becomes voxel (0, 0, 0).
+  double resolution = 1.0;                      ///< r, m.
+};
+
 /// Builds the hierarchy over surfels sorted by Morton code: a node starts with its range and splits
 /// the child with the most surfels at its highest differing key bit until it has eight children;
-/// eight surfels or fewer within 13 voxels make a leaf. `kHigh` opens the child with the largest
-/// box and splits where the surface area heuristic says. `resolution` is r in metres.
-Bvh8 build_bvh8(const std::vector<BuildSurfel>& surfels,
-                double resolution,
-                TreeQuality quality = TreeQuality::kNormal);
+/// eight surfels or fewer within 13 voxels make a leaf. `kHigh` does so down to about 100,000
+/// surfels, and below opens the child with the largest box and splits where the surface area
+/// heuristic says. Does not depend on threads.
+Bvh8 build_bvh8(const TreeInput& input,
+                TreeQuality quality,
+                const Executor& executor,
+                Scratch& scratch);
 
 }  // namespace pointflight

@@ -5,12 +5,13 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <mutex>
 #include <nlohmann/json.hpp>
-#include <numeric>
+#include <span>
 
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/core/version.hpp"
-#include "pointflight/geometry/morton.hpp"
+#include "pointflight/io/read_ahead.hpp"
 #include "pointflight/map/noise_projection.hpp"
 #include "pointflight/map/spacing.hpp"
 #include "pointflight/map/sparse_growth.hpp"
@@ -36,7 +37,9 @@ class Import {
         opener_(opener),
         options_(options),
         executor_(executor),
-        progress_(progress) {}
+        progress_(progress) {
+    map_.scratch = std::make_unique<Scratch>(options.scratch_folder, options.scratch_memory);
+  }
 
   ImportedMap run() {
     ImportReport& report = map_.report;
@@ -55,30 +58,32 @@ class Import {
   }
 
  private:
-  /// Calls `visit(point_world, intensity)` for every finite point of all sources.
-  template <class Visit>
-  void for_each_point(std::string_view what, const Visit& visit) {
+  /// Calls `visit(batch)` with the finite points of all sources, in the world, batch by batch.
+  void for_each_batch(std::string_view what,
+                      const std::function<void(std::span<const CloudPoint>)>& visit) {
     ImportReport& report = map_.report;
     report.points_read = 0;
     report.points_not_finite = 0;
-    std::vector<CloudPoint> batch;
     for (std::size_t i = 0; i < names_.size(); ++i) {
       const auto reader = opener_(i);
       report.has_intensity = report.has_intensity || reader->has_intensity();
-      while (reader->read(batch)) {
+      // while one batch is used, the next one is read
+      ReadAhead ahead(*reader, executor_.threads() > 1);
+      std::vector<CloudPoint> batch;
+      while (ahead.read(batch)) {
         report.points_read += batch.size();
+        std::size_t finite = 0;
         for (const CloudPoint& point : batch) {
           const Vector3d p = to_world(point.position);
-          if (p.allFinite()) {
-            visit(p, std::isfinite(point.intensity) ? point.intensity : 0.0f);
-          } else {
-            ++report.points_not_finite;
-          }
+          if (!p.allFinite()) continue;
+          batch[finite++] = {p, std::isfinite(point.intensity) ? point.intensity : 0.0f};
         }
+        report.points_not_finite += batch.size() - finite;
+        visit(std::span(batch).first(finite));
         pointflight::report(
             progress_,
             what,
-            (static_cast<double>(i) + reader->share_read()) / static_cast<double>(names_.size()));
+            (static_cast<double>(i) + ahead.share_read()) / static_cast<double>(names_.size()));
       }
     }
     if (report.points_read == 0) throw InputError(fmt::format("{}: no points", names_.front()));
@@ -95,8 +100,8 @@ class Import {
   }
 
   void choose_resolution() {
-    for_each_point("measuring the point spacing",
-                   [this](const Vector3d& p, float) { spacing_.add(p); });
+    for_each_batch("measuring the point spacing",
+                   [this](std::span<const CloudPoint> points) { spacing_.add(points, executor_); });
     measure_spacing();
     if (map_.report.supported_resolution <= 0.0) {
       throw InputError(fmt::format("{}: too few points to tell their spacing; give --resolution",
@@ -112,12 +117,13 @@ class Import {
   void accumulate() {
     ImportReport& report = map_.report;
     const bool measures_spacing = !report.resolution_was_chosen;
-    fill_grid(std::nullopt, measures_spacing);
+    fill_cells(std::nullopt, measures_spacing);
     // the first point may be a stray one far from all others (0 0 0 before a cloud in UTM)
-    if (2 * report.points_out_of_reach > report.points_read) fill_grid(spacing_.middle(), false);
+    if (2 * report.points_out_of_reach > report.points_read) fill_cells(spacing_.middle(), false);
+    pointflight::report(progress_, "measuring the point spacing", 0.0);
     if (measures_spacing) measure_spacing();
     const double r = report.resolution;
-    report.cells = grid_->cells().size();
+    report.cells = cells_.count();
     if (2 * report.points_out_of_reach > report.points_read) {
       throw InputError(fmt::format(
           "{}: {} of {} points lie more than {} km from the first one, too far for a resolution of "
@@ -131,53 +137,88 @@ class Import {
   }
 
   /// Cells lie around `middle`, or around the first point.
-  void fill_grid(const std::optional<Vector3d>& middle, bool measures_spacing) {
+  void fill_cells(const std::optional<Vector3d>& middle, bool measures_spacing) {
     ImportReport& report = map_.report;
     const double r = report.resolution;
-    grid_.reset();
     report.points_out_of_reach = 0;
-    for_each_point("reading points", [&](const Vector3d& p, float intensity) {
-      if (!grid_) {
-        const Vector3d base = ((middle.value_or(p) / r).array().floor() + kGridPhase) * r;
-        grid_.emplace(base, r);
+    std::optional<CellAccumulator> accumulator;
+    for_each_batch("reading points", [&](std::span<const CloudPoint> points) {
+      if (!accumulator && !points.empty()) {
+        const Vector3d inside = middle.value_or(points.front().position);
+        const Vector3d base = ((inside / r).array().floor() + kGridPhase) * r;
+        accumulator.emplace(VoxelFrame{base, r}, executor_, *map_.scratch, options_.cells_memory);
       }
-      if (!grid_->add(p, intensity)) ++report.points_out_of_reach;
-      if (measures_spacing) spacing_.add(p);
+      if (!points.empty()) report.points_out_of_reach += accumulator->add(points);
+      if (measures_spacing) spacing_.add(points, executor_);
     });
+    cells_ = accumulator->finish();
   }
 
   void drop_outliers() {
-    pointflight::report(progress_, "looking for outliers", 0.0);
-    ImportReport& report = map_.report;
-    const auto outliers = find_outliers(*grid_, options_.outliers, executor_);
-    report.outlier_cells = outliers.size();
-    std::vector<bool> dropped(grid_->cells().size(), false);
-    for (const std::uint32_t i : outliers) {
-      const VoxelCell& cell = grid_->cells()[i];
-      dropped[i] = true;
-      report.outlier_points += cell.n;
-      map_.outliers.push_back(
-          {grid_->centroid_world(cell), cell.intensity_sum / static_cast<float>(cell.n)});
-    }
-    sort_cells(dropped);
+    Outliers outliers =
+        pointflight::drop_outliers(cells_, options_.outliers, executor_, *map_.scratch, progress_);
+    map_.report.outlier_cells = outliers.centroids_world.size();
+    map_.report.outlier_points = outliers.points;
+    map_.outliers = std::move(outliers.centroids_world);
   }
 
-  /// Keeps what was not dropped, in Morton order from the lowest corner.
-  void sort_cells(const std::vector<bool>& dropped) {
-    const auto& cells = grid_->cells();
-    std::array<std::int32_t, 3> max = {};
-    bool first = true;
-    for (std::size_t i = 0; i < cells.size(); ++i) {
-      if (dropped[i]) continue;
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        const std::int32_t v = cells[i].voxel[axis];
-        min_voxel_[axis] = first ? v : std::min(min_voxel_[axis], v);
-        max[axis] = first ? v : std::max(max[axis], v);
+  void flatten_noise() {
+    pointflight::report(progress_, "measuring the noise", 0.0);
+    ImportReport& report = map_.report;
+    report.noise = estimate_noise(cells_, executor_);
+    if (!needs_projection(cells_, report.noise)) return;
+    cells_ =
+        project_noise(cells_, report.noise, executor_, *map_.scratch, report.projection, progress_);
+  }
+
+  void build_tree() {
+    ImportReport& report = map_.report;
+    find_bounds();
+    const auto surfels = fit_surfels(cells_, executor_, *map_.scratch, progress_);
+    pointflight::report(progress_, "closing gaps of thin scans", 0.0);
+    report.grown_surfels = grow_sparse_surfels(cells_, surfels, executor_, progress_);
+    report.surfels = surfels.size();
+    choose_tau(surfels);
+    const ScratchArray<std::uint8_t> intensity =
+        report.has_intensity ? intensities() : ScratchArray<std::uint8_t>();
+    cells_ = {};  // room for the tree
+    pointflight::report(progress_, "building the hierarchy", 0.0);
+    TreeInput input{surfels, intensity, {}, report.resolution};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      input.low[axis] = static_cast<std::uint32_t>(min_voxel_[axis] + kMaxVoxel);
+    }
+    map_.tree = build_bvh8(input, options_.quality, executor_, *map_.scratch);
+    pointflight::report(progress_, "building the hierarchy", 1.0);
+  }
+
+  /// Where the map lies: in voxels, and its centroids in the world.
+  void find_bounds() {
+    struct Bounds {
+      std::array<std::int32_t, 3> min{kMaxVoxel, kMaxVoxel, kMaxVoxel};
+      std::array<std::int32_t, 3> max{-kMaxVoxel, -kMaxVoxel, -kMaxVoxel};
+      Aabb world;
+    };
+    std::vector<Bounds> of_tile(cells_.tiles().size());
+    cells_.for_each_tile(executor_, [&](std::size_t t, std::span<VoxelCell> cells) {
+      for (const VoxelCell& cell : cells) {
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+          of_tile[t].min[axis] = std::min(of_tile[t].min[axis], cell.voxel[axis]);
+          of_tile[t].max[axis] = std::max(of_tile[t].max[axis], cell.voxel[axis]);
+        }
+        of_tile[t].world.add(cells_.frame().centroid_world(cell));
       }
-      first = false;
+    });
+    Bounds all;
+    for (const Bounds& bounds : of_tile) {
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        all.min[axis] = std::min(all.min[axis], bounds.min[axis]);
+        all.max[axis] = std::max(all.max[axis], bounds.max[axis]);
+      }
+      all.world.min = all.world.min.cwiseMin(bounds.world.min);
+      all.world.max = all.world.max.cwiseMax(bounds.world.max);
     }
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      if (max[axis] - min_voxel_[axis] >= (1 << 20)) {
+      if (all.max[axis] - all.min[axis] >= (1 << 20)) {
         throw InputError(fmt::format(
             "{}: the cloud is wider than {} km, too wide for a resolution of {} m; give a coarser "
             "--resolution",
@@ -186,97 +227,82 @@ class Import {
             map_.report.resolution));
       }
     }
-    std::vector<std::pair<std::uint64_t, std::uint32_t>> order;
-    order.reserve(cells.size());
-    for (std::uint32_t i = 0; i < cells.size(); ++i) {
-      if (dropped[i]) continue;
-      const auto& v = cells[i].voxel;
-      order.emplace_back(morton_encode(static_cast<std::uint32_t>(v[0] - min_voxel_[0]),
-                                       static_cast<std::uint32_t>(v[1] - min_voxel_[1]),
-                                       static_cast<std::uint32_t>(v[2] - min_voxel_[2])),
-                         i);
-    }
-    std::sort(order.begin(), order.end());
-    std::vector<std::uint32_t> indices;
-    indices.reserve(order.size());
-    for (const auto& entry : order) indices.push_back(entry.second);
-    grid_->reorder(indices);
-  }
-
-  void flatten_noise() {
-    pointflight::report(progress_, "measuring the noise", 0.0);
-    ImportReport& report = map_.report;
-    report.noise = estimate_noise(*grid_, executor_);
-    if (!needs_projection(*grid_, report.noise)) return;
-    pointflight::report(progress_, "taking the noise out", 0.0);
-    grid_ = project_noise(*grid_, report.noise, executor_, report.projection);
-    sort_cells(std::vector<bool>(grid_->cells().size(), false));
-  }
-
-  void build_tree() {
-    pointflight::report(progress_, "fitting surfels", 0.0);
-    auto surfels = fit_surfels(*grid_, min_voxel_, executor_);
-    ImportReport& report = map_.report;
-    pointflight::report(progress_, "closing gaps of thin scans", 0.0);
-    report.grown_surfels = grow_sparse_surfels(*grid_, surfels, executor_);
-    report.surfels = surfels.size();
-    for (const BuildSurfel& surfel : surfels) {
-      report.planar_surfels += surfel.s[0] <= kPlanarThickness ? 1 : 0;
-    }
-    choose_tau(surfels);
-    if (report.has_intensity) set_intensities(surfels);
-    pointflight::report(progress_, "building the hierarchy", 0.5);
-    map_.tree = build_bvh8(surfels, report.resolution, options_.quality);
-    pointflight::report(progress_, "building the hierarchy", 1.0);
+    min_voxel_ = all.min;
+    map_.description.bounds_world = all.world;
+    map_.description.origin_world =
+        cells_.frame().base_world +
+        map_.report.resolution * Vector3d(min_voxel_[0], min_voxel_[1], min_voxel_[2]);
   }
 
   /// Dense maps have few holes to bridge and can have sharper edges.
-  void choose_tau(const std::vector<BuildSurfel>& surfels) {
+  void choose_tau(const ScratchArray<BuildSurfel>& surfels) {
     constexpr double kThin = 16.0;
     constexpr double kDense = 40.0;
+    constexpr std::size_t kMostPoints = 1 << 12;
     ImportReport& report = map_.report;
-    std::vector<std::uint32_t> counts;
-    for (std::size_t i = 0; i < surfels.size(); ++i) {
-      if (surfels[i].s[0] <= kPlanarThickness) counts.push_back(grid_->cells()[i].n);
-    }
-    if (!counts.empty()) {
-      const auto middle = counts.begin() + static_cast<std::ptrdiff_t>(counts.size() / 2);
-      std::nth_element(counts.begin(), middle, counts.end());
-      report.points_per_cell = *middle;
+    std::vector<std::uint64_t> cells_with(kMostPoints + 1, 0);
+    std::mutex mutex;
+    const std::vector<std::size_t> first = cells_.first_numbers();
+    cells_.for_each_tile(executor_, [&](std::size_t t, std::span<VoxelCell> cells) {
+      std::vector<std::uint32_t> counts;
+      for (std::size_t i = 0; i < cells.size(); ++i) {
+        if (is_planar(surfels[first[t] + i].word)) counts.push_back(cells[i].n);
+      }
+      surfels.release(first[t], first[t] + cells.size());
+      const std::lock_guard lock(mutex);  // the order of whole numbers does not show
+      for (const std::uint32_t n : counts) ++cells_with[std::min<std::size_t>(n, kMostPoints)];
+      report.planar_surfels += counts.size();
+    });
+    std::uint64_t below = 0;
+    for (std::size_t n = 0; n <= kMostPoints && report.planar_surfels > 0; ++n) {
+      below += cells_with[n];
+      if (below <= report.planar_surfels / 2) continue;
+      report.points_per_cell = static_cast<double>(n);
+      break;
     }
     const double share = std::clamp((report.points_per_cell - kThin) / (kDense - kThin), 0.0, 1.0);
     report.tau = options_.tau.value_or(static_cast<float>(0.30 + 0.10 * share));
   }
 
   /// Mean intensity of each cell as a byte between the least and the greatest.
-  void set_intensities(std::vector<BuildSurfel>& surfels) {
-    const auto& cells = grid_->cells();
-    float min = std::numeric_limits<float>::infinity();
-    float max = -min;
+  ScratchArray<std::uint8_t> intensities() {
     const auto mean = [](const VoxelCell& cell) {
       const float value = cell.intensity_sum / static_cast<float>(cell.n);
       return std::isfinite(value) ? value : 0.0f;
     };
-    for (const VoxelCell& cell : cells) {
-      min = std::min(min, mean(cell));
-      max = std::max(max, mean(cell));
+    std::vector<std::pair<float, float>> of_tile(
+        cells_.tiles().size(),
+        {std::numeric_limits<float>::infinity(), -std::numeric_limits<float>::infinity()});
+    cells_.for_each_tile(executor_, [&](std::size_t t, std::span<VoxelCell> cells) {
+      for (const VoxelCell& cell : cells) {
+        of_tile[t].first = std::min(of_tile[t].first, mean(cell));
+        of_tile[t].second = std::max(of_tile[t].second, mean(cell));
+      }
+    });
+    float min = std::numeric_limits<float>::infinity();
+    float max = -min;
+    for (const auto& [low, high] : of_tile) {
+      min = std::min(min, low);
+      max = std::max(max, high);
     }
     const float step = (max - min) / 255.0f;
     map_.description.intensity_offset = min;
     map_.description.intensity_step = std::isfinite(step) ? step : 0.0f;
-    for (std::size_t i = 0; i < cells.size(); ++i) {
-      const float code = step > 0.0f ? std::round((mean(cells[i]) - min) / step) : 0.0f;
-      surfels[i].intensity = static_cast<std::uint8_t>(std::clamp(code, 0.0f, 255.0f));
-    }
+    ScratchArray<std::uint8_t> codes(*map_.scratch, cells_.count());
+    const std::vector<std::size_t> first = cells_.first_numbers();
+    cells_.for_each_tile(executor_, [&](std::size_t t, std::span<VoxelCell> cells) {
+      for (std::size_t i = 0; i < cells.size(); ++i) {
+        const float code = step > 0.0f ? std::round((mean(cells[i]) - min) / step) : 0.0f;
+        codes[first[t] + i] = static_cast<std::uint8_t>(std::clamp(code, 0.0f, 255.0f));
+      }
+    });
+    return codes;
   }
 
   void describe() {
     const ImportReport& report = map_.report;
     MapDescription& d = map_.description;
     d.resolution = report.resolution;
-    d.origin_world = grid_->base_world() +
-                     report.resolution * Vector3d(min_voxel_[0], min_voxel_[1], min_voxel_[2]);
-    for (const VoxelCell& cell : grid_->cells()) d.bounds_world.add(grid_->centroid_world(cell));
     d.model.tau = report.tau;
     d.has_intensity = report.has_intensity;
     d.surfel_count = report.surfels;
@@ -317,7 +343,7 @@ class Import {
   const Executor& executor_;
   const Progress& progress_;
   SpacingEstimate spacing_;
-  std::optional<VoxelGrid> grid_;
+  CellTiles cells_;
   std::array<std::int32_t, 3> min_voxel_{};
   ImportedMap map_;
 };

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -9,6 +10,7 @@
 #include "pointflight/core/parallel.hpp"
 #include "pointflight/core/progress.hpp"
 #include "pointflight/io/cloud_reader.hpp"
+#include "pointflight/map/cell_accumulator.hpp"
 #include "pointflight/map/map_file.hpp"
 #include "pointflight/map/noise_projection.hpp"
 #include "pointflight/map/outliers.hpp"
@@ -22,6 +24,10 @@ struct ImportOptions {
   OutlierOptions outliers;
   TreeQuality quality = TreeQuality::kNormal;
   std::optional<float> tau;  ///< Coverage that makes a return; without it by the density.
+  /// Where intermediate results lie that exceed the memory below; empty: with temporary files.
+  std::string scratch_folder;
+  std::size_t scratch_memory = Scratch::kDefaultMemory;        ///< Bytes.
+  std::size_t cells_memory = CellAccumulator::kDefaultMemory;  ///< Bytes, while points are read.
 };
 
 /// What an import did, for the user and for the map's metadata.
@@ -49,6 +55,7 @@ struct ImportReport {
 
 /// A finished import in memory.
 struct ImportedMap {
+  std::unique_ptr<Scratch> scratch;  ///< Of the tree.
   Bvh8 tree;
   MapDescription description;
   ImportReport report;

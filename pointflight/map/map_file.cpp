@@ -27,9 +27,9 @@ struct Layout {
 
 Layout lay_out(const Bvh8& tree, const MapDescription& d) {
   Layout layout;
-  layout.sections = {as_bytes(tree.nodes),
-                     as_bytes(tree.words),
-                     d.has_intensity ? as_bytes(tree.intensity) : std::span<const std::byte>(),
+  layout.sections = {std::as_bytes(tree.nodes.span()),
+                     std::as_bytes(tree.words.span()),
+                     std::as_bytes(tree.intensity.span()),
                      std::as_bytes(std::span<const char>(d.metadata.data(), d.metadata.size()))};
   MapHeader header{};
   std::memcpy(header.magic, kMapMagic, sizeof kMapMagic);

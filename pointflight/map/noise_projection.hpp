@@ -2,14 +2,13 @@
 
 #include <cstdint>
 
-#include "pointflight/core/parallel.hpp"
-#include "pointflight/map/voxel_moments.hpp"
+#include "pointflight/map/cell_tiles.hpp"
 
 namespace pointflight {
 
 /// Standard deviation of the cloud's points across its flat surfaces, m: the 20th percentile of the
 /// thickness of planar neighbourhoods. 0 where there are none (foliage).
-double estimate_noise(const VoxelGrid& grid, const Executor& executor);
+double estimate_noise(const CellTiles& cells, const Executor& executor);
 
 /// What the projection did.
 struct ProjectionReport {
@@ -21,15 +20,16 @@ struct ProjectionReport {
 
 /// True if a noise of `sigma` is worth a projection: above 0.05 of a cell. On cleaner clouds it
 /// does more harm than good.
-bool needs_projection(const VoxelGrid& grid, double sigma);
+bool needs_projection(const CellTiles& cells, double sigma);
 
-/// The grid with its cells moved along the normal onto the plane of the smallest neighbourhood (3,
-/// 5 or 7 cells wide) that is planar, and flattened; cells that land in one merge. A plane must not
-/// be thicker than max(2.5 sigma, 20 mm): the faces of a partition stay apart. Does not depend on
-/// threads.
-VoxelGrid project_noise(const VoxelGrid& grid,
+/// The cells moved along the normal onto the plane of the smallest neighbourhood (3, 5 or 7 cells
+/// wide) that is planar, and flattened; cells that land in one merge. A plane must not be thicker
+/// than max(2.5 sigma, 20 mm): the faces of a partition stay apart. Does not depend on threads.
+CellTiles project_noise(const CellTiles& cells,
                         double sigma,
                         const Executor& executor,
-                        ProjectionReport& report);
+                        Scratch& scratch,
+                        ProjectionReport& report,
+                        const Progress& progress = {});
 
 }  // namespace pointflight

@@ -3,8 +3,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "pointflight/core/parallel.hpp"
-#include "pointflight/map/voxel_moments.hpp"
+#include "pointflight/io/cloud_reader.hpp"
+#include "pointflight/map/cell_tiles.hpp"
 
 namespace pointflight {
 
@@ -16,12 +16,20 @@ struct OutlierOptions {
   double sigmas = 4.0;
 };
 
-/// Indices of the cells that are outliers, ascending: those whose mean distance to the `neighbours`
-/// nearest cell centroids is far above that of the cloud. Evenly sparse surfaces stay (ground that
-/// a scanner only grazed): a cell also has to stand out from its own neighbours, or be more than
-/// ten cells from them. Does not depend on threads.
-std::vector<std::uint32_t> find_outliers(const VoxelGrid& grid,
-                                         const OutlierOptions& options,
-                                         const Executor& executor);
+/// What was dropped.
+struct Outliers {
+  std::vector<CloudPoint> centroids_world;  ///< With the cells' mean intensities.
+  std::uint64_t points = 0;
+};
+
+/// Takes the outliers out of the cells: those whose mean distance to the `neighbours` nearest cell
+/// centroids is far above that of the cloud. Evenly sparse surfaces stay (ground that a scanner
+/// only grazed): a cell also has to stand out from its own neighbours, or be more than ten cells
+/// from them. Neighbours farther than 16 cells count as that far. Does not depend on threads.
+Outliers drop_outliers(CellTiles& cells,
+                       const OutlierOptions& options,
+                       const Executor& executor,
+                       Scratch& scratch,
+                       const Progress& progress = {});
 
 }  // namespace pointflight

@@ -4,7 +4,8 @@
 #include <cmath>
 #include <nanoflann.hpp>
 
-#include "pointflight/core/random.hpp"
+#include "pointflight/core/hash.hpp"
+#include "pointflight/core/math.hpp"
 
 namespace pointflight {
 namespace {
@@ -28,23 +29,51 @@ using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<do
 
 }  // namespace
 
-bool SpacingEstimate::is_chosen(const Vector3d& point, std::uint64_t one_in) const {
-  if (one_in == 1) return true;
-  std::uint64_t key = 0;
+SpacingEstimate::Block SpacingEstimate::block_of(const Vector3d& point) {
+  Block block{};
   for (int axis = 0; axis < 3; ++axis) {
-    const double cell = std::floor(point[axis] / kBlock);
-    key = key * 0x9e3779b97f4a7c15ull + static_cast<std::uint64_t>(static_cast<std::int64_t>(cell));
+    block[static_cast<std::size_t>(axis)] = floor_to_integer(point[axis] / kBlock);
   }
-  return RandomStream(0, StreamId::kSpacingSample, 0).bits(key)[0] % one_in == 0;
+  return block;
 }
 
-void SpacingEstimate::add(const Vector3d& point) {
-  if (!(point.cwiseAbs().maxCoeff() < 1e12) || !is_chosen(point, one_in_)) return;
+bool SpacingEstimate::is_chosen(const Block& block, std::uint64_t one_in) {
+  if (one_in == 1) return true;
+  std::uint64_t key = 0;
+  for (const std::int64_t cell : block) {
+    key = key * 0x9e3779b97f4a7c15ull + static_cast<std::uint64_t>(cell);
+  }
+  return (scatter64(key) & (one_in - 1)) == 0;  // a power of two
+}
+
+void SpacingEstimate::add(std::span<const CloudPoint> points, const Executor& executor) {
+  // blocks are only ever given up: what is chosen now holds all that will be kept
+  constexpr std::size_t kChunk = 8192;
+  std::vector<std::vector<std::size_t>> chosen((points.size() + kChunk - 1) / kChunk);
+  executor.parallel_for(points.size(), kChunk, [&](std::size_t begin, std::size_t end) {
+    Block last{};
+    bool last_is_chosen = is_chosen(last, one_in_);
+    for (std::size_t i = begin; i < end; ++i) {
+      const Vector3d& p = points[i].position;
+      if (!(p.cwiseAbs().maxCoeff() < 1e12)) continue;
+      const Block block = block_of(p);
+      if (block != last) last_is_chosen = is_chosen(block, one_in_);
+      last = block;
+      if (last_is_chosen) chosen[begin / kChunk].push_back(i);
+    }
+  });
+  for (const auto& indices : chosen) {
+    for (const std::size_t i : indices) keep(points[i].position);
+  }
+}
+
+void SpacingEstimate::keep(const Vector3d& point) {
+  if (!is_chosen(block_of(point), one_in_)) return;
   kept_.push_back(point);
   // a single block may hold more than all of them: then keep what came first
   while (kept_.size() > kMaxPoints && one_in_ < (1u << 20)) {
     one_in_ *= 2;
-    std::erase_if(kept_, [&](const Vector3d& p) { return !is_chosen(p, one_in_); });
+    std::erase_if(kept_, [&](const Vector3d& p) { return !is_chosen(block_of(p), one_in_); });
     if (kept_.empty()) kept_.push_back(point);
   }
   if (kept_.size() > 2 * kMaxPoints) kept_.pop_back();

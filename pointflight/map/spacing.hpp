@@ -1,16 +1,20 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
-#include "pointflight/geometry/types.hpp"
+#include "pointflight/core/parallel.hpp"
+#include "pointflight/io/cloud_reader.hpp"
 
 namespace pointflight {
 
 /// Estimates the point spacing of a streamed cloud from the points of a few randomly chosen blocks.
 class SpacingEstimate {
  public:
-  void add(const Vector3d& point);
+  /// Adds finite points; the result depends on their order only.
+  void add(std::span<const CloudPoint> points, const Executor& executor);
 
   /// Median distance between a point and its nearest neighbour, m; 0 below 20 usable points.
   [[nodiscard]] double median_spacing() const;
@@ -22,7 +26,10 @@ class SpacingEstimate {
   static constexpr double kBlock = 2.0;              ///< m: far above any useful spacing.
   static constexpr std::size_t kMaxPoints = 200000;  ///< Kept; then blocks are thinned by half.
 
-  [[nodiscard]] bool is_chosen(const Vector3d& point, std::uint64_t one_in) const;
+  using Block = std::array<std::int64_t, 3>;
+  static Block block_of(const Vector3d& point);
+  static bool is_chosen(const Block& block, std::uint64_t one_in);
+  void keep(const Vector3d& point);
 
   std::vector<Vector3d> kept_;
   std::uint64_t one_in_ = 1;

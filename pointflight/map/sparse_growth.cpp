@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "pointflight/map/covariance_axes.hpp"
+#include "pointflight/map/surfel_fit.hpp"
 
 namespace pointflight {
 namespace {
@@ -19,72 +20,77 @@ constexpr std::int32_t kWidest = 3;  // cells to each side: 7^3
 
 using BlockKey = std::array<std::int32_t, 3>;
 
-BlockKey block_of(const VoxelGrid& grid, const VoxelCell& cell) {
+BlockKey block_of(double resolution, const VoxelCell& cell) {
   BlockKey key{};
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    key[axis] =
-        static_cast<std::int32_t>(std::floor(cell.voxel[axis] * grid.resolution() / kBlock));
+    key[axis] = static_cast<std::int32_t>(std::floor(cell.voxel[axis] * resolution / kBlock));
   }
   return key;
 }
 
-/// Blocks whose median planar cell has too few points.
-std::map<BlockKey, bool> sparse_blocks(const VoxelGrid& grid,
-                                       const std::vector<BuildSurfel>& surfels) {
-  std::map<BlockKey, std::vector<std::uint32_t>> counts;
-  for (std::size_t i = 0; i < surfels.size(); ++i) {
-    if (surfels[i].s[0] > kPlanarThickness) continue;
-    counts[block_of(grid, grid.cells()[i])].push_back(grid.cells()[i].n);
-  }
-  std::map<BlockKey, bool> sparse;
-  for (auto& [key, n] : counts) {
-    const auto middle = n.begin() + static_cast<std::ptrdiff_t>(n.size() / 2);
-    std::nth_element(n.begin(), middle, n.end());
-    sparse[key] = static_cast<double>(*middle) < kSparse;
-  }
-  return sparse;
-}
-
-/// The occupied cells around one, as moments about it and distances of their centroids, metres.
-struct Surroundings {
-  Moments moments;
-  std::vector<double> distances;
+/// Planar cells of a block, and those with too few points.
+struct Counts {
+  std::size_t all = 0;
+  std::size_t sparse = 0;
+  [[nodiscard]] bool median_is_sparse() const { return 2 * sparse > all; }
 };
 
-Surroundings surroundings_of(const VoxelGrid& grid,
-                             NeighbourWindow& window,
-                             const VoxelCell& cell,
-                             std::int32_t reach) {
-  Surroundings around;
-  const Vector3d own = cell.moments().mean();
-  window.for_each(cell, reach, [&](const VoxelCell& other, int dx, int dy, int dz) {
-    const Vector3d mean = other.moments().mean() + grid.resolution() * Vector3d(dx, dy, dz);
-    around.distances.push_back((mean - own).norm());
+using Blocks = std::map<BlockKey, Counts>;
+
+Blocks count_blocks(const CellTiles& cells,
+                    const ScratchArray<BuildSurfel>& surfels,
+                    const std::vector<std::size_t>& first,
+                    const Executor& executor) {
+  std::vector<Blocks> of_tile(cells.tiles().size());
+  cells.for_each_tile(executor, [&](std::size_t t, std::span<VoxelCell> own) {
+    Blocks& blocks = of_tile[t];
+    BlockKey last{};
+    Counts* counts = nullptr;
+    for (std::size_t i = 0; i < own.size(); ++i) {
+      if (!is_planar(surfels[first[t] + i].word)) continue;
+      const BlockKey key = block_of(cells.resolution(), own[i]);
+      if (counts == nullptr || key != last) counts = &blocks[key];
+      last = key;
+      ++counts->all;
+      counts->sparse += own[i].n < kSparse ? 1 : 0;
+    }
+    surfels.release(first[t], first[t] + own.size());
   });
-  return around;
+  Blocks all;
+  for (const Blocks& blocks : of_tile) {
+    for (const auto& [key, counts] : blocks) {
+      all[key].all += counts.all;
+      all[key].sparse += counts.sparse;
+    }
+  }
+  return all;
 }
 
 /// The widened surfel, or nothing where the surroundings are not planar.
-std::optional<BuildSurfel> widened(const VoxelGrid& grid,
-                                   NeighbourWindow& window,
-                                   const VoxelCell& cell,
-                                   const BuildSurfel& surfel) {
-  Surroundings around;
-  for (std::int32_t reach = 1; reach <= kWidest; ++reach) {
-    around = surroundings_of(grid, window, cell, reach);
-    if (around.distances.size() < kEnoughCells) continue;
-    around.moments = window.moments(cell, reach);
-    break;
-  }
-  if (around.distances.size() < kEnoughCells) return std::nullopt;
-  const CovarianceAxes axes = covariance_axes(around.moments.covariance());
+std::optional<Surfel> widened(const VoxelGrid& grid,
+                              NeighbourWindow& window,
+                              const VoxelCell& cell,
+                              std::vector<double>& squared) {
+  // distances to the centroids of the occupied cells around, the cell itself included
+  const Vector3d own = cell.moments().mean();
+  std::int32_t reach = 0;
+  do {
+    squared.clear();
+    window.for_each(cell, ++reach, [&](const VoxelCell& other, int dx, int dy, int dz) {
+      const Vector3d mean = other.moments().mean() + grid.resolution() * Vector3d(dx, dy, dz);
+      squared.push_back((mean - own).squaredNorm());
+    });
+  } while (squared.size() < kEnoughCells && reach < kWidest);
+  if (squared.size() < kEnoughCells) return std::nullopt;
+  const CovarianceAxes axes = covariance_axes(window.moments(cell, reach).covariance());
   const Vector3d& l = axes.lambda;
   if (!(l[0] < 0.05 * l[1] && l[1] > 0.1 * l[2])) return std::nullopt;
   // the first is the cell itself
-  std::nth_element(around.distances.begin(), around.distances.begin() + 4, around.distances.end());
+  std::nth_element(squared.begin(), squared.begin() + 4, squared.end());
   const double r = grid.resolution();
-  const double factor = std::clamp(around.distances[4] / (1.25 * r), 1.0, 3.0);
-  BuildSurfel wide = surfel;
+  const double factor = std::clamp(std::sqrt(squared[4]) / (1.25 * r), 1.0, 3.0);
+  const Surfel surfel = fit_surfel(grid, window, cell);
+  Surfel wide = surfel;
   wide.axes = axes.vectors.cast<float>();
   const double filled = 1.0 / std::sqrt(12.0);
   for (const int k : {1, 2}) {
@@ -97,24 +103,40 @@ std::optional<BuildSurfel> widened(const VoxelGrid& grid,
 
 }  // namespace
 
-std::uint64_t grow_sparse_surfels(const VoxelGrid& grid,
-                                  std::vector<BuildSurfel>& surfels,
-                                  const Executor& executor) {
-  const auto sparse = sparse_blocks(grid, surfels);
+std::uint64_t grow_sparse_surfels(const CellTiles& cells,
+                                  const ScratchArray<BuildSurfel>& surfels,
+                                  const Executor& executor,
+                                  const Progress& progress) {
+  const std::vector<std::size_t> first = cells.first_numbers();
+  const Blocks blocks = count_blocks(cells, surfels, first, executor);
+  const auto is_thin = [&](const VoxelCell& cell) {
+    if (cell.n >= kSparse) return false;
+    const auto block = blocks.find(block_of(cells.resolution(), cell));
+    return block != blocks.end() && block->second.median_is_sparse();
+  };
+  std::vector<char> has_thin(cells.tiles().size(), 0);
+  cells.for_each_tile(executor, [&](std::size_t t, std::span<VoxelCell> own) {
+    has_thin[t] = std::any_of(own.begin(), own.end(), is_thin) ? 1 : 0;
+  });
+  std::vector<std::size_t> thin;
+  for (std::size_t t = 0; t < has_thin.size(); ++t) {
+    if (has_thin[t] != 0) thin.push_back(t);
+  }
   std::atomic<std::uint64_t> grown{0};
-  executor.parallel_for(surfels.size(), 2048, [&](std::size_t begin, std::size_t end) {
-    NeighbourWindow window(grid);
-    for (std::size_t i = begin; i < end; ++i) {
-      const VoxelCell& cell = grid.cells()[i];
-      if (cell.n >= kSparse) continue;
-      const auto block = sparse.find(block_of(grid, cell));
-      if (block == sparse.end() || !block->second) continue;
-      if (const auto wide = widened(grid, window, cell, surfels[i])) {
-        surfels[i] = *wide;
+  const auto widen = [&](TileView& view) {
+    NeighbourWindow window(view.grid);
+    std::vector<double> squared;
+    for (std::size_t i = 0; i < view.count; ++i) {
+      const VoxelCell& cell = view.grid.cells()[i];
+      if (!is_thin(cell)) continue;
+      if (const auto wide = widened(view.grid, window, cell, squared)) {
+        surfels[first[view.tile] + i].word = encode(*wide);
         ++grown;
       }
     }
-  });
+    surfels.release(first[view.tile], first[view.tile] + view.count);
+  };
+  cells.for_each_view_of(thin, executor, kWidest, widen, progress, "closing gaps of thin scans");
   return grown;
 }
 

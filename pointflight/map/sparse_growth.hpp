@@ -1,10 +1,9 @@
 #pragma once
 
-#include <vector>
+#include <cstdint>
 
-#include "pointflight/core/parallel.hpp"
 #include "pointflight/map/bvh8.hpp"
-#include "pointflight/map/voxel_moments.hpp"
+#include "pointflight/map/cell_tiles.hpp"
 
 namespace pointflight {
 
@@ -13,9 +12,10 @@ namespace pointflight {
 /// median planar cell, on cells with fewer than 4 points whose wider neighbourhood is planar; dense
 /// regions and foliage are left as they are. Returns how many surfels were widened.
 ///
-/// `surfels` are those of `grid`, in its order. Does not depend on threads.
-std::uint64_t grow_sparse_surfels(const VoxelGrid& grid,
-                                  std::vector<BuildSurfel>& surfels,
-                                  const Executor& executor);
+/// `surfels` are those of `cells`, in their order. Does not depend on threads.
+std::uint64_t grow_sparse_surfels(const CellTiles& cells,
+                                  const ScratchArray<BuildSurfel>& surfels,
+                                  const Executor& executor,
+                                  const Progress& progress = {});
 
 }  // namespace pointflight

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "pointflight/geometry/morton.hpp"
 #include "pointflight/map/covariance_axes.hpp"
 
 namespace pointflight {
@@ -18,18 +17,33 @@ constexpr double kLoosePrior = 0.65;
 constexpr double kWatertight = 0.28;  // r; a filled cell has 0.289
 constexpr double kTrustedPoints = 40.0;
 
-/// Frame with the plane's normal first and the cell's own longest direction last.
-Matrix3d planar_frame(const CovarianceAxes& plane, const CovarianceAxes& own) {
+/// Frame with the plane's normal first and the direction within it last in which the cell's own
+/// points spread most.
+Matrix3d planar_frame(const CovarianceAxes& plane, const Matrix3d& own_covariance) {
+  const Vector3d a = plane.vectors.col(1);
+  const Vector3d b = plane.vectors.col(2);
+  // larger eigenvector of the covariance within the plane, [[p, q], [q, s]]
+  const Vector3d ca = own_covariance * a;
+  const double q = b.dot(ca);
+  const double h = 0.5 * (a.dot(ca) - b.dot(own_covariance * b));
+  const double d = std::sqrt(h * h + q * q);
+  const double along_a = h >= 0.0 ? h + d : q;
+  const double along_b = h >= 0.0 ? q : d - h;
+  Vector3d longest = along_a * a + along_b * b;
+  if (longest.norm() > 1e-6 * own_covariance.trace()) {
+    longest.normalize();
+  } else {
+    longest = b;
+  }
   const Vector3d normal = plane.vectors.col(0);
-  Vector3d longest = own.vectors.col(2) - own.vectors.col(2).dot(normal) * normal;
-  if (longest.squaredNorm() < 1e-6) longest = plane.vectors.col(2);
-  longest.normalize();
   Matrix3d frame;
   frame << normal, longest.cross(normal), longest;
   return frame;
 }
 
-BuildSurfel fit(const VoxelGrid& grid, NeighbourWindow& window, const VoxelCell& cell) {
+}  // namespace
+
+Surfel fit_surfel(const VoxelGrid& grid, NeighbourWindow& window, const VoxelCell& cell) {
   const double r = grid.resolution();
   const double cell_variance = r * r / 12.0;  // of a plane that fills the cell, per axis
   const Moments own = cell.moments();
@@ -37,16 +51,21 @@ BuildSurfel fit(const VoxelGrid& grid, NeighbourWindow& window, const VoxelCell&
   const CovarianceAxes around = covariance_axes(near.covariance());
   Matrix3d own_covariance = own.covariance();
   if (!own_covariance.allFinite()) own_covariance.setZero();
-  const CovarianceAxes inside = covariance_axes(own_covariance);
 
   const double thickness = std::sqrt(around.lambda[0]);
   const bool neighbours_planar =
       near.n >= 5.0 && thickness < 0.15 * r && around.lambda[0] < 0.15 * around.lambda[1];
-  const bool own_planar = own.n >= 5.0 && inside.lambda[0] < 0.05 * inside.lambda[1];
-  const bool planar = neighbours_planar || own_planar;
-  const Matrix3d frame = neighbours_planar ? planar_frame(around, inside) : inside.vectors;
+  bool planar = neighbours_planar;
+  Matrix3d frame;
+  if (neighbours_planar) {
+    frame = planar_frame(around, own_covariance);
+  } else {
+    const CovarianceAxes inside = covariance_axes(own_covariance);
+    planar = own.n >= 5.0 && inside.lambda[0] < 0.05 * inside.lambda[1];
+    frame = inside.vectors;
+  }
 
-  BuildSurfel surfel;
+  Surfel surfel;
   Vector3d s;
   for (int k = 0; k < 3; ++k) {
     const Vector3d axis = frame.col(k);
@@ -79,27 +98,25 @@ BuildSurfel fit(const VoxelGrid& grid, NeighbourWindow& window, const VoxelCell&
   surfel.axes = ordered.cast<float>();
   surfel.s = s.cast<float>();
   const Vector3d center = own.mean() / r;
-  surfel.center_in_voxel = (center.array() + 0.5).max(0.0).min(1.0).matrix().cast<float>();
+  surfel.center_voxels = (center.array() + 0.5).max(0.0).min(1.0).matrix().cast<float>();
   return surfel;
 }
 
-}  // namespace
-
-std::vector<BuildSurfel> fit_surfels(const VoxelGrid& grid,
-                                     const std::array<std::int32_t, 3>& min_voxel,
-                                     const Executor& executor) {
-  const auto& cells = grid.cells();
-  std::vector<BuildSurfel> surfels(cells.size());
-  executor.parallel_for(cells.size(), 2048, [&](std::size_t begin, std::size_t end) {
-    NeighbourWindow window(grid);
-    for (std::size_t i = begin; i < end; ++i) {
-      surfels[i] = fit(grid, window, cells[i]);
-      const auto& v = cells[i].voxel;
-      surfels[i].morton = morton_encode(static_cast<std::uint32_t>(v[0] - min_voxel[0]),
-                                        static_cast<std::uint32_t>(v[1] - min_voxel[1]),
-                                        static_cast<std::uint32_t>(v[2] - min_voxel[2]));
+ScratchArray<BuildSurfel> fit_surfels(const CellTiles& cells,
+                                      const Executor& executor,
+                                      Scratch& scratch,
+                                      const Progress& progress) {
+  ScratchArray<BuildSurfel> surfels(scratch, cells.count());
+  const std::vector<std::size_t> first = cells.first_numbers();
+  const auto fit_tile = [&](TileView& view) {
+    NeighbourWindow window(view.grid);
+    std::size_t to = first[view.tile];
+    for (const VoxelCell& cell : view.own()) {
+      surfels[to++] = {voxel_key(cell.voxel), encode(fit_surfel(view.grid, window, cell))};
     }
-  });
+    surfels.release(first[view.tile], to);
+  };
+  cells.for_each_view(executor, 1, fit_tile, progress, "fitting surfels");
   return surfels;
 }
 

@@ -1,18 +1,19 @@
 #pragma once
 
-#include <vector>
-
-#include "pointflight/core/parallel.hpp"
 #include "pointflight/map/bvh8.hpp"
-#include "pointflight/map/voxel_moments.hpp"
+#include "pointflight/map/cell_tiles.hpp"
 
 namespace pointflight {
 
-/// Fits one surfel to each cell of the grid, in the grid's order, which must be Morton order of
-/// `voxel - min_voxel`. Axes come from the 3x3x3 neighbourhood where that is planar, spreads from
-/// the cell's own points, shrunk to a prior worth 8 points (docs/architecture.md, "Surfels").
-std::vector<BuildSurfel> fit_surfels(const VoxelGrid& grid,
-                                     const std::array<std::int32_t, 3>& min_voxel,
-                                     const Executor& executor);
+/// Fits a surfel to a cell of the grid that `window` looks at; its centre is in voxels from the
+/// cell's low corner. Axes come from the 3x3x3 neighbourhood where that is planar, spreads from the
+/// cell's own points, shrunk to a prior worth 8 points (docs/architecture.md, "Surfels").
+Surfel fit_surfel(const VoxelGrid& grid, NeighbourWindow& window, const VoxelCell& cell);
+
+/// Fits one surfel to each cell, in the cells' order.
+ScratchArray<BuildSurfel> fit_surfels(const CellTiles& cells,
+                                      const Executor& executor,
+                                      Scratch& scratch,
+                                      const Progress& progress = {});
 
 }  // namespace pointflight

@@ -1,23 +1,15 @@
 #include "pointflight/map/voxel_moments.hpp"
 
+#include <algorithm>
 #include <cmath>
+
+#include "pointflight/core/hash.hpp"
+#include "pointflight/core/math.hpp"
 
 namespace pointflight {
 namespace {
 
-constexpr double kMaxCells = 1 << 20;
-
 constexpr std::size_t kSlotsMin = 1 << 12;
-
-/// Murmur3's finaliser: neighbours scatter.
-std::uint64_t hash_key(std::uint64_t h) {
-  h ^= h >> 33;
-  h *= 0xff51afd7ed558ccdull;
-  h ^= h >> 33;
-  h *= 0xc4ceb9fe1a85ec53ull;
-  h ^= h >> 33;
-  return h;
-}
 
 }  // namespace
 
@@ -40,8 +32,32 @@ Moments VoxelCell::moments() const {
   return m;
 }
 
-VoxelGrid::VoxelGrid(const Vector3d& base_world, double resolution)
-    : base_(base_world), resolution_(resolution), slots_(kSlotsMin, kNone) {}
+void VoxelCell::add(const VoxelCell& other) {
+  n += other.n;
+  for (std::size_t k = 0; k < 3; ++k) sum[k] += other.sum[k];
+  for (std::size_t k = 0; k < 6; ++k) products[k] += other.products[k];
+  intensity_sum += other.intensity_sum;
+}
+
+std::optional<VoxelFrame::Place> VoxelFrame::place_of(const Vector3d& point_world) const {
+  const Vector3d cells = (point_world - base_world) * (1.0 / resolution);
+  if (!(cells.cwiseAbs().maxCoeff() < kMaxVoxel)) return std::nullopt;
+  Place place{};
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::int64_t low = floor_to_integer(cells[axis]);
+    place.voxel[static_cast<std::size_t>(axis)] = static_cast<std::int32_t>(low);
+    place.in_cell[axis] = (cells[axis] - static_cast<double>(low) - 0.5) * resolution;
+  }
+  return place;
+}
+
+Vector3d VoxelFrame::centroid_world(const VoxelCell& cell) const {
+  const Vector3d center(cell.voxel[0] + 0.5, cell.voxel[1] + 0.5, cell.voxel[2] + 0.5);
+  return base_world + resolution * center +
+         Eigen::Map<const Vector3f>(cell.sum.data()).cast<double>() / cell.n;
+}
+
+VoxelGrid::VoxelGrid(const VoxelFrame& frame) : frame_(frame), slots_(kSlotsMin, kNone) {}
 
 std::uint64_t VoxelGrid::brick_key(std::int32_t x, std::int32_t y, std::int32_t z) {
   // 19 bits and a sign each
@@ -52,7 +68,7 @@ std::uint64_t VoxelGrid::brick_key(std::int32_t x, std::int32_t y, std::int32_t 
 
 std::size_t VoxelGrid::slot_of(std::uint64_t key) const {
   const std::size_t mask = slots_.size() - 1;
-  std::size_t slot = hash_key(key) & mask;
+  std::size_t slot = scatter64(key) & mask;
   while (slots_[slot] != kNone && bricks_[slots_[slot]].key != key) slot = (slot + 1) & mask;
   return slot;
 }
@@ -66,7 +82,9 @@ void VoxelGrid::resize_table(std::size_t slots) {
   for (std::uint32_t i = 0; i < bricks_.size(); ++i) slots_[slot_of(bricks_[i].key)] = i;
 }
 
-std::uint32_t VoxelGrid::add_brick(std::uint64_t key) {
+std::uint32_t VoxelGrid::brick_at(std::uint64_t key) {
+  const std::uint32_t found = slots_[slot_of(key)];
+  if (found != kNone) return found;
   if (2 * (bricks_.size() + 1) > slots_.size()) resize_table(2 * slots_.size());
   const auto index = static_cast<std::uint32_t>(bricks_.size());
   slots_[slot_of(key)] = index;
@@ -76,71 +94,88 @@ std::uint32_t VoxelGrid::add_brick(std::uint64_t key) {
   return index;
 }
 
-VoxelCell* VoxelGrid::cell_at(const Vector3d& cells) {
-  if (!(cells.cwiseAbs().maxCoeff() < kMaxCells)) return nullptr;
-  const Vector3d low = cells.array().floor();
-  const std::array<std::int32_t, 3> voxel = {static_cast<std::int32_t>(low.x()),
-                                             static_cast<std::int32_t>(low.y()),
-                                             static_cast<std::int32_t>(low.z())};
+std::uint32_t VoxelGrid::cell_at(const std::array<std::int32_t, 3>& voxel) {
   const std::uint64_t key = brick_key(voxel[0], voxel[1], voxel[2]);
-  if (last_brick_ == kNone || bricks_[last_brick_].key != key) {
-    last_brick_ = find_brick(key);
-    if (last_brick_ == kNone) last_brick_ = add_brick(key);
-  }
-  std::uint32_t& cell = bricks_[last_brick_].cells[place_in_brick(voxel[0], voxel[1], voxel[2])];
+  if (last_brick_ == kNone || bricks_[last_brick_].key != key) last_brick_ = brick_at(key);
+  Brick& brick = bricks_[last_brick_];
+  const std::size_t place = place_in_brick(voxel[0], voxel[1], voxel[2]);
+  std::uint32_t& cell = brick.cells[place];
   if (cell == kNone) {
+    brick.occupied |= std::uint64_t{1} << place;
     cell = static_cast<std::uint32_t>(cells_.size());
     cells_.emplace_back().voxel = voxel;
   }
-  return &cells_[cell];
+  return cell;
 }
 
-bool VoxelGrid::add(const Vector3d& point_world, float intensity) {
-  const Vector3d cells = (point_world - base_) / resolution_;
-  VoxelCell* cell = cell_at(cells);
-  if (cell == nullptr) return false;
-  const Vector3d low = cells.array().floor();
-  const Vector3f q =
-      ((cells - low).array() - 0.5).matrix().cast<float>() * static_cast<float>(resolution_);
-  ++cell->n;
-  for (std::size_t axis = 0; axis < 3; ++axis) cell->sum[axis] += q[static_cast<int>(axis)];
-  cell->products[0] += q.x() * q.x();
-  cell->products[1] += q.x() * q.y();
-  cell->products[2] += q.x() * q.z();
-  cell->products[3] += q.y() * q.y();
-  cell->products[4] += q.y() * q.z();
-  cell->products[5] += q.z() * q.z();
-  cell->intensity_sum += intensity;
-  return true;
-}
-
-bool VoxelGrid::add(const Vector3d& mean_world,
-                    const Matrix3d& covariance,
-                    std::uint32_t n,
-                    float intensity_sum) {
-  const Vector3d cells = (mean_world - base_) / resolution_;
-  VoxelCell* cell = cell_at(cells);
-  if (cell == nullptr) return false;
-  const Vector3d q = (cells.array() - cells.array().floor() - 0.5).matrix() * resolution_;
-  const Matrix3d products = n * (covariance + q * q.transpose());
-  cell->n += n;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    cell->sum[axis] += static_cast<float>(n * q[static_cast<int>(axis)]);
-  }
-  std::size_t k = 0;
-  for (int row = 0; row < 3; ++row) {
-    for (int column = row; column < 3; ++column) {
-      cell->products[k++] += static_cast<float>(products(row, column));
+void VoxelGrid::add(std::span<const CellPoint> points) {
+  // points of a scan scatter: what one needs is fetched while others are looked up, or each would
+  // wait for memory four times (slot, brick, entry, cell)
+  constexpr std::size_t kGroup = 32;
+  std::array<std::uint32_t, kGroup> at{};
+  for (std::size_t first = 0; first < points.size(); first += kGroup) {
+    const auto group = points.subspan(first, std::min(kGroup, points.size() - first));
+    const std::size_t mask = slots_.size() - 1;
+    for (std::size_t i = 0; i < group.size(); ++i) {
+      const auto& v = group[i].voxel;
+      __builtin_prefetch(&slots_[scatter64(brick_key(v[0], v[1], v[2])) & mask]);
+    }
+    for (std::size_t i = 0; i < group.size(); ++i) {
+      const auto& v = group[i].voxel;
+      at[i] = slots_[scatter64(brick_key(v[0], v[1], v[2])) & mask];
+      if (at[i] == kNone) continue;
+      __builtin_prefetch(&bricks_[at[i]].key);
+      __builtin_prefetch(&bricks_[at[i]].cells[place_in_brick(v[0], v[1], v[2])]);
+    }
+    for (std::size_t i = 0; i < group.size(); ++i) {
+      if (at[i] == kNone) continue;
+      const auto& v = group[i].voxel;
+      const std::uint32_t cell = bricks_[at[i]].cells[place_in_brick(v[0], v[1], v[2])];
+      if (cell != kNone) __builtin_prefetch(&cells_[cell]);
+    }
+    for (const CellPoint& p : group) {
+      VoxelCell& cell = cells_[cell_at(p.voxel)];
+      const auto& q = p.in_cell;
+      ++cell.n;
+      for (std::size_t axis = 0; axis < 3; ++axis) cell.sum[axis] += q[axis];
+      cell.products[0] += q[0] * q[0];
+      cell.products[1] += q[0] * q[1];
+      cell.products[2] += q[0] * q[2];
+      cell.products[3] += q[1] * q[1];
+      cell.products[4] += q[1] * q[2];
+      cell.products[5] += q[2] * q[2];
+      cell.intensity_sum += p.intensity;
     }
   }
-  cell->intensity_sum += intensity_sum;
-  return true;
 }
 
-std::uint32_t VoxelGrid::find(const std::array<std::int32_t, 3>& voxel) const {
-  const std::uint32_t brick = find_brick(brick_key(voxel[0], voxel[1], voxel[2]));
-  return brick == kNone ? kNone
-                        : bricks_[brick].cells[place_in_brick(voxel[0], voxel[1], voxel[2])];
+void VoxelGrid::add(const VoxelCell& cell) {
+  cells_[cell_at(cell.voxel)].add(cell);
+}
+
+std::vector<std::uint32_t> VoxelGrid::morton_order() const {
+  std::vector<std::pair<std::uint64_t, std::uint32_t>> bricks(bricks_.size());
+  for (std::uint32_t i = 0; i < bricks.size(); ++i) {
+    // any cell of a brick tells where the brick lies
+    const auto& entries = bricks_[i].cells;
+    const auto any = std::find_if(
+        entries.begin(), entries.end(), [](std::uint32_t cell) { return cell != kNone; });
+    bricks[i] = {voxel_key(cells_[*any].voxel) >> 6, i};
+  }
+  std::sort(bricks.begin(), bricks.end());
+  std::vector<std::uint32_t> order;
+  order.reserve(cells_.size());
+  for (const auto& brick : bricks) {
+    for (const std::uint32_t cell : bricks_[brick.second].cells) {
+      if (cell != kNone) order.push_back(cell);
+    }
+  }
+  return order;
+}
+
+std::size_t VoxelGrid::memory() const {
+  return cells_.capacity() * sizeof(VoxelCell) + bricks_.capacity() * sizeof(Brick) +
+         slots_.capacity() * sizeof(std::uint32_t);
 }
 
 void NeighbourWindow::move_to(const VoxelCell& cell) {
@@ -192,29 +227,6 @@ Moments NeighbourWindow::moments(const VoxelCell& cell, std::int32_t reach) {
       products[1], products[3], products[4],              //
       products[2], products[4], products[5];
   return all;
-}
-
-Vector3d VoxelGrid::centroid_world(const VoxelCell& cell) const {
-  const Vector3d center(cell.voxel[0] + 0.5, cell.voxel[1] + 0.5, cell.voxel[2] + 0.5);
-  return base_ + resolution_ * center +
-         Eigen::Map<const Vector3f>(cell.sum.data()).cast<double>() / cell.n;
-}
-
-void VoxelGrid::reorder(const std::vector<std::uint32_t>& indices) {
-  std::vector<VoxelCell> kept;
-  kept.reserve(indices.size());
-  for (const std::uint32_t i : indices) kept.push_back(cells_[i]);
-  cells_ = std::move(kept);
-  bricks_.clear();
-  slots_.assign(kSlotsMin, kNone);
-  last_brick_ = kNone;
-  for (std::uint32_t i = 0; i < cells_.size(); ++i) {
-    const auto& v = cells_[i].voxel;
-    const std::uint64_t key = brick_key(v[0], v[1], v[2]);
-    std::uint32_t brick = find_brick(key);
-    if (brick == kNone) brick = add_brick(key);
-    bricks_[brick].cells[place_in_brick(v[0], v[1], v[2])] = i;
-  }
 }
 
 }  // namespace pointflight

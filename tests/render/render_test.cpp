@@ -358,7 +358,8 @@ TEST(BeamRenderer, BeamsAlongAWallDoNotOverflowUnseen) {
 }
 
 TEST(BeamRenderer, AnEmptyMapReturnsNothing) {
-  const Bvh8 empty = build_bvh8({}, 0.1);
+  Scratch scratch;
+  const Bvh8 empty = build_bvh8({{}, {}}, TreeQuality::kNormal, Executor(1), scratch);
   MapDescription description;
   description.resolution = 0.1;
   const auto map = SurfelMap::from_bytes(map_bytes(empty, description), "empty");

@@ -1,0 +1,103 @@
+#include "pointflight/core/scratch.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdlib>
+#include <filesystem>
+#include <system_error>
+
+#include "pointflight/core/input_error.hpp"
+
+namespace pointflight {
+namespace {
+
+constexpr std::size_t kPage = 4096;
+
+[[noreturn]] void fail(const std::string& folder, std::size_t bytes, int error) {
+  throw InputError(
+      fmt::format("{}: no room for {:.1f} GB of intermediate results: {}; choose "
+                  "another place or a coarser --resolution",
+                  folder,
+                  1e-9 * static_cast<double>(bytes),
+                  std::generic_category().message(error)));
+}
+
+/// A file that has no name.
+int open_nameless(const std::string& folder, std::size_t bytes) {
+  int file = ::open(folder.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, 0600);
+  if (file >= 0) return file;
+  // some network file systems cannot
+  std::string name = folder + "/pointflight-XXXXXX";
+  file = ::mkstemp(name.data());
+  if (file < 0) fail(folder, bytes, errno);
+  ::unlink(name.c_str());
+  return file;
+}
+
+}  // namespace
+
+Scratch::Scratch(std::string folder, std::size_t memory_bytes)
+    : folder_(folder.empty() ? std::filesystem::temp_directory_path().string() : std::move(folder)),
+      limit_(memory_bytes) {}
+
+ScratchBlock::ScratchBlock(Scratch& scratch, std::size_t bytes)
+    : scratch_(&scratch), bytes_((bytes + kPage - 1) / kPage * kPage) {
+  if (bytes_ == 0) return;
+  in_file_ = scratch.in_memory_.fetch_add(bytes_) + bytes_ > scratch.limit_;
+  int file = -1;
+  if (in_file_) {
+    scratch.in_memory_ -= bytes_;
+    file = open_nameless(scratch.folder_, bytes_);
+    // takes the room now: a full disk is an error here and not a signal later
+    const int error = ::posix_fallocate(file, 0, static_cast<off_t>(bytes_));
+    if (error != 0) {
+      ::close(file);
+      fail(scratch.folder_, bytes_, error);
+    }
+  }
+  const int flags = in_file_ ? MAP_SHARED : MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE;
+  void* address = ::mmap(nullptr, bytes_, PROT_READ | PROT_WRITE, flags, file, 0);
+  const int error = errno;
+  if (file >= 0) ::close(file);
+  if (address == MAP_FAILED) {
+    if (!in_file_) scratch.in_memory_ -= bytes_;
+    fail(scratch.folder_, bytes_, error);
+  }
+  data_ = static_cast<std::byte*>(address);
+  if (in_file_) scratch.in_files_ += bytes_;
+}
+
+ScratchBlock::~ScratchBlock() {
+  if (data_ == nullptr) return;
+  ::munmap(data_, bytes_);
+  (in_file_ ? scratch_->in_files_ : scratch_->in_memory_) -= bytes_;
+}
+
+ScratchBlock::ScratchBlock(ScratchBlock&& other) noexcept
+    : scratch_(other.scratch_),
+      data_(std::exchange(other.data_, nullptr)),
+      bytes_(std::exchange(other.bytes_, 0)),
+      in_file_(other.in_file_) {}
+
+ScratchBlock& ScratchBlock::operator=(ScratchBlock&& other) noexcept {
+  std::swap(scratch_, other.scratch_);
+  std::swap(data_, other.data_);
+  std::swap(bytes_, other.bytes_);
+  std::swap(in_file_, other.in_file_);
+  return *this;
+}
+
+void ScratchBlock::release(std::size_t begin, std::size_t end) const {
+  // whole pages within the range
+  const std::size_t first = (begin + kPage - 1) / kPage * kPage;
+  const std::size_t last = end / kPage * kPage;
+  if (in_file_ && data_ != nullptr && first < last) {
+    ::madvise(data_ + first, last - first, MADV_DONTNEED);
+  }
+}
+
+}  // namespace pointflight

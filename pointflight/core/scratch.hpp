@@ -1,0 +1,96 @@
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <type_traits>
+#include <utility>
+
+namespace pointflight {
+
+/// Room for large arrays: in memory until together they reach a limit, beyond that in files without
+/// a name in a folder, mapped, which the kernel can write out whenever memory is short. The files
+/// vanish with the process, however it ends.
+///
+/// Must outlive its arrays. Arrays may be made from any thread.
+class Scratch {
+ public:
+  static constexpr std::size_t kDefaultMemory = std::size_t{3} << 29;  ///< Bytes: 1.5 GiB.
+
+  /// `folder` empty: that of temporary files. `memory_bytes` 0: every array is a file.
+  explicit Scratch(std::string folder = {}, std::size_t memory_bytes = kDefaultMemory);
+  Scratch(const Scratch&) = delete;
+  Scratch& operator=(const Scratch&) = delete;
+
+  [[nodiscard]] std::size_t bytes_in_memory() const { return in_memory_; }
+  [[nodiscard]] std::size_t bytes_in_files() const { return in_files_; }
+
+ private:
+  friend class ScratchBlock;
+  std::string folder_;
+  std::size_t limit_;
+  std::atomic<std::size_t> in_memory_{0};
+  std::atomic<std::size_t> in_files_{0};
+};
+
+/// Zeroed bytes of a Scratch.
+class ScratchBlock {
+ public:
+  ScratchBlock() = default;
+  /// Throws InputError where the folder has no room.
+  ScratchBlock(Scratch& scratch, std::size_t bytes);
+  ~ScratchBlock();
+  ScratchBlock(ScratchBlock&& other) noexcept;
+  ScratchBlock& operator=(ScratchBlock&& other) noexcept;
+
+  [[nodiscard]] std::byte* data() const { return data_; }
+
+  /// These bytes will not be touched for a while: a block in a file stops counting as the process's
+  /// memory. They stay what they are.
+  void release(std::size_t begin, std::size_t end) const;
+
+ private:
+  Scratch* scratch_ = nullptr;
+  std::byte* data_ = nullptr;
+  std::size_t bytes_ = 0;
+  bool in_file_ = false;
+};
+
+/// A fixed number of values in a Scratch, zeroed at first.
+template <class T>
+class ScratchArray {
+  static_assert(std::is_trivially_copyable_v<T>);
+
+ public:
+  ScratchArray() = default;
+  ScratchArray(Scratch& scratch, std::size_t size)
+      : block_(scratch, size * sizeof(T)), size_(size) {}
+  ScratchArray(ScratchArray&& other) noexcept
+      : block_(std::move(other.block_)), size_(std::exchange(other.size_, 0)) {}
+  ScratchArray& operator=(ScratchArray&& other) noexcept {
+    block_ = std::move(other.block_);
+    size_ = std::exchange(other.size_, 0);
+    return *this;
+  }
+
+  [[nodiscard]] std::size_t size() const { return size_; }
+  [[nodiscard]] T* data() const { return reinterpret_cast<T*>(block_.data()); }
+  [[nodiscard]] T& operator[](std::size_t i) const { return data()[i]; }
+  [[nodiscard]] T* begin() const { return data(); }
+  [[nodiscard]] T* end() const { return data() + size_; }
+  [[nodiscard]] std::span<T> span() const { return {data(), size_}; }
+
+  /// See ScratchBlock.
+  void release(std::size_t begin, std::size_t end) const {
+    block_.release(begin * sizeof(T), end * sizeof(T));
+  }
+
+ private:
+  ScratchBlock block_;
+  std::size_t size_ = 0;
+};
+
+}  // namespace pointflight
