@@ -25,7 +25,7 @@ struct Flags {
   int copies = 1;
   std::vector<int> threads = {1, 2};
   std::string output;  ///< Keeps the last map.
-  bool high = false;
+  bool normal = false;
   bool json = false;
 };
 
@@ -122,7 +122,7 @@ std::vector<Stage> timed_import(const MemoryCloud& cloud,
   };
   ImportOptions options;
   options.resolution = flags.resolution;
-  options.quality = flags.high ? TreeQuality::kHigh : TreeQuality::kNormal;
+  options.quality = flags.normal ? TreeQuality::kNormal : TreeQuality::kHigh;
   const ImportedMap map = build_map(
       {name},
       [&](std::size_t) { return std::make_unique<MemoryReader>(cloud, flags.copies); },
@@ -209,7 +209,7 @@ int main(int argc, char** argv) {
   app.add_option("--copies", flags.copies, "Of the scene, side by side");
   app.add_option("--threads", flags.threads, "Each in turn")->delimiter(',');
   app.add_option("--output", flags.output, "Write the last map there: .pfmap");
-  app.add_flag("--high", flags.high, "As by --quality high");
+  app.add_flag("--normal", flags.normal, "As by --quality normal");
   app.add_flag("--json", flags.json, "Print JSON");
   CLI11_PARSE(app, argc, argv);
   try {

@@ -321,6 +321,13 @@ POINTFLIGHT_INLINE std::int32_t sum(const I8& a) {
   for (std::size_t p = 1; p < kParts; ++p) all = hn::Add(all, a.v[p]);
   return hn::GetLane(hn::SumOfLanes(kI, all));
 }
+POINTFLIGHT_INLINE float sum(const F8& a) {
+  alignas(32) float lanes[8];
+  store(a, lanes);
+  // one order on every target
+  return ((lanes[0] + lanes[1]) + (lanes[2] + lanes[3])) +
+         ((lanes[4] + lanes[5]) + (lanes[6] + lanes[7]));
+}
 POINTFLIGHT_INLINE float greatest(const F8& a) {
   auto all = a.v[0];
   for (std::size_t p = 1; p < kParts; ++p) all = hn::Max(all, a.v[p]);

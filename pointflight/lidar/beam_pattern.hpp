@@ -33,6 +33,9 @@ class BeamPattern {
   /// own time. The same for an index always; repeating sensors return the same for all indices.
   [[nodiscard]] virtual std::vector<Beam> beams(std::uint64_t scan_index,
                                                 const Executor& executor) const = 0;
+
+  /// True if all scans have the same beams: what is worked out for one is kept.
+  [[nodiscard]] virtual bool repeats() const { return false; }
 };
 
 /// Makes the pattern that the settings name. Throws InputError.

@@ -5,6 +5,7 @@
 
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/random.hpp"
+#include "pointflight/render/direction_order.hpp"
 
 namespace pointflight {
 namespace {
@@ -31,6 +32,24 @@ Duration Lidar::period() const {
   return from_seconds(1.0 / settings_.rate);
 }
 
+std::shared_ptr<const Lidar::OrderedBeams> Lidar::ordered_beams(std::uint64_t scan_index,
+                                                                const Executor& executor) const {
+  {
+    const std::lock_guard lock(kept_->mutex);
+    if (kept_->beams) return kept_->beams;
+  }
+  auto made = std::make_shared<OrderedBeams>();
+  made->beams = pattern_->beams(scan_index, executor);
+  if (!pattern_->repeats()) return made;
+  std::vector<Vector3f> directions;
+  directions.reserve(made->beams.size());
+  for (const Beam& beam : made->beams) directions.push_back(beam.direction_sensor);
+  made->order = direction_order(directions, executor);
+  const std::lock_guard lock(kept_->mutex);  // another thread may have made the same
+  kept_->beams = made;
+  return made;
+}
+
 Scan Lidar::take(const ScanRequest& request,
                  const PoseAt& pose_at,
                  const Renderer& renderer,
@@ -40,7 +59,8 @@ Scan Lidar::take(const ScanRequest& request,
   scan.sensor = sensor_;
   scan.start = request.start;
   scan.end = request.start + period();
-  const std::vector<Beam> beams = pattern_->beams(request.index, executor);
+  const auto ordered = ordered_beams(request.index, executor);
+  const std::vector<Beam>& beams = ordered->beams;
   scan.beams = beams.size();
 
   // world rays, each from the pose at its own time
@@ -66,6 +86,7 @@ Scan Lidar::take(const ScanRequest& request,
   std::vector<Hit> hits(beams.size());
   RayBatch batch;
   batch.rays = rays;
+  batch.order = ordered->order;
   batch.T_world_sensor = middle;
   batch.range_max = range_max;
   batch.image_resolution = settings_.image_resolution_deg * kDegree;

@@ -2,6 +2,7 @@
 
 #include <functional>
 #include <memory>
+#include <mutex>
 
 #include "pointflight/core/parallel.hpp"
 #include "pointflight/lidar/beam_pattern.hpp"
@@ -45,9 +46,23 @@ class Lidar {
   }
 
  private:
+  /// Beams of a scan and their order by direction.
+  struct OrderedBeams {
+    std::vector<Beam> beams;
+    std::vector<std::uint32_t> order;  ///< Empty for patterns that do not repeat.
+  };
+  [[nodiscard]] std::shared_ptr<const OrderedBeams> ordered_beams(std::uint64_t scan_index,
+                                                                  const Executor& executor) const;
+
   LidarSettings settings_;
   std::uint32_t sensor_;
   std::unique_ptr<BeamPattern> pattern_;
+  /// Of a pattern that repeats, after its first scan.
+  struct Kept {
+    std::mutex mutex;
+    std::shared_ptr<const OrderedBeams> beams;
+  };
+  std::unique_ptr<Kept> kept_ = std::make_unique<Kept>();
 };
 
 }  // namespace pointflight

@@ -24,12 +24,18 @@ struct Range {
   [[nodiscard]] std::size_t count() const { return end - begin; }
 };
 
+/// Lanes 0 to 2; four are as fast as one.
 struct Box {
-  Vector3f min = Vector3f::Constant(std::numeric_limits<float>::infinity());
-  Vector3f max = Vector3f::Constant(-std::numeric_limits<float>::infinity());
+  Eigen::Array4f min = Eigen::Array4f::Constant(std::numeric_limits<float>::infinity());
+  Eigen::Array4f max = Eigen::Array4f::Constant(-std::numeric_limits<float>::infinity());
   void add(const Box& other) {
-    min = min.cwiseMin(other.min);
-    max = max.cwiseMax(other.max);
+    min = min.min(other.min);
+    max = max.max(other.max);
+  }
+  [[nodiscard]] Eigen::Array4f center() const { return 0.5f * (min + max); }
+  [[nodiscard]] double half_area() const {
+    const Eigen::Array4f d = max - min;
+    return static_cast<double>(d[0] * d[1] + d[1] * d[2] + d[2] * d[0]);
   }
 };
 
@@ -41,35 +47,39 @@ struct Children {
   std::size_t count = 0;
 };
 
-/// Opens the child with the greatest `size_of` that is no leaf, until there are eight.
-template <class IsLeaf, class SizeOf, class Split>
-Children open_children(const Range& range,
-                       const IsLeaf& is_leaf,
-                       const SizeOf& size_of,
-                       const Split& split) {
+/// Two parts of a range and how much each is worth being opened.
+struct Split {
+  std::size_t middle;
+  double first_worth;
+  double second_worth;
+};
+
+/// Opens the child that is worth most and no leaf, until there are eight.
+template <class IsLeaf, class SplitRange>
+Children open_children(const Range& range, const IsLeaf& is_leaf, const SplitRange& split) {
   Children children;
   auto& ranges = children.ranges;
-  std::array<double, 8> sizes{};  // negative: a leaf
-  const auto set = [&](std::size_t i, const Range& part) {
+  std::array<double, 8> worth{};  // negative: a leaf
+  const auto set = [&](std::size_t i, const Range& part, double value) {
     ranges[i] = part;
-    sizes[i] = is_leaf(part) ? -1.0 : size_of(part);
+    worth[i] = is_leaf(part) ? -1.0 : value;
   };
-  set(0, range);
+  set(0, range, 0.0);
   children.count = 1;
   while (children.count < ranges.size()) {
-    std::size_t largest = 0;
+    std::size_t best = 0;
     for (std::size_t i = 1; i < children.count; ++i) {
-      if (sizes[i] > sizes[largest]) largest = i;
+      if (worth[i] > worth[best]) best = i;
     }
-    if (sizes[largest] < 0.0) break;
-    const Range whole = ranges[largest];
-    const std::size_t middle = split(whole);
-    for (std::size_t i = children.count; i > largest + 1; --i) {
+    if (worth[best] < 0.0) break;
+    const Range whole = ranges[best];
+    const Split parts = split(whole);
+    for (std::size_t i = children.count; i > best + 1; --i) {
       ranges[i] = ranges[i - 1];
-      sizes[i] = sizes[i - 1];
+      worth[i] = worth[i - 1];
     }
-    set(largest, {whole.begin, middle});
-    set(largest + 1, {middle, whole.end});
+    set(best, {whole.begin, parts.middle}, parts.first_worth);
+    set(best + 1, {parts.middle, whole.end}, parts.second_worth);
     ++children.count;
   }
   return children;
@@ -93,8 +103,9 @@ class Surfels {
   /// These have been used for the last time.
   void release(const Range& range) const { input_.surfels.release(range.begin, range.end); }
 
-  /// First surfel whose key has the range's highest differing bit set.
-  [[nodiscard]] std::size_t split_by_key(const Range& range) const {
+  /// The second part begins with the first surfel whose key has the range's highest differing bit
+  /// set; parts are worth what they hold.
+  [[nodiscard]] Split split_by_key(const Range& range) const {
     const auto surfels = input_.surfels.span();
     const std::uint64_t first = surfels[range.begin].morton;
     const std::uint64_t last = surfels[range.end - 1].morton;
@@ -106,7 +117,9 @@ class Surfels {
                          surfels.begin() + static_cast<std::ptrdiff_t>(range.end),
                          border,
                          [](const BuildSurfel& s, std::uint64_t key) { return s.morton < key; });
-    return static_cast<std::size_t>(at - surfels.begin());
+    const auto middle = static_cast<std::size_t>(at - surfels.begin());
+    return {
+        middle, static_cast<double>(middle - range.begin), static_cast<double>(range.end - middle)};
   }
 
   /// Box of the ellipsoid of kSupport standard deviations as the reader decodes it, grown so that
@@ -114,7 +127,7 @@ class Surfels {
   [[nodiscard]] Box support_box(SurfelWord word, const Voxel& origin) const {
     const Surfel surfel = decode(word);
     const double r = input_.resolution;
-    Box box;
+    Box box{Eigen::Array4f::Zero(), Eigen::Array4f::Zero()};
     for (int axis = 0; axis < 3; ++axis) {
       double variance = 0.0;
       for (int k = 0; k < 3; ++k) {
@@ -137,7 +150,7 @@ class Surfels {
 };
 
 void quantise(const Box& whole, std::span<const Box> boxes, Bvh8Node& node) {
-  const float extent = (whole.max - whole.min).maxCoeff();
+  const float extent = (whole.max - whole.min).head<3>().maxCoeff();
   node.scale = std::nextafter(extent / 254.0f, std::numeric_limits<float>::infinity());
   for (int axis = 0; axis < 3; ++axis) node.origin[axis] = whole.min[axis];
   for (std::size_t i = 0; i < boxes.size(); ++i) {
@@ -196,7 +209,6 @@ class Part {
     const Children children = open_children(
         range,
         [this](const Range& part) { return is_leaf(part); },
-        [this](const Range& part) { return size_of(part); },
         [this](const Range& part) { return split(part); });
     std::array<std::uint8_t, 8> meta{};
     std::array<Box, 8> boxes;
@@ -253,97 +265,95 @@ class Part {
   /// Number in the whole map of the i-th surfel of the part.
   [[nodiscard]] std::size_t surfel(std::size_t i) const { return range_.begin + order_[i]; }
 
-  /// What makes a child worth opening: its surfels, or the chance that a ray comes by.
-  [[nodiscard]] double size_of(const Range& range) const {
-    if (quality_ == TreeQuality::kNormal) return static_cast<double>(range.count());
-    Box whole;
-    for (std::size_t i = range.begin; i < range.end; ++i) whole.add(boxes_[order_[i]]);
-    return area_of(whole);
-  }
-
-  static double area_of(const Box& box) {
-    const Vector3f d = box.max - box.min;
-    return static_cast<double>(d.x() * d.y() + d.y() * d.z() + d.z() * d.x());
-  }
-
-  [[nodiscard]] std::size_t split(const Range& range) {
+  [[nodiscard]] Split split(const Range& range) {
     if (quality_ == TreeQuality::kHigh) return split_by_area(range);
     // in this quality the order is still that of the keys
     const std::size_t first = range_.begin;
-    return surfels_.split_by_key({first + range.begin, first + range.end}) - first;
+    Split parts = surfels_.split_by_key({first + range.begin, first + range.end});
+    parts.middle -= first;
+    return parts;
   }
 
-  /// Surface area heuristic in 16 bins an axis; a part of n surfels costs its area times the leaves
-  /// that it will have.
-  [[nodiscard]] std::size_t split_by_area(const Range& range) {
-    constexpr std::size_t kBins = 16;
-    Vector3f low = Vector3f::Constant(std::numeric_limits<float>::infinity());
-    Vector3f high = -low;
+  static constexpr std::size_t kMostBins = 16;
+  struct Bins {
+    std::array<Box, kMostBins> boxes;
+    std::array<std::uint32_t, kMostBins> counts{};
+  };
+
+  /// Surface area heuristic over bins along each axis (Wald 2007): a part of n surfels costs its
+  /// area times the leaves that it will have; its area is also what it is worth.
+  [[nodiscard]] Split split_by_area(const Range& range) {
+    const std::size_t bins = range.count() < 64 ? 8 : kMostBins;
+    Eigen::Array4f low = Eigen::Array4f::Constant(std::numeric_limits<float>::infinity());
+    Eigen::Array4f high = -low;
     for (std::size_t i = range.begin; i < range.end; ++i) {
-      const Vector3f c = center_of(boxes_[order_[i]]);
-      low = low.cwiseMin(c);
-      high = high.cwiseMax(c);
+      const Eigen::Array4f center = boxes_[order_[i]].center();
+      low = low.min(center);
+      high = high.max(center);
+    }
+    // an axis without extent has but one bin
+    const Eigen::Array4f extent = high - low;
+    const Eigen::Array4f scale =
+        (extent > 0.0f).select(static_cast<float>(bins) / extent, Eigen::Array4f::Zero());
+    const auto bins_of = [&](const Box& box) -> Eigen::Array4i {
+      return ((box.center() - low) * scale).cast<int>().min(static_cast<int>(bins) - 1);
+    };
+    std::array<Bins, 3> along;
+    for (std::size_t i = range.begin; i < range.end; ++i) {
+      const Box& box = boxes_[order_[i]];
+      const Eigen::Array4i bin = bins_of(box);
+      for (int axis = 0; axis < 3; ++axis) {
+        Bins& of_axis = along[static_cast<std::size_t>(axis)];
+        const auto k = static_cast<std::size_t>(bin[axis]);
+        of_axis.boxes[k].add(box);
+        ++of_axis.counts[k];
+      }
     }
     double best_cost = std::numeric_limits<double>::infinity();
     int best_axis = -1;
     std::size_t best_bin = 0;
+    Split parts{};
     for (int axis = 0; axis < 3; ++axis) {
-      if (!(high[axis] > low[axis])) continue;
-      std::array<Box, kBins> bins;
-      std::array<std::size_t, kBins> counts{};
-      const float scale = bins_per_metre(low[axis], high[axis], kBins);
-      for (std::size_t i = range.begin; i < range.end; ++i) {
-        const Box& box = boxes_[order_[i]];
-        const std::size_t bin = bin_of(center_of(box)[axis], low[axis], scale, kBins);
-        bins[bin].add(box);
-        ++counts[bin];
-      }
-      // costs of the upper parts, then of the lower ones
-      std::array<double, kBins> above{};
+      if (scale[axis] == 0.0f) continue;
+      const Bins& of_axis = along[static_cast<std::size_t>(axis)];
+      std::array<double, kMostBins> above{};  // areas of the parts from a bin on
       Box box;
-      std::size_t count = 0;
-      for (std::size_t bin = kBins - 1; bin > 0; --bin) {
-        box.add(bins[bin]);
-        count += counts[bin];
-        above[bin] = count == 0 ? 0.0 : area_of(box) * leaves_of(count);
+      for (std::size_t bin = bins - 1; bin > 0; --bin) {
+        box.add(of_axis.boxes[bin]);
+        above[bin] = box.half_area();
       }
       box = {};
-      count = 0;
-      for (std::size_t bin = 0; bin + 1 < kBins; ++bin) {
-        box.add(bins[bin]);
-        count += counts[bin];
+      std::size_t count = 0;
+      for (std::size_t bin = 0; bin + 1 < bins; ++bin) {
+        box.add(of_axis.boxes[bin]);
+        count += of_axis.counts[bin];
         if (count == 0 || count == range.count()) continue;
-        const double cost = area_of(box) * leaves_of(count) + above[bin + 1];
+        const double area = box.half_area();
+        const double cost =
+            area * leaves_of(count) + above[bin + 1] * leaves_of(range.count() - count);
         if (cost < best_cost) {
           best_cost = cost;
           best_axis = axis;
           best_bin = bin;
+          parts = {range.begin + count, area, above[bin + 1]};
         }
       }
     }
-    if (best_axis < 0) return split_in_halves(range);
-    const float scale = bins_per_metre(low[best_axis], high[best_axis], kBins);
-    const auto middle = std::stable_partition(
-        order_.begin() + static_cast<std::ptrdiff_t>(range.begin),
-        order_.begin() + static_cast<std::ptrdiff_t>(range.end),
-        [&](std::uint32_t i) {
-          return bin_of(center_of(boxes_[i])[best_axis], low[best_axis], scale, kBins) <= best_bin;
-        });
-    return static_cast<std::size_t>(middle - order_.begin());
+    if (best_axis < 0) {  // all centres at one place
+      const double area = range.count() > 0 ? boxes_[order_[range.begin]].half_area() : 0.0;
+      return {range.begin + range.count() / 2, area, area};
+    }
+    std::stable_partition(order_.begin() + static_cast<std::ptrdiff_t>(range.begin),
+                          order_.begin() + static_cast<std::ptrdiff_t>(range.end),
+                          [&](std::uint32_t i) {
+                            return static_cast<std::size_t>(bins_of(boxes_[i])[best_axis]) <=
+                                   best_bin;
+                          });
+    return parts;
   }
 
-  /// All centres at one place.
-  static std::size_t split_in_halves(const Range& range) { return range.begin + range.count() / 2; }
-
-  static Vector3f center_of(const Box& box) { return 0.5f * (box.min + box.max); }
-  static float bins_per_metre(float low, float high, std::size_t bins) {
-    return static_cast<float>(bins) / (high - low);
-  }
-  static std::size_t bin_of(float x, float low, float scale, std::size_t bins) {
-    return std::min(bins - 1, static_cast<std::size_t>((x - low) * scale));
-  }
   static double leaves_of(std::size_t count) {
-    return std::ceil(static_cast<double>(count) / static_cast<double>(kMaxLeafSurfels));
+    return static_cast<double>((count + kMaxLeafSurfels - 1) / kMaxLeafSurfels);
   }
 
   Box append_leaf(const Range& range) {
@@ -416,7 +426,6 @@ class TreeBuilder {
     const Children children = open_children(
         range,
         [this](const Range& part) { return part.count() <= part_surfels_; },
-        [](const Range& part) { return static_cast<double>(part.count()); },
         [this](const Range& part) { return surfels_.split_by_key(part); });
     for (std::size_t i = 0; i < children.count; ++i) {
       const Range& part = children.ranges[i];

@@ -22,7 +22,7 @@ struct ImportOptions {
   double scale = 1.0;                ///< Metres per unit of the file.
   char up = 'z';                     ///< The file's up axis: 'z', or 'y' (turned to z).
   OutlierOptions outliers;
-  TreeQuality quality = TreeQuality::kNormal;
+  TreeQuality quality = TreeQuality::kHigh;
   std::optional<float> tau;  ///< Coverage that makes a return; without it by the density.
   /// Where intermediate results lie that exceed the memory below; empty: with temporary files.
   std::string scratch_folder;

@@ -472,6 +472,7 @@ static std::uint64_t trace_singly(const KernelMap& map,
         continue;
       }
       hits[s.ray] = finish(map, s);
+      if (next + kInFlight < count) hwy::Prefetch(rays + order[next + kInFlight]);
       if (next < count) {
         start_ray(map, rays[order[next]], order[next], s);
         ++next;

@@ -86,27 +86,96 @@ struct PacketLeaf {
   SurfelLanes lanes;
   double corner[3];  ///< The leaf's origin from the map's origin, m.
   std::uint32_t first_word;
-  // after `decode`: one value a surfel
+  std::uint32_t count;
+  // one value a surfel
   alignas(32) float shape[10][8];
   alignas(32) float center[3][8];    ///< From the leaf's origin, m.
   alignas(32) float whitened[3][8];  ///< From the apex: what all beams share where origins agree.
 };
 
-POINTFLIGHT_INLINE void decode(const KernelMap& map, const Packet& p, PacketLeaf& leaf) {
-  const Shapes e = decode_shapes(map.scale, leaf.lanes);
-  const F8* const all[10] = {
-      &e.m0x, &e.m0y, &e.m0z, &e.m1x, &e.m1y, &e.m1z, &e.m2x, &e.m2y, &e.m2z, &e.s0};
-  for (int k = 0; k < 10; ++k) store(*all[k], leaf.shape[k]);
-  store(leaf.lanes.x, leaf.center[0]);
-  store(leaf.lanes.y, leaf.center[1]);
-  store(leaf.lanes.z, leaf.center[2]);
-  const Whitened u = whiten(e,
-                            leaf.lanes.x + splat(static_cast<float>(leaf.corner[0] - p.apex[0])),
-                            leaf.lanes.y + splat(static_cast<float>(leaf.corner[1] - p.apex[1])),
-                            leaf.lanes.z + splat(static_cast<float>(leaf.corner[2] - p.apex[2])));
-  store(u.x, leaf.whitened[0]);
-  store(u.y, leaf.whitened[1]);
-  store(u.z, leaf.whitened[2]);
+/// Of eight surfels' centres, from the apex.
+struct Place {
+  F8 x, y, z;
+};
+
+/// The centres of a leaf's surfels in the packet's frame, and which of them the packet may meet.
+struct InFrustum {
+  F8 u, v, depth;  ///< From the apex, m.
+  std::uint32_t surfels;
+};
+
+POINTFLIGHT_INLINE InFrustum in_frustum(const KernelMap& map,
+                                        const Packet& p,
+                                        const PacketLeaf& leaf,
+                                        const Place& center) {
+  const auto along = [&](const float* axis) {
+    return center.x * splat(axis[0]) + center.y * splat(axis[1]) + center.z * splat(axis[2]);
+  };
+  InFrustum in;  // NOLINT(cppcoreguidelines-pro-type-member-init): all is written
+  in.u = along(p.u);
+  in.v = along(p.v);
+  in.depth = along(p.w);
+  const F8 reach =
+      (sqrt(leaf.lanes.widest * splat(map.support_squared)) * splat(1.03f) + splat(p.spread)) *
+      splat(p.norm);
+  const F8 inside = min(min(in.u - in.depth * splat(p.low_u), in.depth * splat(p.high_u) - in.u),
+                        min(in.v - in.depth * splat(p.low_v), in.depth * splat(p.high_v) - in.v));
+  const M8 met = (splat(0.0f) <= inside + reach) & (in.depth <= splat(p.end) + reach) &
+                 (splat(0.0f) <= in.depth + reach);
+  in.surfels = bits(met) & ((1u << leaf.count) - 1u);
+  return in;
+}
+
+/// Which surfels of a leaf each group may meet: bit i of byte g. A surfel's support is an
+/// ellipsoid; seen from the apex it lies within a rectangle of the plane across the packet's mean
+/// direction: with its centre at c_u = (c.u) / (c.w), a point c + e of it lies (e.(u - c_u w)) /
+/// ((c + e).w) beside, and e.n is M |S R n| at most.
+POINTFLIGHT_INLINE std::uint64_t pairs_of(const KernelMap& map,
+                                          const Packet& p,
+                                          const PacketLeaf& leaf,
+                                          const Shapes& e,
+                                          const InFrustum& in) {
+  const SurfelLanes& s = leaf.lanes;
+  const Whitened eu = whiten(e, splat(p.u[0]), splat(p.u[1]), splat(p.u[2]));
+  const Whitened ev = whiten(e, splat(p.v[0]), splat(p.v[1]), splat(p.v[2]));
+  const Whitened ew = whiten(e, splat(p.w[0]), splat(p.w[1]), splat(p.w[2]));
+  // whitening divides by deviations; times the variances
+  const F8 ratio = look_up8(map.scale.ratio, right<24>(s.high) & splat_bits(7u));
+  const F8 q0 = e.s0 * e.s0;
+  const F8 q1 = s.variance2 * ratio * ratio;
+  const F8 q2 = s.variance2;
+  const auto reach_along = [&](const F8& a0, const F8& a1, const F8& a2) {
+    const F8 b0 = a0 * q0;
+    const F8 b1 = a1 * q1;
+    const F8 b2 = a2 * q2;
+    return sqrt((b0 * b0 + b1 * b1 + b2 * b2) * splat(map.support_squared)) * splat(1.03f);
+  };
+  const F8 per_depth = splat(1.0f) / in.depth;
+  const F8 at_u = in.u * per_depth;
+  const F8 at_v = in.v * per_depth;
+  const F8 spread = splat(p.spread);
+  const F8 reach_w = reach_along(ew.x, ew.y, ew.z) + spread;
+  const F8 reach_u = reach_along(eu.x - at_u * ew.x, eu.y - at_u * ew.y, eu.z - at_u * ew.z) +
+                     spread * (splat(1.0f) + abs(at_u));
+  const F8 reach_v = reach_along(ev.x - at_v * ew.x, ev.y - at_v * ew.y, ev.z - at_v * ew.z) +
+                     spread * (splat(1.0f) + abs(at_v));
+  const F8 begin = in.depth - reach_w;
+  // around the apex a surfel may be met in any direction
+  const M8 ahead = splat(0.0f) < begin;
+  const F8 per_begin = splat(1.0f) / begin;
+  const F8 everywhere = splat(1e30f);
+  const F8 half_u = select(ahead, reach_u * per_begin, everywhere);
+  const F8 half_v = select(ahead, reach_v * per_begin, everywhere);
+  const F8 middle_u = select(ahead, at_u, splat(0.0f));
+  const F8 middle_v = select(ahead, at_v, splat(0.0f));
+  std::uint64_t pairs = 0;
+  for (std::size_t g = 0; g < kGroups; ++g) {
+    const M8 met = (abs(middle_u - splat(p.middle_u[g])) <= half_u + splat(p.half_u[g])) &
+                   (abs(middle_v - splat(p.middle_v[g])) <= half_v + splat(p.half_v[g])) &
+                   (begin <= splat(p.group_end[g]));
+    pairs |= static_cast<std::uint64_t>(bits(met) & in.surfels) << (8 * g);
+  }
+  return pairs;
 }
 
 POINTFLIGHT_INLINE Shapes shape_at(const PacketLeaf& leaf, std::size_t i) {
@@ -159,19 +228,20 @@ POINTFLIGHT_INLINE void meet_group(
     }
     const Meeting meeting = meet(u, whiten(e, dx, dy, dz), e.s0);
     const M8 accepted = (meeting.m2 < support) & (splat(0.0f) <= meeting.t) & (meeting.t <= end);
-    if (bits(accepted) == 0) continue;
     if (rows.count == kRows) {
       p.failed |= 1u << g;
       return;
     }
+    // a row that no beam meets is written over by the next: half of them, at no pattern
     const I8 weight = keep(accepted, weights_of(map, meeting.m2));
     const F8 met = select(accepted, meeting.t, splat(kNever));
     nearest = min(nearest, met);
+    total = total + weight;
     store(met, rows.t[rows.count]);
     store(weight, rows.weight[rows.count]);
     store(meeting.cosine, rows.cosine[rows.count]);
-    rows.word[rows.count++] = leaf.first_word + static_cast<std::uint32_t>(i);
-    total = total + weight;
+    rows.word[rows.count] = leaf.first_word + static_cast<std::uint32_t>(i);
+    rows.count += bits(accepted) != 0 ? 1 : 0;
   }
   if (rows.count == before) return;
   store(total, group.total);
@@ -185,47 +255,33 @@ POINTFLIGHT_INLINE void visit_leaf(const KernelMap& map, Packet& p, const Entry&
   PacketLeaf leaf;  // NOLINT(cppcoreguidelines-pro-type-member-init): written before it is read
   leaf.lanes = load_surfels(map.scale, map.words + entry.index + 1);
   leaf.first_word = entry.index + 1;
+  leaf.count = entry.meta;
   leaf.corner[0] = header.x * map.resolution;
   leaf.corner[1] = header.y * map.resolution;
   leaf.corner[2] = header.z * map.resolution;
-  // centres from the apex and how far they reach
-  alignas(32) float cx[8];
-  alignas(32) float cy[8];
-  alignas(32) float cz[8];
-  alignas(32) float reach[8];
-  store(leaf.lanes.x + splat(static_cast<float>(leaf.corner[0] - p.apex[0])), cx);
-  store(leaf.lanes.y + splat(static_cast<float>(leaf.corner[1] - p.apex[1])), cy);
-  store(leaf.lanes.z + splat(static_cast<float>(leaf.corner[2] - p.apex[2])), cz);
-  store(sqrt(leaf.lanes.widest * splat(map.support_squared)) * splat(1.03f) + splat(p.spread),
-        reach);
-  const F8 ax = load(p.axis_x);
-  const F8 ay = load(p.axis_y);
-  const F8 az = load(p.axis_z);
-  const F8 tangent = load(p.tangent);
-  const F8 group_end = load(p.group_end);
-  // bit i of byte g: group g may meet surfel i
-  std::uint64_t pairs = 0;
-  for (std::size_t i = 0; i < entry.meta; ++i) {
-    const F8 x = splat(cx[i]);
-    const F8 y = splat(cy[i]);
-    const F8 z = splat(cz[i]);
-    const F8 far = splat(reach[i]);
-    const F8 along = ax * x + ay * y + az * z;
-    const F8 px = x - along * ax;
-    const F8 py = y - along * ay;
-    const F8 pz = z - along * az;
-    const F8 limit = far + max(along, splat(0.0f)) * tangent;
-    const M8 touched = (px * px + py * py + pz * pz <= limit * limit) & (along - far <= group_end) &
-                       (splat(0.0f) <= along + far);
-    // groups to bytes
-    constexpr std::uint64_t kSpread = 0x0002040810204081ull;  // bit k to bit 8 k, after masking
-    const std::uint64_t mask = bits(touched) & 0xffu;
-    const std::uint64_t low = (mask & 0x7f) * kSpread & 0x0101010101010101ull;
-    pairs |= (low | (mask >> 7) << 56) << i;
-  }
+  // centres from the apex
+  const Place center = {leaf.lanes.x + splat(static_cast<float>(leaf.corner[0] - p.apex[0])),
+                        leaf.lanes.y + splat(static_cast<float>(leaf.corner[1] - p.apex[1])),
+                        leaf.lanes.z + splat(static_cast<float>(leaf.corner[2] - p.apex[2]))};
+  const InFrustum in = in_frustum(map, p, leaf, center);
+  if (in.surfels == 0) return;
+  const Shapes e = decode_shapes(map.scale, leaf.lanes);
+  const std::uint64_t pairs = pairs_of(map, p, leaf, e, in);
   if (pairs == 0) return;
-  decode(map, p, leaf);
-  for (std::size_t g = 0; g < kGroups; ++g) {
+  const F8* const shape[10] = {
+      &e.m0x, &e.m0y, &e.m0z, &e.m1x, &e.m1y, &e.m1z, &e.m2x, &e.m2y, &e.m2z, &e.s0};
+  for (int k = 0; k < 10; ++k) store(*shape[k], leaf.shape[k]);
+  if (p.one_origin) {
+    const Whitened u = whiten(e, center.x, center.y, center.z);
+    store(u.x, leaf.whitened[0]);
+    store(u.y, leaf.whitened[1]);
+    store(u.z, leaf.whitened[2]);
+  } else {
+    store(leaf.lanes.x, leaf.center[0]);
+    store(leaf.lanes.y, leaf.center[1]);
+    store(leaf.lanes.z, leaf.center[2]);
+  }
+  for (std::size_t g = 0; g < p.count; ++g) {
     const auto which = static_cast<std::uint32_t>(pairs >> (8 * g)) & 0xffu;
     if (which == 0 || (p.failed >> g & 1u) != 0) continue;
     if (p.one_origin) {
@@ -296,44 +352,77 @@ POINTFLIGHT_INLINE void finish(const KernelMap& map,
   }
 }
 
+/// Beams that wait for single rays.
+struct Waiting {
+  std::uint32_t beams[256];
+  std::size_t count = 0;
+};
+
+/// Fills a packet with groups of eight beams from `at` on, as far as they lie together; `taken`
+/// tells where each begins. Groups that are too wide go to those that wait. Returns the number of
+/// groups.
+POINTFLIGHT_INLINE std::size_t fill(const KernelMap& map,
+                                    const Ray* rays,
+                                    const std::uint32_t* order,
+                                    std::size_t count,
+                                    std::size_t& at,
+                                    Packet& p,
+                                    std::size_t (&taken)[kGroups],
+                                    Waiting& waiting) {
+  std::size_t groups = 0;
+  while (groups < kGroups && at + 8 <= count && waiting.count + 8 <= std::size(waiting.beams)) {
+    // beams lie scattered: those of the next packet are fetched meanwhile
+    for (std::size_t i = at + kPacket; i < std::min(at + kPacket + 8, count); ++i) {
+      hwy::Prefetch(rays + order[i]);
+    }
+    const bool together = take_beams(map, rays, order + at, p.groups[groups]);
+    if (together && groups > 0 && !lies_near(p.groups[groups], p.groups[0])) break;
+    if (together) {
+      taken[groups++] = at;
+    } else {
+      std::copy(order + at, order + at + 8, waiting.beams + waiting.count);
+      waiting.count += 8;
+    }
+    at += 8;
+  }
+  return groups;
+}
+
 static std::uint64_t trace(const KernelMap& map,
                            const Ray* rays,
                            const std::uint32_t* order,
                            std::size_t count,
                            BeamGrouping grouping,
                            KernelHit* hits) {
+  if (grouping != BeamGrouping::kAsSuits || map.node_count == 0) {
+    return trace_singly(map, rays, order, count, hits);
+  }
   std::uint64_t overflows = 0;
   std::size_t at = 0;
-  std::size_t singly = 0;  // beams before `at` that wait for single rays
-  Packet packet;           // NOLINT(cppcoreguidelines-pro-type-member-init): by gather
+  Waiting waiting;
+  Packet packet;  // NOLINT(cppcoreguidelines-pro-type-member-init): by take_beams and set_up
+  std::size_t taken[kGroups];
   const auto trace_waiting = [&] {
-    if (singly == 0) return;
-    overflows += trace_singly(map, rays, order + at - singly, singly, hits);
-    singly = 0;
+    overflows += trace_singly(map, rays, waiting.beams, waiting.count, hits);
+    waiting.count = 0;
   };
-  const bool packets = grouping == BeamGrouping::kAsSuits && map.node_count > 0;
-  while (packets && at + kPacket <= count) {
-    if (!gather(map, rays, order + at, packet)) {
-      at += kPacket;
-      singly += kPacket;
-      continue;
-    }
-    trace_waiting();
+  while (at + 8 <= count) {
+    const std::size_t groups = fill(map, rays, order, count, at, packet, taken, waiting);
+    if (waiting.count + kPacket > std::size(waiting.beams)) trace_waiting();
+    if (groups == 0) continue;
+    set_up(packet, groups);
     walk(map, packet);
-    for (std::size_t g = 0; g < kGroups; ++g) {
-      const std::uint32_t* beams = order + at + 8 * g;
+    for (std::size_t g = 0; g < groups; ++g) {
+      const std::uint32_t* beams = order + taken[g];
       if ((packet.failed >> g & 1u) != 0) {
         overflows += trace_singly(map, rays, beams, 8, hits);
       } else {
         finish(map, packet.groups[g], beams, hits);
       }
     }
-    at += kPacket;
   }
-  singly += count - at;
-  at = count;
   trace_waiting();
-  return overflows;
+  return overflows + trace_singly(map, rays, order + at, count - at, hits);
 }
 
 }  // namespace pointflight::HWY_NAMESPACE

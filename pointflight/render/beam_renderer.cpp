@@ -18,7 +18,12 @@ BeamRenderer::BeamRenderer(const Scene& scene, BeamGrouping grouping)
 void BeamRenderer::render(const RayBatch& batch,
                           std::span<Hit> hits,
                           const Executor& executor) const {
-  const auto order = direction_order(batch.rays, executor);
+  std::vector<std::uint32_t> own_order;
+  std::span<const std::uint32_t> order = batch.order;
+  if (order.size() != batch.rays.size()) {
+    own_order = direction_order(batch.rays, executor);
+    order = own_order;
+  }
   std::vector<KernelHit> found(batch.rays.size());
   executor.parallel_for(order.size(), kChunk, [&](std::size_t begin, std::size_t end) {
     const std::span part(order.data() + begin, end - begin);

@@ -71,13 +71,13 @@ std::uint32_t cell_of(const Vector3f& d) {
   return hilbert(cell(u), cell(v));
 }
 
-}  // namespace
-
-std::vector<std::uint32_t> direction_order(std::span<const Ray> rays, const Executor& executor) {
-  const std::size_t n = rays.size();
+template <class DirectionAt>
+std::vector<std::uint32_t> order_of(std::size_t n,
+                                    const DirectionAt& direction_at,
+                                    const Executor& executor) {
   std::vector<std::uint32_t> keys(n);
   executor.parallel_for(n, 8192, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) keys[i] = cell_of(rays[i].direction_world);
+    for (std::size_t i = begin; i < end; ++i) keys[i] = cell_of(direction_at(i));
   });
   // counting sort, a byte at a time
   std::vector<std::uint32_t> order(n);
@@ -92,6 +92,19 @@ std::vector<std::uint32_t> direction_order(std::span<const Ray> rays, const Exec
     std::swap(order, other);
   }
   return other;
+}
+
+}  // namespace
+
+std::vector<std::uint32_t> direction_order(std::span<const Ray> rays, const Executor& executor) {
+  const auto at = [&](std::size_t i) -> const Vector3f& { return rays[i].direction_world; };
+  return order_of(rays.size(), at, executor);
+}
+
+std::vector<std::uint32_t> direction_order(std::span<const Vector3f> directions,
+                                           const Executor& executor) {
+  const auto at = [&](std::size_t i) -> const Vector3f& { return directions[i]; };
+  return order_of(directions.size(), at, executor);
 }
 
 }  // namespace pointflight

@@ -14,4 +14,8 @@ namespace pointflight {
 /// Beams traced in this order find their part of the map in the cache.
 std::vector<std::uint32_t> direction_order(std::span<const Ray> rays, const Executor& executor);
 
+/// The same for directions in any frame: a turned pattern keeps its neighbours.
+std::vector<std::uint32_t> direction_order(std::span<const Vector3f> directions,
+                                           const Executor& executor);
+
 }  // namespace pointflight

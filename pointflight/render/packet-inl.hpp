@@ -17,7 +17,7 @@ inline constexpr std::size_t kGroups = 8;
 inline constexpr std::size_t kPacket = 8 * kGroups;
 /// Rows of hits of one group: beyond, its beams are traced singly.
 inline constexpr std::size_t kRows = 96;
-/// Wider groups (tangent of half the angle) meet so many surfels apart that single rays are faster.
+/// Wider groups (radius, rad) meet so many surfels apart that single rays are faster.
 inline constexpr float kWidestGroup = 0.012f;
 
 /// Hits of eight beams: a row is one surfel, lanes that it does not meet hold kNever and weight 0.
@@ -36,16 +36,21 @@ struct Group {
   alignas(32) float first[8];
   alignas(32) std::int32_t total[8];
   alignas(32) float nearest[8];  ///< The least t of all hits.
+  float mean[3];                 ///< Of the directions.
   double origin[3][8];
   HitRows rows;
 };
 
 struct Packet {
-  // cones around the groups, seen from the apex: lanes are groups
-  alignas(32) float axis_x[8], axis_y[8], axis_z[8], tangent[8], group_end[8];
-  double apex[3];     ///< From the map's origin.
-  float apex_box[3];  ///< The same in float, for boxes.
-  float spread;       ///< Origins lie so far from the apex at most.
+  // The beams' directions d as places (d.u / d.w, d.v / d.w) in a plane across the mean direction
+  // w: a rectangle around each group; lanes are groups.
+  alignas(32) float middle_u[8], middle_v[8], half_u[8], half_v[8], group_end[8];
+  float u[3], v[3], w[3];
+  float low_u, high_u, low_v, high_v;  ///< Around all groups.
+  float norm;                          ///< Of the frustum's normals below, the greatest.
+  double apex[3];                      ///< From the map's origin.
+  float apex_box[3];                   ///< The same in float, for boxes.
+  float spread;                        ///< Origins lie so far from the apex at most.
   bool one_origin;
   float plane[4][3];               ///< Inward normals of the frustum's sides.
   float offset[4];                 ///< n . (p - apex) >= offset inside.
@@ -56,88 +61,141 @@ struct Packet {
   float main_offset;     ///< Of the origins along the main axis, the one that shortens most.
   float end;             ///< Farthest end of all beams.
   std::uint32_t failed;  ///< Groups to be traced singly.
+  std::size_t count;     ///< Of the groups that are there.
   Group groups[kGroups];
 };
 
-/// Sets up a packet. False where its beams are better traced singly.
-POINTFLIGHT_INLINE bool gather(const KernelMap& map,
-                               const Ray* rays,
-                               const std::uint32_t* order,
-                               Packet& p) {
+/// Copies eight beams to a group. False where they are too far apart to go together.
+POINTFLIGHT_INLINE bool take_beams(const KernelMap& map,
+                                   const Ray* rays,
+                                   const std::uint32_t* beams,
+                                   Group& group) {
+  for (std::size_t i = 0; i < 8; ++i) {
+    const Ray& ray = rays[beams[i]];
+    group.dx[i] = ray.direction_world.x();
+    group.dy[i] = ray.direction_world.y();
+    group.dz[i] = ray.direction_world.z();
+    group.end[i] = ray.range_max;
+    for (int k = 0; k < 3; ++k) group.origin[k][i] = ray.origin_world[k] - map.origin[k];
+  }
+  const F8 dx = load(group.dx);
+  const F8 dy = load(group.dy);
+  const F8 dz = load(group.dz);
+  group.mean[0] = 0.125f * sum(dx);
+  group.mean[1] = 0.125f * sum(dy);
+  group.mean[2] = 0.125f * sum(dz);
+  const F8 x = dx - splat(group.mean[0]);
+  const F8 y = dy - splat(group.mean[1]);
+  const F8 z = dz - splat(group.mean[2]);
+  if (!(greatest(x * x + y * y + z * z) <= kWidestGroup * kWidestGroup)) return false;
+  store(splat(kNever), group.first);
+  store(splat(kNever), group.nearest);
+  store(splat_int(0), group.total);
+  group.rows.count = 0;
+  return true;
+}
+
+/// True if a group may join a packet: neighbours along the curve through the beams lie together,
+/// but for the curve's leaps.
+POINTFLIGHT_INLINE bool lies_near(const Group& group, const Group& other) {
+  constexpr float kFarthest = 8.0f * kWidestGroup;
+  float squared = 0.0f;
+  for (int k = 0; k < 3; ++k) {
+    squared += (group.mean[k] - other.mean[k]) * (group.mean[k] - other.mean[k]);
+  }
+  return squared <= kFarthest * kFarthest;
+}
+
+/// How far the origins of a packet's beams lie from its apex, which is the first one.
+POINTFLIGHT_INLINE float spread_of(const Packet& p) {
+  F8 squared = splat(0.0f);
+  bool moves = false;
+  for (std::size_t g = 0; g < p.count; ++g) {
+    for (int k = 0; k < 3; ++k) {
+      for (std::size_t i = 0; i < 8; ++i) moves = moves || p.groups[g].origin[k][i] != p.apex[k];
+    }
+  }
+  if (!moves) return 0.0f;
+  for (std::size_t g = 0; g < p.count; ++g) {
+    F8 distance = splat(0.0f);
+    for (int k = 0; k < 3; ++k) {
+      alignas(32) float away[8];
+      for (std::size_t i = 0; i < 8; ++i) {
+        away[i] = static_cast<float>(p.groups[g].origin[k][i] - p.apex[k]);
+      }
+      distance = distance + load(away) * load(away);
+    }
+    squared = max(squared, distance);
+  }
+  return std::sqrt(greatest(squared)) * 1.001f;
+}
+
+/// Sets up a packet of the first `count` groups.
+POINTFLIGHT_INLINE void set_up(Packet& p, std::size_t count) {
+  p.count = count;
+  p.failed = 0;
+  for (int k = 0; k < 3; ++k) {
+    p.apex[k] = p.groups[0].origin[k][0];
+    p.apex_box[k] = static_cast<float>(p.apex[k]);
+  }
+  p.spread = spread_of(p);
+  p.one_origin = p.spread == 0.0f;
   Vector3f mean = Vector3f::Zero();
-  for (std::size_t i = 0; i < kPacket; ++i) mean += rays[order[i]].direction_world;
-  const float length = mean.norm();
-  if (!(length > 0.9f * kPacket)) return false;
-  mean /= length;
-  const Vector3d& apex = rays[order[0]].origin_world;
+  for (std::size_t g = 0; g < kGroups; ++g) {
+    // what is not there meets nothing
+    p.group_end[g] = g < count ? greatest(load(p.groups[g].end)) : -kNever;
+    for (int k = 0; k < 3 && g < count; ++k) mean[k] += p.groups[g].mean[k];
+  }
+  p.end = greatest(load(p.group_end));
+  mean.normalize();
   const Vector3f helper = std::abs(mean.z()) < 0.9f ? Vector3f::UnitZ() : Vector3f::UnitX();
   const Vector3f u = mean.cross(helper).normalized();
   const Vector3f v = mean.cross(u);
+  for (int k = 0; k < 3; ++k) {
+    p.u[k] = u[k];
+    p.v[k] = v[k];
+    p.w[k] = mean[k];
+  }
   int main_axis = 0;
   mean.cwiseAbs().maxCoeff(&main_axis);
 
-  float low[2] = {kNever, kNever};
-  float high[2] = {-kNever, -kNever};
-  float spread = 0.0f;
-  float greatest_component = 0.0f;
+  F8 steepest = splat(0.0f);
+  alignas(32) float low[2][8];  // by group
+  alignas(32) float high[2][8];
   for (std::size_t g = 0; g < kGroups; ++g) {
-    Group& group = p.groups[g];
-    Vector3f axis = Vector3f::Zero();
-    for (std::size_t i = 0; i < 8; ++i) axis += rays[order[8 * g + i]].direction_world;
-    axis.normalize();
-    float tangent = 0.0f;
-    float farthest = 0.0f;
-    for (std::size_t i = 0; i < 8; ++i) {
-      const Ray& ray = rays[order[8 * g + i]];
-      const Vector3f& d = ray.direction_world;
-      const float cosine = d.dot(axis);
-      if (!(cosine > 0.9f)) return false;
-      tangent = std::max(tangent, (d / cosine - axis).norm());
-      const float ahead = d.dot(mean);
-      if (!(ahead > 0.5f)) return false;
-      const float across[2] = {d.dot(u) / ahead, d.dot(v) / ahead};
-      for (int k = 0; k < 2; ++k) {
-        low[k] = std::min(low[k], across[k]);
-        high[k] = std::max(high[k], across[k]);
-      }
-      const Vector3f away = (ray.origin_world - apex).cast<float>();
-      spread = std::max(spread, away.norm());
-      greatest_component = std::max(greatest_component, std::abs(d[main_axis]));
-      group.dx[i] = d.x();
-      group.dy[i] = d.y();
-      group.dz[i] = d.z();
-      group.end[i] = ray.range_max;
-      group.first[i] = kNever;
-      group.total[i] = 0;
-      group.nearest[i] = kNever;
-      for (int k = 0; k < 3; ++k) group.origin[k][i] = ray.origin_world[k] - map.origin[k];
-      farthest = std::max(farthest, ray.range_max);
-    }
-    if (tangent > kWidestGroup) return false;
-    p.axis_x[g] = axis.x();
-    p.axis_y[g] = axis.y();
-    p.axis_z[g] = axis.z();
-    p.tangent[g] = tangent * 1.001f + 1e-6f;
-    p.group_end[g] = farthest;
-    group.rows.count = 0;
+    const Group& group = p.groups[g < count ? g : 0];
+    const F8 dx = load(group.dx);
+    const F8 dy = load(group.dy);
+    const F8 dz = load(group.dz);
+    const F8 ahead = dx * splat(mean.x()) + dy * splat(mean.y()) + dz * splat(mean.z());
+    const F8 per_ahead = splat(1.0f) / ahead;
+    const F8 at_u = (dx * splat(u.x()) + dy * splat(u.y()) + dz * splat(u.z())) * per_ahead;
+    const F8 at_v = (dx * splat(v.x()) + dy * splat(v.y()) + dz * splat(v.z())) * per_ahead;
+    low[0][g] = least(at_u);
+    high[0][g] = greatest(at_u);
+    low[1][g] = least(at_v);
+    high[1][g] = greatest(at_v);
+    steepest = max(steepest, abs(main_axis == 0 ? dx : main_axis == 1 ? dy : dz));
   }
+  const float room = 1e-5f;  // for rounding
+  const F8 half = splat(0.5f);
+  const F8 half_u = (load(high[0]) - load(low[0])) * half;
+  const F8 half_v = (load(high[1]) - load(low[1])) * half;
+  store((load(low[0]) + load(high[0])) * half, p.middle_u);
+  store((load(low[1]) + load(high[1])) * half, p.middle_v);
+  store(half_u + splat(room), p.half_u);
+  store(half_v + splat(room), p.half_v);
 
-  for (int k = 0; k < 3; ++k) {
-    p.apex[k] = apex[k] - map.origin[k];
-    p.apex_box[k] = static_cast<float>(p.apex[k]);
-  }
-  p.spread = spread;
-  p.one_origin = spread == 0.0f;
-  p.end = *std::max_element(p.group_end, p.group_end + kGroups);
-  p.failed = 0;
-  // a little room for rounding, and for origins beside the apex
-  const float room = 1e-5f;
-  const Vector3f normals[4] = {u - (low[0] - room) * mean,
-                               (high[0] + room) * mean - u,
-                               v - (low[1] - room) * mean,
-                               (high[1] + room) * mean - v};
+  p.low_u = least(load(low[0])) - room;
+  p.high_u = greatest(load(high[0])) + room;
+  p.low_v = least(load(low[1])) - room;
+  p.high_v = greatest(load(high[1])) + room;
+  const Vector3f normals[4] = {
+      u - p.low_u * mean, p.high_u * mean - u, v - p.low_v * mean, p.high_v * mean - v};
+  p.norm = 0.0f;
   for (int k = 0; k < 4; ++k) {
-    p.offset[k] = -spread * normals[k].norm() * 1.001f;
+    p.norm = std::max(p.norm, normals[k].norm() * 1.001f);
+    p.offset[k] = -p.spread * normals[k].norm() * 1.001f;
     for (int axis = 0; axis < 3; ++axis) {
       p.plane[k][axis] = normals[k][axis];
       p.plane_side[k][axis] =
@@ -147,9 +205,8 @@ POINTFLIGHT_INLINE bool gather(const KernelMap& map,
   p.main_axis = main_axis;
   const bool forward = mean[main_axis] > 0.0f;
   p.main_side = static_cast<std::uint32_t>(main_axis) + (forward ? 0u : 3u);
-  p.main_step = (forward ? 1.0f : -1.0f) / (greatest_component * 1.0001f);
-  p.main_offset = (forward ? spread : -spread) * 1.001f;
-  return true;
+  p.main_step = (forward ? 1.0f : -1.0f) / (greatest(steepest) * 1.0001f);
+  p.main_offset = (forward ? p.spread : -p.spread) * 1.001f;
 }
 
 /// Which children the frustum may touch, and a lower bound of the distance to each.

@@ -20,6 +20,9 @@ struct Scene {
 /// The rays of one scan and what a renderer that makes images needs to lay them out.
 struct RayBatch {
   std::span<const Ray> rays;
+  /// The rays' `direction_order`, or empty: the renderer finds it where it needs one. For patterns
+  /// that repeat.
+  std::span<const std::uint32_t> order;
   /// Where the sensor is and how it is turned: middle of the scan for a moving one. Renderers that
   /// trace single rays ignore it.
   Pose T_world_sensor;

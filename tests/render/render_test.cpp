@@ -314,6 +314,7 @@ TEST(BeamRenderer, TheShapeOfTheTreeDoesNotShow) {
   scene.sample(800.0, 0.01, 1, [&](const Vector3d& p) { points.push_back({p, 0.0f}); });
   ImportOptions options;
   options.resolution = 0.1;
+  options.quality = TreeQuality::kNormal;
   const ImportedMap normal = import_points(points, options);
   options.quality = TreeQuality::kHigh;
   const ImportedMap high = import_points(points, options);

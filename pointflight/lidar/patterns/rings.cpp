@@ -138,6 +138,8 @@ class OusterPattern : public BeamPattern {
     }
   }
 
+  [[nodiscard]] bool repeats() const override { return true; }
+
   [[nodiscard]] std::vector<Beam> beams(std::uint64_t /*scan_index*/,
                                         const Executor& /*executor*/) const override {
     return beams_;

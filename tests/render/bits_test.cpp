@@ -1,0 +1,152 @@
+// The same bits from every build: maps and ten million beams a scene against recorded hashes. Where
+// a change of the import or of the measurement model is meant to change them, run the test and put
+// in what it prints; where it is not, the change has broken reproducibility.
+#include <gtest/gtest.h>
+
+#include <bit>
+#include <cmath>
+#include <cstdlib>
+
+#include "pointflight/core/hash.hpp"
+#include "pointflight/core/simd_targets.hpp"
+#include "pointflight/fidelity/exact_scene.hpp"
+#include "pointflight/map/map_builder.hpp"
+#include "pointflight/render/beam_renderer.hpp"
+#include "tests/support.hpp"
+
+namespace pointflight {
+namespace {
+
+constexpr std::size_t kBatch = 100000;
+#ifdef POINTFLIGHT_SANITIZED
+constexpr bool kAll = false;  // the first 100,000 beams; they are slow there
+#else
+constexpr bool kAll = true;
+#endif
+
+struct Recorded {
+  const char* scene;
+  std::uint64_t map;
+  std::uint64_t beams_1e5, beams_1e6, beams_1e7;
+};
+
+constexpr Recorded kRecorded[] = {{"hall",
+                                   2386404990381011384u,
+                                   16597911269294532308u,
+                                   4377268358821254905u,
+                                   11811959684748482050u},
+                                  {"forest",
+                                   823786977657235212u,
+                                   2787569446707309826u,
+                                   9255876663816004262u,
+                                   14546053413353038918u}};
+
+std::vector<std::byte> map_of_scene(const ExactScene& scene) {
+  SceneSampling sampling;
+  sampling.resolution = 0.2;
+  sampling.density_min = 100.0;
+  ImportOptions options;
+  options.resolution = 0.2;
+  const Executor executor(0);
+  const ImportedMap map = build_map(
+      {scene.name}, [&](std::size_t) { return sampled_cloud(scene, sampling); }, options, executor);
+  return map_bytes(map.tree, map.description);
+}
+
+/// Half of the beams fill a patch densely (they go as packets), half point anywhere; in every other
+/// batch the sensor moves. Made with + * / sqrt only, so that the inputs are the same bits too.
+std::vector<Ray> rays_of(const ExactScene& scene, std::size_t batch) {
+  std::vector<Ray> rays(kBatch);
+  const Vector3d at = scene.poses[batch % scene.poses.size()].translation;
+  const double turn = 0.7548776662466927 * static_cast<double>(batch + 1);
+  for (std::size_t i = 0; i < kBatch; ++i) {
+    const auto n = static_cast<double>(i);
+    Vector3d d;
+    if (i % 2 == 0) {
+      const double column = static_cast<double>(i / 2 % 250) / 250.0 - 0.5;
+      const double row = static_cast<double>(i / 500) / 100.0 - 0.5;
+      d = Vector3d(1.0, 0.8 * column + 0.3, 0.3 * row);
+      // about z by a rational angle: (1 - s^2, 2 s) / (1 + s^2)
+      const double s = 4.0 * (turn - std::floor(turn)) - 2.0;
+      const double c = (1.0 - s * s) / (1.0 + s * s);
+      const double q = 2.0 * s / (1.0 + s * s);
+      d = Vector3d(c * d.x() - q * d.y(), q * d.x() + c * d.y(), d.z());
+    } else {
+      // R3 sequence (Roberts 2018)
+      const auto part = [&](double step) {
+        const double x = turn + step * n;
+        return 2.0 * (x - std::floor(x)) - 1.0;
+      };
+      d = Vector3d(part(0.8191725133961645), part(0.6710436067037893), part(0.5497004779019703));
+      if (!(d.squaredNorm() > 1e-4)) d = Vector3d::UnitX();
+    }
+    rays[i].direction_world = (d / std::sqrt(d.squaredNorm())).cast<float>();
+    rays[i].origin_world = at;
+    if (batch % 2 == 1) rays[i].origin_world += Vector3d(2e-6 * n, -1e-6 * n, 1e-7 * n);
+    rays[i].range_max = 60.0f;
+  }
+  return rays;
+}
+
+class Bits : public ::testing::TestWithParam<Recorded> {
+ protected:
+  void SetUp() override {
+    scene_ = load_scene(GetParam().scene);
+    map_ = SurfelMap::from_bytes(map_of_scene(scene_), scene_.name);
+    const std::vector<std::uint64_t> parts = {hash64(std::as_bytes(map_->nodes())),
+                                              hash64(std::as_bytes(map_->words()))};
+    map_hash_ = hash64(as_bytes(parts));
+  }
+
+  /// Hash of the hits of the first `beams`.
+  std::uint64_t hash_of(std::size_t beams, int threads, BeamGrouping grouping) {
+    const BeamRenderer renderer(Scene{map_}, grouping);
+    const Executor executor(threads);
+    std::vector<std::uint64_t> hashes;
+    std::vector<Hit> hits(kBatch);
+    for (std::size_t batch = 0; batch * kBatch < beams; ++batch) {
+      const std::vector<Ray> rays = rays_of(scene_, batch);
+      RayBatch request;
+      request.rays = rays;
+      renderer.render(request, hits, executor);
+      hashes.push_back(hash64(as_bytes(hits)));
+    }
+    EXPECT_EQ(renderer.overflow_count(), 0u);
+    return hash64(as_bytes(hashes));
+  }
+
+  ExactScene scene_;
+  std::shared_ptr<const SurfelMap> map_;
+  std::uint64_t map_hash_ = 0;
+};
+
+TEST_P(Bits, AreThoseRecorded) {
+#if defined(__x86_64__)
+  const Recorded& recorded = GetParam();
+  EXPECT_EQ(map_hash_, recorded.map) << "the map is another";
+  EXPECT_EQ(hash_of(100000, 2, BeamGrouping::kAsSuits), recorded.beams_1e5);
+  EXPECT_EQ(hash_of(100000, 1, BeamGrouping::kSingly), recorded.beams_1e5) << "singly";
+  if (kAll) EXPECT_EQ(hash_of(10000000, 2, BeamGrouping::kAsSuits), recorded.beams_1e7);
+  const bool thorough = std::getenv("POINTFLIGHT_THOROUGH") != nullptr;  // by ./dev check
+  for (const std::string& name : kernel_names()) {
+    use_kernel(name);
+    if (!kAll) {
+      EXPECT_EQ(hash_of(100000, 3, BeamGrouping::kAsSuits), recorded.beams_1e5) << name;
+    } else if (!thorough) {
+      EXPECT_EQ(hash_of(1000000, 3, BeamGrouping::kAsSuits), recorded.beams_1e6) << name;
+    } else {
+      EXPECT_EQ(hash_of(10000000, 3, BeamGrouping::kAsSuits), recorded.beams_1e7) << name;
+    }
+  }
+  use_kernel("");
+#else
+  GTEST_SKIP() << "recorded on x86-64";
+#endif
+}
+
+INSTANTIATE_TEST_SUITE_P(Scenes, Bits, ::testing::ValuesIn(kRecorded), [](const auto& info) {
+  return std::string(info.param.scene);
+});
+
+}  // namespace
+}  // namespace pointflight
