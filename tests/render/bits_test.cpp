@@ -126,7 +126,9 @@ TEST_P(Bits, AreThoseRecorded) {
   EXPECT_EQ(map_hash_, recorded.map) << "the map is another";
   EXPECT_EQ(hash_of(100000, 2, BeamGrouping::kAsSuits), recorded.beams_1e5);
   EXPECT_EQ(hash_of(100000, 1, BeamGrouping::kSingly), recorded.beams_1e5) << "singly";
-  if (kAll) EXPECT_EQ(hash_of(10000000, 2, BeamGrouping::kAsSuits), recorded.beams_1e7);
+  if (kAll) {
+    EXPECT_EQ(hash_of(10000000, 2, BeamGrouping::kAsSuits), recorded.beams_1e7);
+  }
   const bool thorough = std::getenv("POINTFLIGHT_THOROUGH") != nullptr;  // by ./dev check
   for (const std::string& name : kernel_names()) {
     use_kernel(name);
