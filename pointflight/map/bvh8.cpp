@@ -353,7 +353,8 @@ class Part {
   }
 
   static double leaves_of(std::size_t count) {
-    return static_cast<double>((count + kMaxLeafSurfels - 1) / kMaxLeafSurfels);
+    const std::size_t leaves = (count + kMaxLeafSurfels - 1) / kMaxLeafSurfels;
+    return static_cast<double>(leaves);
   }
 
   Box append_leaf(const Range& range) {

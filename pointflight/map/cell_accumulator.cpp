@@ -62,7 +62,7 @@ CellAccumulator::CellAccumulator(const VoxelFrame& frame,
       shards_(kShards, VoxelGrid(frame)) {}
 
 void CellAccumulator::sort_points(std::span<const CloudPoint> points, Chunk& chunk) const {
-  std::array<CellPoint, kChunkPoints> placed;
+  std::array<CellPoint, kChunkPoints> placed;  // NOLINT(cppcoreguidelines-pro-type-member-init)
   std::array<std::uint8_t, kChunkPoints> shard{};
   std::array<std::size_t, kShards + 1> counts{};
   std::size_t n = 0;

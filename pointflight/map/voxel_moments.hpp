@@ -191,8 +191,8 @@ class NeighbourWindow {
     for (std::int32_t bx = x.first_brick(); bx <= x.last_brick(); ++bx) {
       for (std::int32_t by = y.first_brick(); by <= y.last_brick(); ++by) {
         for (std::int32_t bz = z.first_brick(); bz <= z.last_brick(); ++bz) {
-          const VoxelGrid::Brick* brick =
-              around_[static_cast<std::size_t>(bx * 9 + by * 3 + bz + 13)];
+          const std::int32_t place = bx * 9 + by * 3 + bz + 13;
+          const VoxelGrid::Brick* brick = around_[static_cast<std::size_t>(place)];
           if (brick == nullptr) continue;
           std::uint64_t left = brick->occupied & kPlaces[0][x.within(bx)] &
                                kPlaces[1][y.within(by)] & kPlaces[2][z.within(bz)];

@@ -101,7 +101,7 @@ struct Place {
 /// The centres of a leaf's surfels in the packet's frame, and which of them the packet may meet.
 struct InFrustum {
   F8 u, v, depth;  ///< From the apex, m.
-  std::uint32_t surfels;
+  std::uint32_t surfels = 0;
 };
 
 POINTFLIGHT_INLINE InFrustum in_frustum(const KernelMap& map,
@@ -354,7 +354,7 @@ POINTFLIGHT_INLINE void finish(const KernelMap& map,
 
 /// Beams that wait for single rays.
 struct Waiting {
-  std::uint32_t beams[256];
+  std::uint32_t beams[256] = {};
   std::size_t count = 0;
 };
 

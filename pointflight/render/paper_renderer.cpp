@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <map>
-#include <optional>
 
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/math.hpp"
@@ -13,252 +12,107 @@ namespace pointflight {
 namespace {
 
 constexpr float kEmpty = std::numeric_limits<float>::infinity();
-// below, a plane's depth is ill-conditioned and its point is drawn as the paper draws the others
-constexpr double kMinCosIncidence = 1e-3;
 
-struct Angles {
-  double azimuth;
-  double elevation;
+/// Least and greatest angles of the rays.
+struct Extent {
+  float azimuth_min = kEmpty, azimuth_max = -kEmpty;
+  float elevation_min = kEmpty, elevation_max = -kEmpty;
 };
 
-Angles angles_of(const Vector3d& v) {
-  return {math::atan2(v.y(), v.x()), math::atan2(v.z(), std::hypot(v.x(), v.y()))};
+Extent extent_of(const PaperAngles& angles, std::size_t count) {
+  Extent extent;
+  for (std::size_t i = 0; i < count; ++i) {
+    extent.azimuth_min = std::min(extent.azimuth_min, angles.azimuth[i]);
+    extent.azimuth_max = std::max(extent.azimuth_max, angles.azimuth[i]);
+    extent.elevation_min = std::min(extent.elevation_min, angles.elevation[i]);
+    extent.elevation_max = std::max(extent.elevation_max, angles.elevation[i]);
+  }
+  return extent;
+}
+
+/// An empty image laid over the rays.
+PaperImage image_over(const Extent& rays, const RayBatch& batch, double radius) {
+  const double step = batch.image_resolution;
+  const auto low = static_cast<double>(rays.azimuth_min);
+  const double spread = static_cast<double>(rays.azimuth_max) - low;
+  const auto bottom = static_cast<double>(rays.elevation_min);
+  const auto top = static_cast<double>(rays.elevation_max);
+  PaperImage image;
+  // rays on both sides of the rear: the whole turn
+  image.full_turn = spread > 2.0 * kPi - 10.0 * step || spread > 1.9 * kPi;
+  const double azimuth_min = image.full_turn ? -kPi : low;
+  const double width = image.full_turn ? 2.0 * kPi : spread;
+  image.columns = static_cast<int>(std::ceil(width / step - 1e-4)) + (image.full_turn ? 0 : 1);
+  image.rows = static_cast<int>(std::floor((top - bottom) / step + 1e-4)) + 1;
+  const double column_step = image.full_turn ? width / image.columns : step;
+  image.step = static_cast<float>(step);
+  image.column_step = static_cast<float>(column_step);
+  image.azimuth_min = static_cast<float>(azimuth_min);
+  image.elevation_min = static_cast<float>(bottom);
+  image.range_max = batch.range_max;
+  image.radius = static_cast<float>(radius);
+  image.reach_squared = static_cast<float>(4.0 * radius * radius);
+  // half a pixel more, for points that round to the outermost
+  image.sin_low = static_cast<float>(math::sin(std::max(-kPi / 2, bottom - step)));
+  image.sin_high = static_cast<float>(math::sin(std::min(kPi / 2, top + step)));
+  image.narrow = !image.full_turn && width < 0.9 * kPi;
+  const auto from = math::sincos(azimuth_min - step);
+  const auto to = math::sincos(azimuth_min + width + step);
+  image.left[0] = static_cast<float>(-from.sin);
+  image.left[1] = static_cast<float>(from.cos);
+  image.right[0] = static_cast<float>(to.sin);
+  image.right[1] = static_cast<float>(-to.cos);
+  image.stride = static_cast<std::size_t>(image.columns) + 8;
+  const auto rows = static_cast<std::size_t>(image.rows);
+  image.depth.assign(rows * image.stride, kEmpty);
+  image.cosine.resize(image.depth.size());
+  image.intensity.resize(image.depth.size());
+  for (std::size_t c = 0; c < image.stride; ++c) {
+    const auto angle = math::sincos(azimuth_min + static_cast<double>(c) * column_step);
+    image.column_cos.push_back(static_cast<float>(angle.cos));
+    image.column_sin.push_back(static_cast<float>(angle.sin));
+  }
+  for (std::size_t row = 0; row < rows; ++row) {
+    const auto angle = math::sincos(bottom + static_cast<double>(row) * step);
+    image.row_cos.push_back(static_cast<float>(angle.cos));
+    image.row_sin.push_back(static_cast<float>(angle.sin));
+  }
+  return image;
+}
+
+/// False if a ball around `center` (sensor frame) lies wholly outside the image.
+bool may_see(const PaperImage& image, const Vector3d& center, double radius) {
+  const double distance = center.norm();
+  if (distance - radius > static_cast<double>(image.range_max)) return false;
+  if (distance <= radius) return true;
+  const double high = static_cast<double>(image.sin_high) * distance;
+  const double low = static_cast<double>(image.sin_low) * distance;
+  const double beside = kPi / 2 * radius;  // along the sphere through the centre
+  if (center.z() > high + beside || center.z() < low - beside) return false;
+  if (!image.narrow) return true;
+  const auto inside = [&](const float* normal) {
+    return static_cast<double>(normal[0]) * center.x() +
+               static_cast<double>(normal[1]) * center.y() >=
+           -radius;
+  };
+  return inside(image.left) && inside(image.right);
+}
+
+/// Depth, cosine and intensity of the pixel that a ray falls in.
+Hit look_up(const PaperImage& image, float azimuth, float elevation) {
+  const auto row = static_cast<int>(
+      floor_to_integer(static_cast<double>((elevation - image.elevation_min) / image.step) + 0.5));
+  auto column = static_cast<int>(floor_to_integer(
+      static_cast<double>((azimuth - image.azimuth_min) / image.column_step) + 0.5));
+  if (image.full_turn) column = (column % image.columns + image.columns) % image.columns;
+  if (row < 0 || row >= image.rows || column < 0 || column >= image.columns) return {};
+  const std::size_t at =
+      static_cast<std::size_t>(row) * image.stride + static_cast<std::size_t>(column);
+  if (!(image.depth[at] <= image.range_max)) return {};
+  return {image.depth[at], image.cosine[at], image.intensity[at]};
 }
 
 }  // namespace
-
-/// The depth image: rows of elevation, columns of azimuth, in the sensor's frame.
-class PaperRenderer::Image {
- public:
-  Image(const RayBatch& batch, const std::vector<Angles>& rays, double plane_reach)
-      : step_(batch.image_resolution),
-        range_max_(static_cast<double>(batch.range_max)),
-        reach_squared_(plane_reach * plane_reach) {
-    double low = kPi;
-    double high = -kPi;
-    elevation_min_ = kPi / 2;
-    elevation_max_ = -kPi / 2;
-    for (const Angles& a : rays) {
-      low = std::min(low, a.azimuth);
-      high = std::max(high, a.azimuth);
-      elevation_min_ = std::min(elevation_min_, a.elevation);
-      elevation_max_ = std::max(elevation_max_, a.elevation);
-    }
-    // rays on both sides of the rear: the whole turn
-    full_turn_ = high - low > 2.0 * kPi - 10.0 * step_ || high - low > 1.9 * kPi;
-    azimuth_min_ = full_turn_ ? -kPi : low;
-    const double width = full_turn_ ? 2.0 * kPi : high - low;
-    columns_ = static_cast<int>(std::ceil(width / step_ - 1e-9)) + (full_turn_ ? 0 : 1);
-    rows_ = static_cast<int>(std::floor((elevation_max_ - elevation_min_) / step_ + 1e-9)) + 1;
-    column_step_ = full_turn_ ? width / columns_ : step_;
-    // half a pixel more, for points that round to the outermost
-    sin_low_ = math::sin(std::max(-kPi / 2, elevation_min_ - step_));
-    sin_high_ = math::sin(std::min(kPi / 2, elevation_max_ + step_));
-    narrow_ = !full_turn_ && width < 0.9 * kPi;
-    const auto from = math::sincos(azimuth_min_ - step_);
-    const auto to = math::sincos(azimuth_min_ + width + step_);
-    left_ = {-from.sin, from.cos};
-    right_ = {to.sin, -to.cos};
-    pixels_.assign(static_cast<std::size_t>(rows_) * static_cast<std::size_t>(columns_),
-                   {kEmpty, 0.0f, 0.0f});
-    for (int c = 0; c < columns_; ++c) {
-      column_rays_.push_back(math::sincos(azimuth_min_ + c * column_step_));
-    }
-    for (int row = 0; row < rows_; ++row) {
-      row_rays_.push_back(math::sincos(elevation_min_ + row * step_));
-    }
-  }
-
-  struct Pixel {
-    float depth;
-    float intensity;
-    float cos_incidence;
-  };
-
-  [[nodiscard]] int rows() const { return rows_; }
-
-  /// False if a ball around `center` (sensor frame) lies wholly outside range and elevations.
-  [[nodiscard]] bool may_see(const Vector3d& center, double radius) const {
-    const double distance = center.norm();
-    if (distance - radius > range_max_) return false;
-    if (distance <= radius) return true;
-    const double half = math::asin(radius / distance) + step_;
-    const Angles a = angles_of(center);
-    if (a.elevation + half < elevation_min_ || a.elevation - half > elevation_max_) return false;
-    if (full_turn_) return true;
-    const double cosine = math::cos(std::min(kPi / 2, std::abs(a.elevation) + half));
-    if (cosine < 0.05) return true;  // near the poles every azimuth is close
-    const double middle = azimuth_min_ + 0.5 * (columns_ - 1) * column_step_;
-    double off = std::abs(a.azimuth - middle);
-    off = std::min(off, 2.0 * kPi - off);
-    return off <= 0.5 * columns_ * column_step_ + half / cosine;
-  }
-
-  /// A point on its way into the image.
-  struct Splat {
-    Vector3f p;  ///< Sensor frame, m.
-    Vector3f normal;
-    float intensity;
-    bool planar;
-    int first_row, last_row;  ///< Within theta_max, and the row that it projects to.
-    double row_at;
-    double azimuth;
-    double distance;
-    double theta_max;
-  };
-
-  /// False for a point that certainly fills no pixel, without trigonometry.
-  [[nodiscard]] bool in_view(const Vector3d& p, double distance, double radius) const {
-    const double beside = 1.6 * radius;  // theta_max is at most pi / 2 of the sine's angle
-    if (distance > range_max_ + radius || distance < 1e-6) return false;
-    if (p.z() > distance * sin_high_ + beside || p.z() < distance * sin_low_ - beside) return false;
-    if (full_turn_ || !narrow_) return true;
-    return left_.dot(p.head<2>()) >= -beside && right_.dot(p.head<2>()) >= -beside;
-  }
-
-  [[nodiscard]] std::optional<Splat> project(const Vector3d& p,
-                                             const Vector3d& normal,
-                                             bool planar,
-                                             float intensity,
-                                             double radius) const {
-    const double distance = p.norm();
-    if (!in_view(p, distance, radius)) return std::nullopt;
-    Splat splat{p.cast<float>(), normal.cast<float>(), intensity, planar, 0, 0, 0, 0, distance, 0};
-    splat.theta_max = distance > radius ? math::asin(radius / distance) : kPi / 2;
-    const Angles a = angles_of(p);
-    splat.azimuth = a.azimuth;
-    splat.row_at = (a.elevation - elevation_min_) / step_;
-    const double reach = splat.theta_max / step_;
-    const int nearest = static_cast<int>(std::lround(splat.row_at));
-    splat.first_row = std::min(nearest, static_cast<int>(std::ceil(splat.row_at - reach)));
-    splat.last_row = std::max(nearest, static_cast<int>(std::floor(splat.row_at + reach)));
-    if (splat.last_row < 0 || splat.first_row >= rows_) return std::nullopt;
-    return splat;
-  }
-
-  /// Fills the pixels of rows [row_begin, row_end) within theta_max of the point.
-  void fill(const Splat& splat, double radius, int row_begin, int row_end) {
-    const Vector3d p = splat.p.cast<double>();
-    const Vector3d normal = splat.normal.cast<double>();
-    const double distance = splat.distance;
-    const Angles a{splat.azimuth, 0.0};
-    const int first = std::max(row_begin, splat.first_row);
-    const int last = std::min(row_end - 1, splat.last_row);
-    const Vector3d axis = p / distance;
-    const double cos_max =
-        std::sqrt(std::max(0.0, 1.0 - std::min(1.0, radius * radius / (distance * distance))));
-    const double plane_offset = normal.dot(p);
-    bool touched = false;
-    for (int row = first; row <= last; ++row) {
-      touched = fill_row(row,
-                         a,
-                         splat.theta_max,
-                         axis,
-                         cos_max,
-                         normal,
-                         plane_offset,
-                         splat.planar,
-                         distance,
-                         splat.intensity) ||
-                touched;
-    }
-    // smaller than a pixel: the pixel it projects to
-    const int nearest_row = static_cast<int>(std::lround(splat.row_at));
-    if (!touched && nearest_row >= row_begin && nearest_row < row_end) {
-      const int column = column_of(a.azimuth);
-      if (column >= 0) put(nearest_row, column, distance, 1.0, splat.intensity);
-    }
-  }
-
-  [[nodiscard]] Hit look_up(const Angles& a) const {
-    const int row = static_cast<int>(std::lround((a.elevation - elevation_min_) / step_));
-    const int column = column_of(a.azimuth);
-    if (row < 0 || row >= rows_ || column < 0) return {};
-    const Pixel& pixel = pixels_[index(row, column)];
-    if (pixel.depth == kEmpty || static_cast<double>(pixel.depth) > range_max_) return {};
-    return {pixel.depth, pixel.cos_incidence, pixel.intensity};
-  }
-
- private:
-  [[nodiscard]] std::size_t index(int row, int column) const {
-    return static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) +
-           static_cast<std::size_t>(column);
-  }
-
-  /// Column of an azimuth, or -1 outside the image.
-  [[nodiscard]] int column_of(double azimuth) const {
-    const int column = static_cast<int>(std::lround((azimuth - azimuth_min_) / column_step_));
-    if (full_turn_) return (column % columns_ + columns_) % columns_;
-    return column >= 0 && column < columns_ ? column : -1;
-  }
-
-  bool fill_row(int row,
-                const Angles& a,
-                double theta_max,
-                const Vector3d& axis,
-                double cos_max,
-                const Vector3d& normal,
-                double plane_offset,
-                bool planar,
-                double distance,
-                float intensity) {
-    const math::SinCos elevation = row_rays_[static_cast<std::size_t>(row)];
-    const double half = elevation.cos > 1e-3 ? theta_max / elevation.cos * 1.2 : 2.0 * kPi;
-    const double at = (a.azimuth - azimuth_min_) / column_step_;
-    const double reach = std::min(half / column_step_ + 1.0, 0.5 * columns_ + 1.0);
-    const bool whole_row = full_turn_ && 2.0 * reach >= columns_;
-    int first = whole_row ? 0 : static_cast<int>(std::ceil(at - reach));
-    int last = whole_row ? columns_ - 1 : static_cast<int>(std::floor(at + reach));
-    if (!full_turn_) {
-      first = half >= kPi ? 0 : std::max(0, first);
-      last = half >= kPi ? columns_ - 1 : std::min(columns_ - 1, last);
-    }
-    bool touched = false;
-    for (int c = first; c <= last; ++c) {
-      const int column = full_turn_ ? (c % columns_ + columns_) % columns_ : c;
-      const math::SinCos azimuth = column_rays_[static_cast<std::size_t>(column)];
-      const Vector3d ray(elevation.cos * azimuth.cos, elevation.cos * azimuth.sin, elevation.sin);
-      if (ray.dot(axis) < cos_max) continue;
-      touched = true;
-      const double slope = normal.dot(ray);
-      if (!planar || std::abs(slope) < kMinCosIncidence) {
-        put(row, column, distance, planar ? std::abs(slope) : 1.0, intensity);
-        continue;
-      }
-      // a point stands for a cube of substance: its plane ends near it (the paper leaves that open,
-      // and grazing planes would reach to the sensor)
-      const double depth = plane_offset / slope;
-      const bool near_point = (depth * ray - distance * axis).squaredNorm() < reach_squared_;
-      if (depth > 0.0 && near_point) put(row, column, depth, std::abs(slope), intensity);
-    }
-    return touched;
-  }
-
-  void put(int row, int column, double depth, double cos_incidence, float intensity) {
-    Pixel& pixel = pixels_[index(row, column)];
-    const auto d = static_cast<float>(depth);
-    if (d < pixel.depth) pixel = {d, intensity, static_cast<float>(cos_incidence)};
-  }
-
-  double step_;
-  double column_step_ = 0.0;
-  double range_max_;
-  double reach_squared_;
-  double azimuth_min_ = 0.0;
-  double elevation_min_ = 0.0;
-  double elevation_max_ = 0.0;
-  double sin_low_ = -1.0;  ///< Of the elevations.
-  double sin_high_ = 1.0;
-  Eigen::Vector2d left_ = Eigen::Vector2d::Zero();  ///< Inward normals of the azimuths' wedge.
-  Eigen::Vector2d right_ = Eigen::Vector2d::Zero();
-  bool narrow_ = false;  ///< The wedge is less than half a turn.
-  bool full_turn_ = false;
-  int rows_ = 0;
-  int columns_ = 0;
-  std::vector<Pixel> pixels_;
-  std::vector<math::SinCos> column_rays_;
-  std::vector<math::SinCos> row_rays_;
-};
 
 PaperRenderer::PaperRenderer(const Scene& scene, const PaperOptions& options)
     : map_(scene.map), options_(options) {
@@ -274,11 +128,66 @@ PaperRenderer::PaperRenderer(const Scene& scene, const PaperOptions& options)
         const auto [at, is_new] = index.try_emplace(key, voxels_.size());
         if (is_new) voxels_.push_back({cell * l, {}});
         Voxel& voxel = voxels_[at->second];
-        voxel.points.push_back({(center - voxel.corner_world).cast<float>(),
-                                normal.cast<float>(),
-                                map_->intensity(word),
-                                thickness < gamma_max});
+        voxel.points.add((center - voxel.corner_world).cast<float>(),
+                         normal.cast<float>(),
+                         thickness < gamma_max,
+                         map_->intensity(word));
       });
+  for (Voxel& voxel : voxels_) voxel.points.finish();
+}
+
+void PaperRenderer::draw(const std::vector<std::size_t>& seen,
+                         const Pose& T_sensor_world,
+                         PaperImage& image,
+                         const Executor& executor) const {
+  // Some voxels at a time, so that their points stay in the cache: first every point is projected
+  // once, then bands of rows are filled. Each pixel belongs to one band and each band takes the
+  // points in the same order, so the result depends on no number of threads.
+  const auto threads = static_cast<std::size_t>(executor.threads());
+  const std::size_t bands = threads == 1 ? 1 : 4 * threads;
+  const std::size_t voxels_a_turn = threads == 1 ? 8 : 64 * threads;
+  const Matrix3f turn = T_sensor_world.rotation.toRotationMatrix().cast<float>();
+  struct Projected {
+    std::vector<PaperSplat> splats;
+    int low = 0, high = 0;  // rows, high exclusive
+  };
+  std::vector<Projected> projected(voxels_a_turn);
+  for (std::size_t first = 0; first < seen.size(); first += voxels_a_turn) {
+    const std::size_t count = std::min(voxels_a_turn, seen.size() - first);
+    executor.parallel_for(count, 1, [&](std::size_t i, std::size_t) {
+      const Voxel& voxel = voxels_[seen[first + i]];
+      Projected& own = projected[i];
+      own.splats.clear();
+      const Vector3f corner = (T_sensor_world * voxel.corner_world).cast<float>();
+      paper_project(image, voxel.points, corner, turn, own.splats);
+      own.low = image.rows;
+      own.high = 0;
+      for (const PaperSplat& splat : own.splats) {
+        own.low = std::min(own.low, std::max(0, splat.first_row));
+        own.high = std::max(own.high, std::min(image.rows, splat.last_row + 1));
+      }
+    });
+    // neighbouring voxels fill few rows: those are shared out
+    int low = image.rows;
+    int high = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+      low = std::min(low, projected[i].low);
+      high = std::max(high, projected[i].high);
+    }
+    if (low >= high) continue;
+    const auto rows = static_cast<std::size_t>(high - low);
+    const auto fill_band = [&](std::size_t begin, std::size_t end) {
+      const int row_begin = low + static_cast<int>(begin);
+      const int row_end = low + static_cast<int>(end);
+      for (std::size_t i = 0; i < count; ++i) {
+        const Projected& own = projected[i];
+        if (own.low < row_end && own.high > row_begin) {
+          paper_fill(image, own.splats, row_begin, row_end);
+        }
+      }
+    };
+    executor.parallel_for(rows, (rows + bands - 1) / bands, fill_band);
+  }
 }
 
 void PaperRenderer::render(const RayBatch& batch,
@@ -286,56 +195,27 @@ void PaperRenderer::render(const RayBatch& batch,
                            const Executor& executor) const {
   if (batch.rays.empty()) return;
   const Pose T_sensor_world = batch.T_world_sensor.inverse();
-  std::vector<Angles> angles(batch.rays.size());
-  executor.parallel_for(angles.size(), 4096, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) {
-      angles[i] = angles_of(T_sensor_world.rotation * batch.rays[i].direction_world.cast<double>());
-    }
+  const Matrix3f turn = T_sensor_world.rotation.toRotationMatrix().cast<float>();
+  PaperAngles angles(batch.rays.size());
+  executor.parallel_for(batch.rays.size(), 4096, [&](std::size_t begin, std::size_t end) {
+    paper_angles(batch.rays, turn, begin, end, angles);
   });
   const double radius = std::sqrt(3.0) / 2.0 * map_->resolution();
-  const double ball = std::sqrt(3.0) / 2.0 * options_.voxel_length + radius;
-  Image image(batch, angles, 2.0 * radius);
+  PaperImage image = image_over(extent_of(angles, batch.rays.size()), batch, radius);
 
-  const Matrix3d turn = T_sensor_world.rotation.toRotationMatrix();
-  std::vector<std::size_t> seen;
+  const double ball = std::sqrt(3.0) / 2.0 * options_.voxel_length + radius;
   const Vector3d half = Vector3d::Constant(0.5 * options_.voxel_length);
+  std::vector<std::size_t> seen;
   for (std::size_t v = 0; v < voxels_.size(); ++v) {
-    if (image.may_see(T_sensor_world * (voxels_[v].corner_world + half), ball)) seen.push_back(v);
+    if (may_see(image, T_sensor_world * (voxels_[v].corner_world + half), ball)) seen.push_back(v);
   }
-  // first every point once, then bands of rows: each pixel belongs to one band, each band takes the
-  // points in the same order, so the result does not depend on threads
-  constexpr std::size_t kVoxels = 16;
-  std::vector<std::vector<Image::Splat>> splats((seen.size() + kVoxels - 1) / kVoxels);
-  executor.parallel_for(seen.size(), kVoxels, [&](std::size_t begin, std::size_t end) {
-    auto& own = splats[begin / kVoxels];
-    for (std::size_t v = begin; v < end; ++v) {
-      const Voxel& voxel = voxels_[seen[v]];
-      const Vector3d corner = T_sensor_world * voxel.corner_world;
-      for (const Point& point : voxel.points) {
-        const Vector3d p = corner + turn * point.position.cast<double>();
-        const Vector3d n = turn * point.normal.cast<double>();
-        if (const auto splat = image.project(p, n, point.planar, point.intensity, radius)) {
-          own.push_back(*splat);
-        }
-      }
+  draw(seen, T_sensor_world, image, executor);
+  executor.parallel_for(hits.size(), 4096, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      hits[i] = look_up(image, angles.azimuth[i], angles.elevation[i]);
+      if (hits[i].range > batch.rays[i].range_max) hits[i] = {};
     }
   });
-  constexpr std::size_t kBand = 32;
-  executor.parallel_for(
-      static_cast<std::size_t>(image.rows()), kBand, [&](std::size_t begin, std::size_t end) {
-        const int first = static_cast<int>(begin);
-        const int last = static_cast<int>(end) - 1;
-        for (const auto& chunk : splats) {
-          for (const Image::Splat& splat : chunk) {
-            if (splat.last_row < first || splat.first_row > last) continue;
-            image.fill(splat, radius, first, last + 1);
-          }
-        }
-      });
-  for (std::size_t i = 0; i < hits.size(); ++i) {
-    hits[i] = image.look_up(angles[i]);
-    if (hits[i].range > batch.rays[i].range_max) hits[i] = {};
-  }
 }
 
 }  // namespace pointflight

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "pointflight/render/paper_kernel.hpp"
 #include "pointflight/render/renderer.hpp"
 
 namespace pointflight {
@@ -28,17 +29,15 @@ class PaperRenderer : public Renderer {
   [[nodiscard]] bool is_snapshot() const override { return true; }
 
  private:
-  struct Point {
-    Vector3f position;  ///< From the voxel's corner, m.
-    Vector3f normal;
-    float intensity;
-    bool planar;  ///< gamma is below the threshold.
-  };
   struct Voxel {
     Vector3d corner_world;
-    std::vector<Point> points;
+    PaperPoints points;
   };
-  class Image;
+  /// Points of the voxels that may be seen, batch by batch, into the image.
+  void draw(const std::vector<std::size_t>& seen,
+            const Pose& T_sensor_world,
+            PaperImage& image,
+            const Executor& executor) const;
 
   std::shared_ptr<const SurfelMap> map_;
   PaperOptions options_;
