@@ -415,17 +415,29 @@ POINTFLIGHT_INLINE bool advance(const KernelMap& map,
                                 std::uint64_t& overflows) {
   if (s.steps == 0) return false;
   --s.steps;
-  if (std::has_single_bit(entered)) {
-    // most often: straight on
-    const Entry child = child_of(*s.node, meta_of(*s.node), s.enter, std::countr_zero(entered));
-    if (child.meta == Bvh8Node::kInner && child.index < map.node_count) {
-      prefetch(map, child);
-      s.node = map.nodes + child.index;
-      return true;
+  // most often one or two children are entered: the nearer one need not go through the stack
+  if (entered != 0) {
+    const std::uint64_t meta = meta_of(*s.node);
+    const std::uint32_t others = entered & (entered - 1);
+    if ((others & (others - 1)) == 0) {
+      Entry next = child_of(*s.node, meta, s.enter, std::countr_zero(entered));
+      prefetch(map, next);
+      if (others != 0 && s.depth < kStack) {
+        const Entry other = child_of(*s.node, meta, s.enter, std::countr_zero(others));
+        prefetch(map, other);
+        const bool swapped = other.t < next.t;
+        s.stack[s.depth++] = swapped ? next : other;
+        next = swapped ? other : next;
+      }
+      if (next.meta != Bvh8Node::kInner) {
+        visit_leaf(map, s, next, overflows);
+      } else if (next.index < map.node_count) {
+        s.node = map.nodes + next.index;
+        return true;
+      }
+    } else {
+      s.depth = push_children(map, *s.node, entered, s.enter, s.stack, s.depth);
     }
-    if (child.meta != Bvh8Node::kInner) visit_leaf(map, s, child, overflows);
-  } else {
-    s.depth = push_children(map, *s.node, entered, s.enter, s.stack, s.depth);
   }
   while (s.depth > 0) {
     const Entry entry = s.stack[--s.depth];

@@ -39,6 +39,7 @@ KernelMap kernel_map_of(const SurfelMap& map) {
   k.weight_scale = kWeightOne * 36.0f / (static_cast<float>(kPi) * k.support_squared);
   k.scale = SurfelScale(static_cast<float>(map.resolution()));
   k.window = m.window * static_cast<float>(map.resolution());
+  k.widest_group = std::min(0.06f, 0.26f * static_cast<float>(map.resolution()));
   k.tau = static_cast<std::int32_t>(m.tau * kWeightOne);
   return k;
 }

@@ -376,7 +376,7 @@ POINTFLIGHT_INLINE std::size_t fill(const KernelMap& map,
       hwy::Prefetch(rays + order[i]);
     }
     const bool together = take_beams(map, rays, order + at, p.groups[groups]);
-    if (together && groups > 0 && !lies_near(p.groups[groups], p.groups[0])) break;
+    if (together && groups > 0 && !lies_near(map, p.groups[groups], p.groups[0])) break;
     if (together) {
       taken[groups++] = at;
     } else {
@@ -388,6 +388,22 @@ POINTFLIGHT_INLINE std::size_t fill(const KernelMap& map,
   return groups;
 }
 
+/// True if most groups of eight lie close enough together: a look at a few of them.
+POINTFLIGHT_INLINE bool is_dense(const KernelMap& map,
+                                 const Ray* rays,
+                                 const std::uint32_t* order,
+                                 std::size_t count,
+                                 Packet& p) {
+  constexpr std::size_t kLooks = 8;
+  if (count < 8 * kLooks) return true;
+  std::size_t together = 0;
+  for (std::size_t i = 0; i < kLooks; ++i) {
+    const std::size_t at = (count - 8) * i / (kLooks - 1) / 8 * 8;
+    together += take_beams(map, rays, order + at, p.groups[0]) ? 1 : 0;
+  }
+  return 2 * together >= kLooks;
+}
+
 static std::uint64_t trace(const KernelMap& map,
                            const Ray* rays,
                            const std::uint32_t* order,
@@ -397,10 +413,13 @@ static std::uint64_t trace(const KernelMap& map,
   if (grouping != BeamGrouping::kAsSuits || map.node_count == 0) {
     return trace_singly(map, rays, order, count, hits);
   }
+  Packet packet;  // NOLINT(cppcoreguidelines-pro-type-member-init): by take_beams and set_up
+  if (!is_dense(map, rays, order, count, packet)) {
+    return trace_singly(map, rays, order, count, hits);
+  }
   std::uint64_t overflows = 0;
   std::size_t at = 0;
   Waiting waiting;
-  Packet packet;  // NOLINT(cppcoreguidelines-pro-type-member-init): by take_beams and set_up
   std::size_t taken[kGroups];
   const auto trace_waiting = [&] {
     overflows += trace_singly(map, rays, waiting.beams, waiting.count, hits);

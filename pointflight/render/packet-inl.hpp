@@ -17,8 +17,6 @@ inline constexpr std::size_t kGroups = 8;
 inline constexpr std::size_t kPacket = 8 * kGroups;
 /// Rows of hits of one group: beyond, its beams are traced singly.
 inline constexpr std::size_t kRows = 96;
-/// Wider groups (radius, rad) meet so many surfels apart that single rays are faster.
-inline constexpr float kWidestGroup = 0.012f;
 
 /// Hits of eight beams: a row is one surfel, lanes that it does not meet hold kNever and weight 0.
 struct HitRows {
@@ -87,7 +85,7 @@ POINTFLIGHT_INLINE bool take_beams(const KernelMap& map,
   const F8 x = dx - splat(group.mean[0]);
   const F8 y = dy - splat(group.mean[1]);
   const F8 z = dz - splat(group.mean[2]);
-  if (!(greatest(x * x + y * y + z * z) <= kWidestGroup * kWidestGroup)) return false;
+  if (!(greatest(x * x + y * y + z * z) <= map.widest_group * map.widest_group)) return false;
   store(splat(kNever), group.first);
   store(splat(kNever), group.nearest);
   store(splat_int(0), group.total);
@@ -97,13 +95,13 @@ POINTFLIGHT_INLINE bool take_beams(const KernelMap& map,
 
 /// True if a group may join a packet: neighbours along the curve through the beams lie together,
 /// but for the curve's leaps.
-POINTFLIGHT_INLINE bool lies_near(const Group& group, const Group& other) {
-  constexpr float kFarthest = 8.0f * kWidestGroup;
+POINTFLIGHT_INLINE bool lies_near(const KernelMap& map, const Group& group, const Group& other) {
+  const float farthest = 8.0f * map.widest_group;
   float squared = 0.0f;
   for (int k = 0; k < 3; ++k) {
     squared += (group.mean[k] - other.mean[k]) * (group.mean[k] - other.mean[k]);
   }
-  return squared <= kFarthest * kFarthest;
+  return squared <= farthest * farthest;
 }
 
 /// How far the origins of a packet's beams lie from its apex, which is the first one.
