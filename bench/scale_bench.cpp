@@ -79,8 +79,9 @@ double kilobytes(const std::string& key) {
 /// each takes of what all share.
 nlohmann::ordered_json memory_of(const std::string& path, const BeamPlan& plan, int count) {
   int done[2];
-  int go[2];
-  if (::pipe(done) != 0 || ::pipe(go) != 0) return {};
+  int look[2];
+  int end[2];
+  if (::pipe(done) != 0 || ::pipe(look) != 0 || ::pipe(end) != 0) return {};
   for (int i = 0; i < count; ++i) {
     if (::fork() != 0) continue;
     const auto map = SurfelMap::open(path);
@@ -89,23 +90,27 @@ nlohmann::ordered_json memory_of(const std::string& path, const BeamPlan& plan, 
     for (std::size_t k = 0; k < kPlaces; ++k) scan(renderer, plan, place_in(*map, k), one);
     char token = 0;
     (void)!::write(done[1], &token, 1);
-    (void)!::read(go[0], &token, 1);  // all are there
+    (void)!::read(look[0], &token, 1);  // all are there
     const double figures[3] = {kilobytes("Rss:"), kilobytes("Pss:"), kilobytes("Private_Dirty:")};
     (void)!::write(done[1], figures, sizeof figures);
-    (void)!::read(go[0], &token, 1);  // all have looked
+    (void)!::read(end[0], &token, 1);  // all have looked
     ::_exit(0);
   }
   char token = 0;
   for (int i = 0; i < count; ++i) (void)!::read(done[0], &token, 1);
-  for (int i = 0; i < count; ++i) (void)!::write(go[1], &token, 1);
+  for (int i = 0; i < count; ++i) (void)!::write(look[1], &token, 1);
   double sums[3] = {0.0, 0.0, 0.0};
   for (int i = 0; i < count; ++i) {
     double figures[3] = {0.0, 0.0, 0.0};
     (void)!::read(done[0], figures, sizeof figures);
     for (int k = 0; k < 3; ++k) sums[k] += 1.024e-3 * figures[k] / count;
   }
-  for (int i = 0; i < count; ++i) (void)!::write(go[1], &token, 1);
+  for (int i = 0; i < count; ++i) (void)!::write(end[1], &token, 1);
   while (::wait(nullptr) > 0) continue;
+  for (const int* pipe : {done, look, end}) {
+    ::close(pipe[0]);
+    ::close(pipe[1]);
+  }
   return {{"processes", count},
           {"resident_mb", sums[0]},
           {"proportional_mb", sums[1]},

@@ -10,7 +10,10 @@ namespace pointflight {
 namespace {
 
 constexpr double kWorthwhile = 0.05;  // cells
-constexpr double kThickest = 0.020;   // m, or 2.5 sigma
+// a plane's neighbourhood is no thicker than the largest of 2.5 sigma and these: rooms that were
+// scanned while walking have walls of 2 to 3 cm, and coarse cells cannot tell faces that near apart
+constexpr double kThickest = 0.020;  // m
+constexpr double kThickestInCells = 0.35;
 constexpr std::size_t kSampledCells = 200000;
 constexpr double kNoiseShare = 0.2;  // percentile
 
@@ -192,7 +195,7 @@ CellTiles project_noise(const CellTiles& cells,
                         Scratch& scratch,
                         ProjectionReport& report,
                         const Progress& progress) {
-  const double thickest = std::max(2.5 * sigma, kThickest);
+  const double thickest = std::max({2.5 * sigma, kThickest, kThickestInCells * cells.resolution()});
   ScratchArray<VoxelCell> results(scratch, cells.capacity());
   std::vector<ProjectionReport> of_tile(cells.tiles().size());
   const auto move_tile = [&](TileView& view) {

@@ -24,7 +24,8 @@ bool needs_projection(const CellTiles& cells, double sigma);
 
 /// The cells moved along the normal onto the plane of the smallest neighbourhood (3, 5 or 7 cells
 /// wide) that is planar, and flattened; cells that land in one merge. A plane must not be thicker
-/// than max(2.5 sigma, 20 mm): the faces of a partition stay apart. Does not depend on threads.
+/// than max(2.5 sigma, 20 mm, 0.35 r): the faces of a partition stay apart. Does not depend on
+/// threads.
 CellTiles project_noise(const CellTiles& cells,
                         double sigma,
                         const Executor& executor,
