@@ -27,6 +27,7 @@ struct FidelityFlags {
   std::vector<double> noises = {0.0};
   double points_per_cell = 8.0;
   double density_min = 2000.0;
+  bool thinned = false;
   std::string lidar;
   std::vector<std::string> renderers = {"beam"};
   double tau = 0.0;  ///< 0: by the density.
@@ -162,7 +163,7 @@ void run_scene(const ExactScene& scene,
   for (const double resolution : flags.resolutions) {
     for (const double noise : flags.noises) {
       const SceneSampling sampling{
-          flags.points_per_cell, resolution, flags.density_min, noise, flags.seed};
+          flags.points_per_cell, resolution, flags.density_min, noise, flags.seed, flags.thinned};
       const auto map = import_scene(scene, sampling, flags, executor, progress);
       for (const std::string& name : flags.renderers) {
         const auto renderer = make_renderer(name, Scene{map});
@@ -182,6 +183,7 @@ void run_scene(const ExactScene& scene,
                          {"resolution", resolution},
                          {"noise", noise},
                          {"points_per_cell", flags.points_per_cell},
+                         {"thinned", flags.thinned},
                          {"beams", beams.plan.name},
                          {"renderer", name},
                          {"tau", map->model().tau},
@@ -255,6 +257,9 @@ void add_fidelity_command(CLI::App& parent, int& /*exit_code*/) {
   app->add_option("--density-min", flags->density_min, "At least so many points a square metre")
       ->check(within(0.0, 1e6))
       ->capture_default_str();
+  app->add_flag("--thinned",
+                flags->thinned,
+                "Keep one point of each cube of the resolution, as maps are often thinned");
   app->add_option("--lidar",
                   flags->lidar,
                   "avia_grid, mid360_uniform, vlp32_grid, a shipped sensor or a .yaml (default: "

@@ -8,11 +8,13 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <unordered_set>
 
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/core/math.hpp"
 #include "pointflight/core/resources.hpp"
+#include "pointflight/geometry/morton.hpp"
 #include "pointflight/geometry/rotation.hpp"
 #include "pointflight/io/byte_cursor.hpp"
 
@@ -209,7 +211,9 @@ class SampledCloud : public CloudReader {
                    sampling_.noise,
                    sampling_.seed,
                    [&](const Vector3d& p) {
-                     batch.push_back({p, 0.0f});
+                     if (!sampling_.one_per_cell || is_first_in_cell(p)) {
+                       batch.push_back({p, 0.0f});
+                     }
                    });
       done_ += count;
       read_ += count;
@@ -227,8 +231,20 @@ class SampledCloud : public CloudReader {
   }
 
  private:
+  /// The grid that thins the cloud is not the one of the map.
+  bool is_first_in_cell(const Vector3d& p) {
+    constexpr double kPhase = 0.19;
+    std::array<std::uint32_t, 3> cell{};
+    for (int axis = 0; axis < 3; ++axis) {
+      const std::int64_t at = floor_to_integer(p[axis] / sampling_.resolution + kPhase);
+      cell[static_cast<std::size_t>(axis)] = static_cast<std::uint32_t>(at + (1 << 20));
+    }
+    return occupied_.insert(morton_encode(cell[0], cell[1], cell[2])).second;
+  }
+
   const ExactScene& scene_;
   SceneSampling sampling_;
+  std::unordered_set<std::uint64_t> occupied_;
   std::vector<std::uint64_t> counts_;  ///< Points of each shape.
   std::uint64_t total_ = 0;
   std::uint64_t read_ = 0;

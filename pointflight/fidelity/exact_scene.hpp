@@ -51,6 +51,8 @@ struct SceneSampling {
   double density_min = 2000.0;   ///< At least so many a square metre.
   double noise = 0.0;            ///< Deviation along the surface normal, m.
   std::uint64_t seed = 1;
+  /// Of the points in a cube of the resolution only the first is kept, as maps are often thinned.
+  bool one_per_cell = false;
 };
 
 /// Streams the points of a sampled scene; the scene must outlive it.

@@ -1,5 +1,9 @@
 #include <gtest/gtest.h>
 
+#include <array>
+#include <cmath>
+#include <map>
+
 #include "pointflight/fidelity/exact_scene.hpp"
 #include "pointflight/fidelity/scene_beams.hpp"
 #include "tests/support.hpp"
@@ -174,6 +178,36 @@ TEST(ExactScene, BadScenesSayFileAndLine) {
   expect_contains(error("g.csv", "disc,x,nan,0,0,0,0,1,,,,1\n"), "not a number");
   expect_contains(error("h.csv.xz", "no xz at all"), "damaged or cut off xz data");
   expect_contains(error_of([] { load_scene("hal"); }), "known: hall, forest, box");
+}
+
+TEST(ExactScene, AThinnedCloudHasOnePointACube) {
+  const ExactScene scene = load_scene("box");
+  SceneSampling sampling;
+  sampling.resolution = 0.1;
+  const auto count_of = [&] {
+    const auto reader = sampled_cloud(scene, sampling);
+    std::vector<CloudPoint> batch;
+    std::map<std::array<std::int64_t, 3>, std::size_t> cells;
+    std::size_t points = 0;
+    while (reader->read(batch)) {
+      for (const CloudPoint& p : batch) {
+        const Vector3d cell = (p.position / 0.1).array() + 0.19;
+        std::array<std::int64_t, 3> key{};
+        for (std::size_t k = 0; k < 3; ++k) {
+          key[k] = static_cast<std::int64_t>(std::floor(cell[static_cast<int>(k)]));
+        }
+        ++cells[key];
+        ++points;
+      }
+    }
+    return std::pair(points, cells.size());
+  };
+  const auto [all, occupied] = count_of();
+  sampling.one_per_cell = true;
+  const auto [kept, kept_cells] = count_of();
+  EXPECT_GT(all, 5 * occupied);
+  EXPECT_EQ(kept, occupied);
+  EXPECT_EQ(kept_cells, occupied);
 }
 
 }  // namespace
