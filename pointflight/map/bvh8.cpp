@@ -482,7 +482,9 @@ class TreeBuilder {
       tree.nodes[i == 0 ? p.slot : node_at + i - 1] = node;
     }
     std::copy(part.words.begin(), part.words.end(), tree.words.begin() + word_at);
-    std::copy(part.intensity.begin(), part.intensity.end(), tree.intensity.begin() + word_at);
+    if (!part.intensity.empty()) {
+      std::copy(part.intensity.begin(), part.intensity.end(), tree.intensity.begin() + word_at);
+    }
     tree.words.release(word_at, word_at + part.words.size());
   }
 
