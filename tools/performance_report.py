@@ -71,8 +71,7 @@ def draw_render(cases, path):
         axis.set_title(pattern, loc="left", fontsize=10)
         axis.set_xticks(range(len(scenes)), [f"{s} {r:g} m" for s, r in scenes])
         axis.grid(axis="y", linewidth=0.3)
-    handles, labels = axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, ncols=5, fontsize=8, loc="outside upper center")
+    axes[0].legend(ncols=5, fontsize=8, loc="lower center", bbox_to_anchor=(0.6, 1.0))
     figure.savefig(path, dpi=100)
 
 

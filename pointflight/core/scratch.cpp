@@ -40,23 +40,25 @@ int open_nameless(const std::string& folder, std::size_t bytes) {
 
 }  // namespace
 
-Scratch::Scratch(std::string folder, std::size_t memory_bytes)
-    : folder_(folder.empty() ? std::filesystem::temp_directory_path().string() : std::move(folder)),
-      limit_(memory_bytes) {}
+Scratch::Scratch(std::string folder, std::size_t memory_bytes) {
+  state_->folder =
+      folder.empty() ? std::filesystem::temp_directory_path().string() : std::move(folder);
+  state_->limit = memory_bytes;
+}
 
 ScratchBlock::ScratchBlock(Scratch& scratch, std::size_t bytes)
-    : scratch_(&scratch), bytes_((bytes + kPage - 1) / kPage * kPage) {
+    : scratch_(scratch.state_), bytes_((bytes + kPage - 1) / kPage * kPage) {
   if (bytes_ == 0) return;
-  in_file_ = scratch.in_memory_.fetch_add(bytes_) + bytes_ > scratch.limit_;
+  in_file_ = scratch_->in_memory.fetch_add(bytes_) + bytes_ > scratch_->limit;
   int file = -1;
   if (in_file_) {
-    scratch.in_memory_ -= bytes_;
-    file = open_nameless(scratch.folder_, bytes_);
+    scratch_->in_memory -= bytes_;
+    file = open_nameless(scratch_->folder, bytes_);
     // takes the room now: a full disk is an error here and not a signal later
     const int error = ::posix_fallocate(file, 0, static_cast<off_t>(bytes_));
     if (error != 0) {
       ::close(file);
-      fail(scratch.folder_, bytes_, error);
+      fail(scratch_->folder, bytes_, error);
     }
   }
   const int flags = in_file_ ? MAP_SHARED : MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE;
@@ -64,21 +66,21 @@ ScratchBlock::ScratchBlock(Scratch& scratch, std::size_t bytes)
   const int error = errno;
   if (file >= 0) ::close(file);
   if (address == MAP_FAILED) {
-    if (!in_file_) scratch.in_memory_ -= bytes_;
-    fail(scratch.folder_, bytes_, error);
+    if (!in_file_) scratch_->in_memory -= bytes_;
+    fail(scratch_->folder, bytes_, error);
   }
   data_ = static_cast<std::byte*>(address);
-  if (in_file_) scratch.in_files_ += bytes_;
+  if (in_file_) scratch_->in_files += bytes_;
 }
 
 ScratchBlock::~ScratchBlock() {
   if (data_ == nullptr) return;
   ::munmap(data_, bytes_);
-  (in_file_ ? scratch_->in_files_ : scratch_->in_memory_) -= bytes_;
+  (in_file_ ? scratch_->in_files : scratch_->in_memory) -= bytes_;
 }
 
 ScratchBlock::ScratchBlock(ScratchBlock&& other) noexcept
-    : scratch_(other.scratch_),
+    : scratch_(std::move(other.scratch_)),
       data_(std::exchange(other.data_, nullptr)),
       bytes_(std::exchange(other.bytes_, 0)),
       in_file_(other.in_file_) {}

@@ -15,25 +15,26 @@ namespace pointflight {
 /// a name in a folder, mapped, which the kernel can write out whenever memory is short. The files
 /// vanish with the process, however it ends.
 ///
-/// Must outlive its arrays. Arrays may be made from any thread.
+/// Arrays may be made from any thread and may outlive it.
 class Scratch {
  public:
   static constexpr std::size_t kDefaultMemory = std::size_t{3} << 29;  ///< Bytes: 1.5 GiB.
 
   /// `folder` empty: that of temporary files. `memory_bytes` 0: every array is a file.
   explicit Scratch(std::string folder = {}, std::size_t memory_bytes = kDefaultMemory);
-  Scratch(const Scratch&) = delete;
-  Scratch& operator=(const Scratch&) = delete;
 
-  [[nodiscard]] std::size_t bytes_in_memory() const { return in_memory_; }
-  [[nodiscard]] std::size_t bytes_in_files() const { return in_files_; }
+  [[nodiscard]] std::size_t bytes_in_memory() const { return state_->in_memory; }
+  [[nodiscard]] std::size_t bytes_in_files() const { return state_->in_files; }
 
  private:
   friend class ScratchBlock;
-  std::string folder_;
-  std::size_t limit_;
-  std::atomic<std::size_t> in_memory_{0};
-  std::atomic<std::size_t> in_files_{0};
+  struct State {
+    std::string folder;
+    std::size_t limit = 0;
+    std::atomic<std::size_t> in_memory{0};
+    std::atomic<std::size_t> in_files{0};
+  };
+  std::shared_ptr<State> state_ = std::make_shared<State>();
 };
 
 /// Zeroed bytes of a Scratch.
@@ -53,7 +54,7 @@ class ScratchBlock {
   void release(std::size_t begin, std::size_t end) const;
 
  private:
-  Scratch* scratch_ = nullptr;
+  std::shared_ptr<Scratch::State> scratch_;
   std::byte* data_ = nullptr;
   std::size_t bytes_ = 0;
   bool in_file_ = false;

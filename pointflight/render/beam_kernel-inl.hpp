@@ -208,9 +208,12 @@ POINTFLIGHT_INLINE Meeting meet(const Whitened& u, const Whitened& v, const F8& 
   return result;
 }
 
-/// Weights c (1 - m^2 / M^2)^2 in whole steps.
+/// Weights c (1 - m^2 / M^2)^2 in whole steps; 0 outside the support, and where a corrupt map makes
+/// m not a number.
 POINTFLIGHT_INLINE I8 weights_of(const KernelMap& map, const F8& m2) {
-  const F8 share = splat(1.0f) - m2 * splat(map.inverse_support);
+  const F8 support = splat(map.support_squared);
+  const F8 inside = select(m2 < support, m2, support);
+  const F8 share = splat(1.0f) - inside * splat(map.inverse_support);
   return to_int(splat(map.weight_scale) * share * share);
 }
 
