@@ -363,7 +363,8 @@ shares_of(const KernelMap& map, const F8& first, const F8& t, const I8& weight, 
   // lanes outside may be anything: they count nothing
   const F8 behind = select(inside, t - first, splat(0.0f));
   s.depth = s.weight * to_int(behind * splat(kShareSteps / map.window));
-  s.cosine = s.weight * to_int(cosine * splat(kShareSteps));
+  const F8 turned = select(inside, cosine, splat(0.0f));
+  s.cosine = s.weight * to_int(turned * splat(kShareSteps));
   return s;
 }
 
