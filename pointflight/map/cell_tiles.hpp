@@ -57,7 +57,6 @@ class CellTiles {
   [[nodiscard]] std::span<VoxelCell> cells_of(const CellTile& tile) const {
     return cells_.span().subspan(tile.begin, tile.count());
   }
-  [[nodiscard]] const VoxelCell& cell(std::size_t index) const { return cells_[index]; }
 
   /// Occupied cells.
   [[nodiscard]] std::size_t count() const;

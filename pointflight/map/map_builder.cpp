@@ -37,9 +37,8 @@ class Import {
         opener_(opener),
         options_(options),
         executor_(executor),
-        progress_(progress) {
-    map_.scratch = std::make_unique<Scratch>(options.scratch_folder, options.scratch_memory);
-  }
+        progress_(progress),
+        scratch_(options.scratch_folder, options.scratch_memory) {}
 
   ImportedMap run() {
     ImportReport& report = map_.report;
@@ -146,7 +145,7 @@ class Import {
       if (!accumulator && !points.empty()) {
         const Vector3d inside = middle.value_or(points.front().position);
         const Vector3d base = ((inside / r).array().floor() + kGridPhase) * r;
-        accumulator.emplace(VoxelFrame{base, r}, executor_, *map_.scratch, options_.cells_memory);
+        accumulator.emplace(VoxelFrame{base, r}, executor_, scratch_, options_.cells_memory);
       }
       if (!points.empty()) report.points_out_of_reach += accumulator->add(points);
       if (measures_spacing) spacing_.add(points, executor_);
@@ -156,7 +155,7 @@ class Import {
 
   void drop_outliers() {
     Outliers outliers =
-        pointflight::drop_outliers(cells_, options_.outliers, executor_, *map_.scratch, progress_);
+        pointflight::drop_outliers(cells_, options_.outliers, executor_, scratch_, progress_);
     map_.report.outlier_cells = outliers.centroids_world.size();
     map_.report.outlier_points = outliers.points;
     map_.outliers = std::move(outliers.centroids_world);
@@ -167,14 +166,13 @@ class Import {
     ImportReport& report = map_.report;
     report.noise = estimate_noise(cells_, executor_);
     if (!needs_projection(cells_, report.noise)) return;
-    cells_ =
-        project_noise(cells_, report.noise, executor_, *map_.scratch, report.projection, progress_);
+    cells_ = project_noise(cells_, report.noise, executor_, scratch_, report.projection, progress_);
   }
 
   void build_tree() {
     ImportReport& report = map_.report;
     find_bounds();
-    const auto surfels = fit_surfels(cells_, executor_, *map_.scratch, progress_);
+    const auto surfels = fit_surfels(cells_, executor_, scratch_, progress_);
     pointflight::report(progress_, "closing gaps of thin scans", 0.0);
     report.grown_surfels = grow_sparse_surfels(cells_, surfels, executor_, progress_);
     report.surfels = surfels.size();
@@ -187,7 +185,7 @@ class Import {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       input.low[axis] = static_cast<std::uint32_t>(min_voxel_[axis] + kMaxVoxel);
     }
-    map_.tree = build_bvh8(input, options_.quality, executor_, *map_.scratch);
+    map_.tree = build_bvh8(input, options_.quality, executor_, scratch_);
     pointflight::report(progress_, "building the hierarchy", 1.0);
   }
 
@@ -288,7 +286,7 @@ class Import {
     const float step = (max - min) / 255.0f;
     map_.description.intensity_offset = min;
     map_.description.intensity_step = std::isfinite(step) ? step : 0.0f;
-    ScratchArray<std::uint8_t> codes(*map_.scratch, cells_.count());
+    ScratchArray<std::uint8_t> codes(scratch_, cells_.count());
     const std::vector<std::size_t> first = cells_.first_numbers();
     cells_.for_each_tile(executor_, [&](std::size_t t, std::span<VoxelCell> cells) {
       for (std::size_t i = 0; i < cells.size(); ++i) {
@@ -342,6 +340,7 @@ class Import {
   const ImportOptions& options_;
   const Executor& executor_;
   const Progress& progress_;
+  Scratch scratch_;
   SpacingEstimate spacing_;
   CellTiles cells_;
   std::array<std::int32_t, 3> min_voxel_{};

@@ -55,7 +55,6 @@ struct ImportReport {
 
 /// A finished import in memory.
 struct ImportedMap {
-  std::unique_ptr<Scratch> scratch;  ///< Of the tree.
   Bvh8 tree;
   MapDescription description;
   ImportReport report;

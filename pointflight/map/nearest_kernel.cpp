@@ -1,29 +1,17 @@
 // Compiled once for each instruction set; one is picked at run time.
 #include "pointflight/map/nearest_kernel.hpp"
 
-#include <bit>
-#include <cstring>
-
 #include "pointflight/core/simd_targets.hpp"
 // for foreach_target
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "pointflight/map/nearest_kernel.cpp"
 #include <hwy/foreach_target.h>
 // after foreach_target
+#include "pointflight/map/children-inl.hpp"
 #include "pointflight/map/surfel_lanes-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace pointflight::HWY_NAMESPACE {
-
-/// 7 siblings a level and 60 levels of Morton bits; a corrupt map stops being followed here.
-inline constexpr std::size_t kStack = 512;
-
-/// A subtree or leaf that may hold something nearer.
-struct Waiting {
-  float bound;  ///< Lower bound of the squared distance.
-  std::uint32_t index;
-  std::uint32_t meta;
-};
 
 /// Squared distances from a point to the boxes of eight children.
 POINTFLIGHT_INLINE F8 child_bounds(const Bvh8Node& node, const float* p) {
@@ -60,31 +48,6 @@ POINTFLIGHT_INLINE F8 surfel_distances(const SurfelScale& scale,
          outside(e.m2x * x + e.m2y * y + e.m2z * z, s2);
 }
 
-/// Pushes the children of a node that lie nearer than `limit`, the nearest on top. Returns the new
-/// depth of the stack.
-POINTFLIGHT_INLINE std::size_t push_near(
-    const Bvh8Node& node, const float* p, float limit, Waiting* stack, std::size_t depth) {
-  alignas(32) float bounds[8];
-  const F8 all = child_bounds(node, p);
-  store(all, bounds);
-  const std::uint32_t near_by = bits(all <= splat(limit));
-  std::uint32_t inner = node.first_inner;
-  std::uint32_t word = node.first_leaf_word;
-  const std::size_t bottom = depth;
-  for (std::uint32_t i = 0; i < 8 && near_by >> i != 0; ++i) {
-    const std::uint32_t meta = node.meta[i];
-    const bool is_inner = meta == Bvh8Node::kInner;
-    const std::uint32_t index = is_inner ? inner : word;
-    inner += is_inner ? 1u : 0u;
-    word += is_inner || meta == 0 ? 0u : meta + 1u;
-    if ((near_by >> i & 1u) == 0 || meta == 0 || depth == kStack) continue;
-    std::size_t at = depth++;
-    for (; at > bottom && stack[at - 1].bound < bounds[i]; --at) stack[at] = stack[at - 1];
-    stack[at] = {bounds[i], index, meta};
-  }
-  return depth;
-}
-
 static NearestWord nearest(const Bvh8Node* nodes,
                            std::size_t node_count,
                            const SurfelWord* words,
@@ -93,7 +56,7 @@ static NearestWord nearest(const Bvh8Node* nodes,
                            double resolution,
                            const double* point,
                            float limit) {
-  Waiting stack[kStack];
+  Entry stack[kStack];  // t: a lower bound of the squared distance
   std::size_t depth = 0;
   NearestWord best;
   best.squared_distance = limit;
@@ -104,8 +67,8 @@ static NearestWord nearest(const Bvh8Node* nodes,
   std::size_t steps = node_count * 9 + 16;  // more visits than children: a cycle
   alignas(32) float bounds[8];
   while (depth > 0 && steps-- > 0) {
-    const Waiting entry = stack[--depth];
-    if (entry.bound > best.squared_distance) continue;
+    const Entry entry = stack[--depth];
+    if (entry.t > best.squared_distance) continue;
     if (entry.meta != Bvh8Node::kInner) {
       if (entry.meta - 1u > 7u || entry.index + entry.meta + kLeafPadding >= word_count) continue;
       const LeafHeader leaf = decode_leaf(words[entry.index]);
@@ -121,7 +84,11 @@ static NearestWord nearest(const Bvh8Node* nodes,
       continue;
     }
     if (entry.index >= node_count) continue;
-    depth = push_near(nodes[entry.index], p, best.squared_distance, stack, depth);
+    const Bvh8Node& node = nodes[entry.index];
+    const F8 distances = child_bounds(node, p);
+    store(distances, bounds);
+    const std::uint32_t near_by = bits(distances <= splat(best.squared_distance));
+    depth = push_children(node, near_by, bounds, stack, depth, [](const Entry&) {});
   }
   return best;
 }

@@ -47,6 +47,7 @@ class SurfelMap {
   [[nodiscard]] const Vector3d& origin_world() const { return origin_; }  ///< Of voxel (0, 0, 0).
   [[nodiscard]] const Aabb& bounds_world() const { return bounds_; }  ///< Of the surfel centres.
   [[nodiscard]] const RenderModel& model() const { return model_; }
+  [[nodiscard]] const SurfelScale& scale() const { return scale_; }
   [[nodiscard]] std::uint64_t surfel_count() const { return surfel_count_; }
   [[nodiscard]] std::uint64_t file_size() const { return file_size_; }
 

@@ -37,7 +37,7 @@ KernelMap kernel_map_of(const SurfelMap& map) {
   k.inverse_support = 1.0f / k.support_squared;
   // c = 36 / (pi M^2): the weights of a covered plane average 1
   k.weight_scale = kWeightOne * 36.0f / (static_cast<float>(kPi) * k.support_squared);
-  k.scale = SurfelScale(static_cast<float>(map.resolution()));
+  k.scale = map.scale();
   k.window = m.window * static_cast<float>(map.resolution());
   k.widest_group = std::min(0.06f, 0.26f * static_cast<float>(map.resolution()));
   k.tau = static_cast<std::int32_t>(m.tau * kWeightOne);

@@ -1,0 +1,86 @@
+// The way down the tree that beams, packets and distances share: where the children of a node lie,
+// and a stack with the nearest on top.
+//
+// Included once a target by Highway's foreach_target; see nearest_kernel.cpp and
+// render/beam_kernel.cpp.
+#if defined(POINTFLIGHT_MAP_CHILDREN_INL_HPP) == defined(HWY_TARGET_TOGGLE)
+#ifdef POINTFLIGHT_MAP_CHILDREN_INL_HPP
+#undef POINTFLIGHT_MAP_CHILDREN_INL_HPP
+#else
+#define POINTFLIGHT_MAP_CHILDREN_INL_HPP
+#endif
+
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+
+#include "pointflight/core/simd8-inl.hpp"
+#include "pointflight/map/bvh8.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace pointflight::HWY_NAMESPACE {
+
+/// 7 siblings a level and 60 levels of Morton bits; a corrupt map stops being followed here.
+inline constexpr std::size_t kStack = 512;
+
+/// A node or leaf that waits to be visited.
+struct Entry {
+  float t;              ///< How far it is: what its visitor orders by, the least first.
+  std::uint32_t index;  ///< Node, or word of a leaf's header.
+  std::uint32_t meta;   ///< Bvh8Node::meta
+};
+
+POINTFLIGHT_INLINE std::uint64_t meta_of(const Bvh8Node& node) {
+  std::uint64_t meta = 0;
+  std::memcpy(&meta, node.meta, 8);
+  return meta;
+}
+
+/// The child in a lane of a node: inner ones are consecutive, and so are the words of leaves.
+POINTFLIGHT_INLINE Entry child_of(const Bvh8Node& node,
+                                  std::uint64_t meta,
+                                  const float* distances,
+                                  int lane) {
+  constexpr std::uint64_t kOnes = 0x0101010101010101ull;
+  const int shift = 8 * lane;
+  const std::uint64_t before = meta & ((1ull << shift) - 1ull);
+  const auto own = static_cast<std::uint32_t>(meta >> shift) & 0xffu;
+  if (own == Bvh8Node::kInner) {
+    const auto nodes_before = static_cast<std::uint32_t>(std::popcount(before & (0x80ull * kOnes)));
+    return {distances[lane], node.first_inner + nodes_before, own};
+  }
+  // a leaf of n surfels has n + 1 words
+  const std::uint64_t counts = before & (0x7full * kOnes);
+  const std::uint64_t words = counts + (((counts + 0x7full * kOnes) >> 7) & kOnes);
+  return {distances[lane],
+          node.first_leaf_word + static_cast<std::uint32_t>((words * kOnes) >> 56),
+          own};
+}
+
+/// Pushes the children of a node that have their bit in `which`, the nearest on top; `fetch` is
+/// told of each. Returns the new depth of the stack.
+template <class Fetch>
+POINTFLIGHT_INLINE std::size_t push_children(const Bvh8Node& node,
+                                             std::uint32_t which,
+                                             const float* distances,
+                                             Entry* stack,
+                                             std::size_t depth,
+                                             const Fetch& fetch) {
+  const std::uint64_t meta = meta_of(node);
+  const std::size_t bottom = depth;
+  for (; which != 0 && depth < kStack; which &= which - 1) {
+    const Entry child = child_of(node, meta, distances, std::countr_zero(which));
+    if (child.meta == 0) continue;
+    fetch(child);
+    std::size_t at = depth++;
+    for (; at > bottom && stack[at - 1].t < child.t; --at) stack[at] = stack[at - 1];
+    stack[at] = child;
+  }
+  return depth;
+}
+
+}  // namespace pointflight::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif
