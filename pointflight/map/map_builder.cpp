@@ -25,6 +25,18 @@ constexpr double kDefaultMeshResolution = 0.05;
 // walls that coincide with cell faces would split into two layers of cells
 constexpr double kGridPhase = -0.37;
 
+/// Coverage that makes a return, by the median of points a planar cell: measured between 1 and 80
+/// points a cell, on exact scenes and on real scans (docs/fidelity.md).
+double tau_for(double points_per_cell) {
+  constexpr double kThin = 2.0;
+  constexpr double kFair = 6.0;
+  constexpr double kDense = 40.0;
+  const auto share = [&](double from, double to) {
+    return std::clamp((points_per_cell - from) / (to - from), 0.0, 1.0);
+  };
+  return 0.24 + 0.13 * share(kThin, kFair) + 0.03 * share(kFair, kDense);
+}
+
 /// One import: the passes over the points in order.
 class Import {
  public:
@@ -232,10 +244,8 @@ class Import {
         map_.report.resolution * Vector3d(min_voxel_[0], min_voxel_[1], min_voxel_[2]);
   }
 
-  /// Dense maps have few holes to bridge and can have sharper edges.
+  /// Thin maps have holes to bridge; the denser, the sharper their edges can be.
   void choose_tau(const ScratchArray<BuildSurfel>& surfels) {
-    constexpr double kThin = 16.0;
-    constexpr double kDense = 40.0;
     constexpr std::size_t kMostPoints = 1 << 12;
     ImportReport& report = map_.report;
     std::vector<std::uint64_t> cells_with(kMostPoints + 1, 0);
@@ -258,8 +268,7 @@ class Import {
       report.points_per_cell = static_cast<double>(n);
       break;
     }
-    const double share = std::clamp((report.points_per_cell - kThin) / (kDense - kThin), 0.0, 1.0);
-    report.tau = options_.tau.value_or(static_cast<float>(0.30 + 0.10 * share));
+    report.tau = options_.tau.value_or(static_cast<float>(tau_for(report.points_per_cell)));
   }
 
   /// Mean intensity of each cell as a byte between the least and the greatest.

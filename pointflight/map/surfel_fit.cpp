@@ -1,7 +1,9 @@
 #include "pointflight/map/surfel_fit.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 
 #include "pointflight/map/covariance_axes.hpp"
 
@@ -16,6 +18,9 @@ constexpr double kLoosePrior = 0.65;
 // beams get through the wall; above, it tells how much of the cell the surface fills
 constexpr double kWatertight = 0.28;  // r; a filled cell has 0.289
 constexpr double kTrustedPoints = 40.0;
+// within a surface, where no edge can grow fat
+constexpr double kWithin = 0.32;      // r
+constexpr double kSameSurface = 0.4;  // r across the plane
 
 /// Frame with the plane's normal first and the direction within it last in which the cell's own
 /// points spread most.
@@ -39,6 +44,32 @@ Matrix3d planar_frame(const CovarianceAxes& plane, const Matrix3d& own_covarianc
   Matrix3d frame;
   frame << normal, longest.cross(normal), longest;
   return frame;
+}
+
+/// True if the surface goes on from the cell to all sides: neighbours near the plane of `frame` in
+/// each of six sectors.
+bool lies_within_surface(NeighbourWindow& window,
+                         const VoxelCell& cell,
+                         const Vector3d& center,
+                         const Matrix3d& frame,
+                         double r) {
+  const Vector3d normal = frame.col(0);
+  const Vector3d across = std::sqrt(3.0) * frame.col(1);
+  const Vector3d along = frame.col(2);
+  std::uint32_t sectors = 0;
+  window.for_each(cell, 1, [&](const VoxelCell& other, int dx, int dy, int dz) {
+    // the way between the centroids, times the other's points
+    const double n = other.n;
+    const Vector3d way = Vector3d(other.sum[0], other.sum[1], other.sum[2]) +
+                         n * (r * Vector3d(dx, dy, dz) - center);
+    if (&other == &cell || std::abs(way.dot(normal)) > kSameSurface * r * n) return;
+    const double u = way.dot(across);
+    const double v = way.dot(along);
+    // three lines through the centre
+    const int sector = (v > 0.0 ? 1 : 0) | (v > u ? 2 : 0) | (v > -u ? 4 : 0);
+    sectors |= 1u << sector;
+  });
+  return std::popcount(sectors) == 6;
 }
 
 }  // namespace
@@ -86,7 +117,8 @@ Surfel fit_surfel(const VoxelGrid& grid, NeighbourWindow& window, const VoxelCel
   }
   if (planar) s[0] = static_cast<double>(kPlanarThickness);
   const bool surface = neighbours_planar && around.lambda[1] >= 0.1 * around.lambda[2];
-  const double floor = surface && own.n <= kTrustedPoints ? kWatertight : double{kMinSpread};
+  double floor = surface && own.n <= kTrustedPoints ? kWatertight : double{kMinSpread};
+  if (neighbours_planar && lies_within_surface(window, cell, own.mean(), frame, r)) floor = kWithin;
   s[1] = std::clamp(s[1], floor, 0.45);
   s[2] = std::clamp(s[2], floor, 0.45);
   Matrix3d ordered = frame;

@@ -52,6 +52,33 @@ TEST(Import, SurfelsOfAPlaneLieOnItWithItsNormal) {
   map->verify();
 }
 
+TEST(Import, OnlyWhereASurfaceGoesOnSurfelsAreWidened) {
+  ShapeScene plane;
+  plane.add_rectangle({0, 0, 0}, {2, 0, 0}, {0, 2, 0});
+  const auto map = map_of(plane, 0.1, 60.0);
+  // a filled cell has 1 / 12; steps of the words are coarse, so means
+  double within = 0.0;
+  double at_edge = 0.0;
+  std::size_t within_count = 0;
+  std::size_t edge_count = 0;
+  map->for_each_surfel([&](const Vector3d& center, const Vector3d&, double, std::uint32_t word) {
+    const Surfel surfel = decode(map->words()[word]);
+    const double inside = std::min({center.x(), center.y(), 2.0 - center.x(), 2.0 - center.y()});
+    const auto area = static_cast<double>(surfel.s[1] * surfel.s[2]);
+    if (inside > 0.15) {
+      within += area;
+      ++within_count;
+    } else if (inside < 0.05) {
+      at_edge += area;
+      ++edge_count;
+    }
+  });
+  ASSERT_GT(within_count, 250u);
+  ASSERT_GT(edge_count, 50u);
+  EXPECT_GT(within / static_cast<double>(within_count), 1.1 / 12.0);
+  EXPECT_LT(at_edge / static_cast<double>(edge_count), 1.0 / 12.0);
+}
+
 TEST(Import, AMapInUtmCoordinatesIsAsExactAsOneAtZero) {
   const Vector3d shift(500000.0, 5400000.0, 300.0);
   std::vector<Vector3d> here;
