@@ -147,10 +147,10 @@ void add_import(CLI::App& parent) {
   app->add_option("--up", flags->up, "The files' up axis; y is turned to z")
       ->check(CLI::IsMember({"y", "z"}))
       ->capture_default_str();
-  app->add_option(
-         "--quality",
-         flags->quality,
-         "Of the hierarchy: normal builds it five times faster, rays in foliage are a fifth slower")
+  app->add_option("--quality",
+                  flags->quality,
+                  "Of the hierarchy: normal builds it three times faster, rays in foliage are a "
+                  "fifth slower")
       ->check(CLI::IsMember({"normal", "high"}))
       ->capture_default_str();
   app->add_option("--tau",

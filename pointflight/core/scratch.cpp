@@ -5,6 +5,7 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstdlib>
 #include <filesystem>
@@ -94,10 +95,11 @@ ScratchBlock& ScratchBlock::operator=(ScratchBlock&& other) noexcept {
 }
 
 void ScratchBlock::release(std::size_t begin, std::size_t end) const {
-  // whole pages within the range
-  const std::size_t first = (begin + kPage - 1) / kPage * kPage;
-  const std::size_t last = end / kPage * kPage;
-  if (in_file_ && data_ != nullptr && first < last) {
+  // pages that are shared with a neighbour too: the file keeps what is in them, and ranges may be
+  // smaller than pages
+  const std::size_t first = begin / kPage * kPage;
+  const std::size_t last = std::min(bytes_, (end + kPage - 1) / kPage * kPage);
+  if (in_file_ && data_ != nullptr && begin < end) {
     ::madvise(data_ + first, last - first, MADV_DONTNEED);
   }
 }

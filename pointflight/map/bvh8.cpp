@@ -25,7 +25,7 @@ class TreeBuilder {
       top_.emplace_back();
       plan(0, {0, surfels_.count()});
       executor.parallel_for(
-          parts_.size(), 1, [&](std::size_t i, std::size_t) { parts_[i].part.build(); });
+          parts_.size(), 1, [&](std::size_t i, std::size_t) { parts_[i].part.build(scratch); });
     }
     return assemble(scratch);
   }
@@ -110,9 +110,10 @@ class TreeBuilder {
       tree.nodes[i == 0 ? p.slot : node_at + i - 1] = node;
     }
     std::copy(part.words.begin(), part.words.end(), tree.words.begin() + word_at);
-    if (!part.intensity.empty()) {
+    if (part.intensity.size() > 0) {
       std::copy(part.intensity.begin(), part.intensity.end(), tree.intensity.begin() + word_at);
     }
+    tree.nodes.release(node_at, node_at + part.nodes.size() - 1);
     tree.words.release(word_at, word_at + part.words.size());
   }
 

@@ -12,6 +12,15 @@ namespace {
 constexpr std::size_t kMaxLeafSurfels = 8;
 constexpr std::uint32_t kMaxLeafVoxels = 13;  // 10 bits at r / 64 reach 16
 
+/// Values that are complete, in an array of just their size: many parts wait at the same time.
+template <class T>
+ScratchArray<T> stored(Scratch& scratch, std::vector<T> values) {
+  ScratchArray<T> array(scratch, values.size());
+  std::copy(values.begin(), values.end(), array.begin());
+  array.release(0, array.size());
+  return array;
+}
+
 double leaves_of(std::size_t count) {
   const std::size_t leaves = (count + kMaxLeafSurfels - 1) / kMaxLeafSurfels;
   return static_cast<double>(leaves);
@@ -140,7 +149,7 @@ void quantise(const Box& whole, std::span<const Box> boxes, Bvh8Node& node) {
   }
 }
 
-void TreePart::build() {
+void TreePart::build(Scratch& scratch) {
   order_.resize(range_.count());
   std::iota(order_.begin(), order_.end(), 0u);
   if (quality_ == TreeQuality::kHigh) {
@@ -149,14 +158,15 @@ void TreePart::build() {
       boxes_.push_back(surfels_.support_box(surfels_.word(i), surfels_.voxel(i)));
     }
   }
-  nodes.emplace_back();
+  new_nodes_.emplace_back();
   box = build_node(0, {0, order_.size()});
-  order_ = {};
-  boxes_ = {};
+  // "= {}" would keep the room
+  order_ = std::vector<std::uint32_t>();
+  boxes_ = std::vector<Box>();
   surfels_.release(range_);
-  nodes.shrink_to_fit();
-  words.shrink_to_fit();
-  intensity.shrink_to_fit();
+  nodes = stored(scratch, std::move(new_nodes_));
+  words = stored(scratch, std::move(new_words_));
+  intensity = stored(scratch, std::move(new_intensity_));
 }
 
 void TreePart::clear() {
@@ -173,8 +183,8 @@ Box TreePart::build_node(std::size_t index, const Range& range) {
       [this](const Range& part) { return split(part); });
   std::array<std::uint8_t, 8> meta{};
   std::array<Box, 8> boxes;
-  const std::size_t first_leaf_word = words.size();
-  const std::size_t first_inner = nodes.size();
+  const std::size_t first_leaf_word = new_words_.size();
+  const std::size_t first_inner = new_nodes_.size();
   std::size_t inner_count = 0;
   for (std::size_t i = 0; i < children.count; ++i) {
     if (is_leaf(children.ranges[i])) {
@@ -185,14 +195,14 @@ Box TreePart::build_node(std::size_t index, const Range& range) {
       ++inner_count;
     }
   }
-  nodes.resize(first_inner + inner_count);
+  new_nodes_.resize(first_inner + inner_count);
   std::size_t next_inner = first_inner;
   for (std::size_t i = 0; i < children.count; ++i) {
     if (meta[i] == Bvh8Node::kInner) boxes[i] = build_node(next_inner++, children.ranges[i]);
   }
   Box whole;
   for (std::size_t i = 0; i < children.count; ++i) whole.add(boxes[i]);
-  Bvh8Node& node = nodes[index];
+  Bvh8Node& node = new_nodes_[index];
   node = {};
   node.first_inner = static_cast<std::uint32_t>(first_inner);
   node.first_leaf_word = static_cast<std::uint32_t>(first_leaf_word);
@@ -263,9 +273,9 @@ Split TreePart::split_by_area(const Range& range) {
 
 Box TreePart::append_leaf(const Range& range) {
   const Voxel origin = voxel_bounds(range).first;
-  words.push_back(encode(
+  new_words_.push_back(encode(
       LeafHeader{origin[0], origin[1], origin[2], static_cast<std::uint32_t>(range.count())}));
-  if (surfels_.has_intensity()) intensity.push_back(0);
+  if (surfels_.has_intensity()) new_intensity_.push_back(0);
   Box whole;
   for (std::size_t i = range.begin; i < range.end; ++i) {
     const Voxel voxel = surfels_.voxel(surfel(i));
@@ -274,8 +284,8 @@ Box TreePart::append_leaf(const Range& range) {
       // 64 steps a voxel
       word += static_cast<SurfelWord>(voxel[axis] - origin[axis]) << (6 + 10 * axis);
     }
-    words.push_back(word);
-    if (surfels_.has_intensity()) intensity.push_back(surfels_.intensity(surfel(i)));
+    new_words_.push_back(word);
+    if (surfels_.has_intensity()) new_intensity_.push_back(surfels_.intensity(surfel(i)));
     whole.add(surfels_.support_box(word, origin));
   }
   return whole;

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "pointflight/core/scratch.hpp"
 #include "pointflight/geometry/morton.hpp"
 #include "pointflight/map/bvh8.hpp"
 
@@ -122,12 +123,12 @@ class TreePart {
   TreePart(const Surfels& surfels, const Range& range, TreeQuality quality)
       : surfels_(surfels), range_(range), quality_(quality) {}
 
-  std::vector<Bvh8Node> nodes;
-  std::vector<SurfelWord> words;
-  std::vector<std::uint8_t> intensity;
+  ScratchArray<Bvh8Node> nodes;
+  ScratchArray<SurfelWord> words;
+  ScratchArray<std::uint8_t> intensity;
   Box box;
 
-  void build();
+  void build(Scratch& scratch);
 
   /// Forgets all but the box.
   void clear();
@@ -149,6 +150,10 @@ class TreePart {
   const Surfels& surfels_;
   Range range_;
   TreeQuality quality_;
+  // while it grows; the scratch arrays above have their exact sizes
+  std::vector<Bvh8Node> new_nodes_;
+  std::vector<SurfelWord> new_words_;
+  std::vector<std::uint8_t> new_intensity_;
   std::vector<std::uint32_t> order_;  ///< Of the surfels in the leaves; by Morton code at first.
   std::vector<Box> boxes_;            ///< For kHigh, in the order of the input.
 };

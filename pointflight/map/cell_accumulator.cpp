@@ -22,32 +22,52 @@ std::size_t shard_of(const std::array<std::int32_t, 3>& voxel, std::size_t shard
 /// A tile's cells within a run.
 struct Segment {
   std::uint64_t key;
-  const ScratchArray<VoxelCell>* run;
-  std::size_t begin;
-  std::size_t end;
-
-  [[nodiscard]] std::span<const VoxelCell> cells() const {
-    return run->span().subspan(begin, end - begin);
-  }
-  void release() const { run->release(begin, end); }
+  std::size_t shard;
+  std::span<const VoxelCell> cells;
 };
 
-/// The tiles of the sorted cells [begin, end) of a run.
-void append_segments(const ScratchArray<VoxelCell>& run,
-                     std::size_t begin,
-                     std::size_t end,
+/// The tiles of a shard's sorted cells in a run.
+void append_segments(std::span<const VoxelCell> cells,
+                     std::size_t shard,
                      std::vector<Segment>& segments) {
-  while (begin < end) {
-    const std::uint64_t key = tile_key(run[begin].voxel);
-    const VoxelCell* behind =
-        std::partition_point(run.data() + begin, run.data() + end, [key](const VoxelCell& c) {
-          return tile_key(c.voxel) == key;
-        });
-    const auto next = static_cast<std::size_t>(behind - run.data());
-    segments.push_back({key, &run, begin, next});
-    begin = next;
+  while (!cells.empty()) {
+    const std::uint64_t key = tile_key(cells.front().voxel);
+    const auto behind = std::partition_point(cells.begin(), cells.end(), [key](const auto& cell) {
+      return tile_key(cell.voxel) == key;
+    });
+    const auto count = static_cast<std::size_t>(behind - cells.begin());
+    segments.push_back({key, shard, cells.first(count)});
+    cells = cells.subspan(count);
   }
 }
+
+/// Writes the cells of a tile, in Morton order, from its begin on, and sets its end.
+void merge(const VoxelFrame& frame,
+           std::span<const Segment> segments,
+           CellTile& tile,
+           const ScratchArray<VoxelCell>& cells) {
+  tile.end = tile.begin;
+  if (segments.size() == 1) {
+    const auto only = segments[0].cells;
+    std::copy(only.begin(), only.end(), cells.begin() + tile.begin);
+    tile.end += only.size();
+  } else {
+    VoxelGrid merged(frame);
+    for (const Segment& segment : segments) {
+      for (const VoxelCell& cell : segment.cells) merged.add(cell);
+    }
+    for (const std::uint32_t cell : merged.morton_order()) {
+      cells[tile.end++] = merged.cells()[cell];
+    }
+  }
+  cells.release(tile.begin, tile.end);
+}
+
+/// A tile and its part in every run.
+struct TileOfRuns {
+  std::span<const Segment> segments;
+  CellTile* tile;
+};
 
 }  // namespace
 
@@ -128,7 +148,7 @@ CellTiles CellAccumulator::finish() {
   std::vector<Segment> segments;
   for (const Run& run : runs_) {
     for (std::size_t shard = 0; shard < kShards; ++shard) {
-      append_segments(run.cells, run.first[shard], run.first[shard + 1], segments);
+      append_segments(run.of_shard(shard), shard, segments);
     }
     run.cells.release(0, run.cells.size());
   }
@@ -144,31 +164,24 @@ CellTiles CellAccumulator::finish() {
       tiles.push_back({segments[i].key, room, room});
       first_segment.push_back(i);
     }
-    room += segments[i].cells().size();
+    room += segments[i].cells.size();
   }
   first_segment.push_back(segments.size());
-  ScratchArray<VoxelCell> cells(scratch_, room);
-  executor_.parallel_for(tiles.size(), 1, [&](std::size_t i, std::size_t) {
-    CellTile& tile = tiles[i];
+  std::array<std::vector<TileOfRuns>, kShards> of_shard;
+  for (std::size_t i = 0; i < tiles.size(); ++i) {
     const auto of_tile =
         std::span(segments).subspan(first_segment[i], first_segment[i + 1] - first_segment[i]);
-    tile.end = tile.begin;
-    if (of_tile.size() == 1) {
-      const auto only = of_tile[0].cells();
-      std::copy(only.begin(), only.end(), cells.begin() + tile.begin);
-      tile.end += only.size();
-    } else {
-      VoxelGrid merged(frame_);
-      for (const Segment& segment : of_tile) {
-        for (const VoxelCell& cell : segment.cells()) merged.add(cell);
-      }
-      for (const std::uint32_t cell : merged.morton_order()) {
-        cells[tile.end++] = merged.cells()[cell];
-      }
-    }
-    cells.release(tile.begin, tile.end);
-    for (const Segment& segment : of_tile) segment.release();
-  });
+    of_shard[of_tile.front().shard].push_back({of_tile, &tiles[i]});
+  }
+  ScratchArray<VoxelCell> cells(scratch_, room);
+  // shard by shard: its cells lie together in every run, and leave memory together
+  for (std::size_t shard = 0; shard < kShards; ++shard) {
+    const auto& todo = of_shard[shard];
+    executor_.parallel_for(todo.size(), 1, [&](std::size_t i, std::size_t) {
+      merge(frame_, todo[i].segments, *todo[i].tile, cells);
+    });
+    for (const Run& run : runs_) run.cells.release(run.first[shard], run.first[shard + 1]);
+  }
   runs_.clear();
   return {frame_, std::move(cells), std::move(tiles)};
 }

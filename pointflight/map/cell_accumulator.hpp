@@ -43,6 +43,9 @@ class CellAccumulator {
   struct Run {
     ScratchArray<VoxelCell> cells;
     std::array<std::size_t, kShards + 1> first{};
+    [[nodiscard]] std::span<const VoxelCell> of_shard(std::size_t shard) const {
+      return cells.span().subspan(first[shard], first[shard + 1] - first[shard]);
+    }
   };
 
   void sort_points(std::span<const CloudPoint> points, Chunk& chunk) const;

@@ -162,6 +162,7 @@ class Import {
       if (!points.empty()) report.points_out_of_reach += accumulator->add(points);
       if (measures_spacing) spacing_.add(points, executor_);
     });
+    pointflight::report(progress_, "sorting cells", 0.0);
     cells_ = accumulator->finish();
   }
 
