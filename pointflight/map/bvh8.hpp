@@ -29,7 +29,7 @@ static_assert(sizeof(Bvh8Node) == 80);
 inline constexpr std::size_t kLeafPadding = 8;
 
 /// Half width, in standard deviations, of the ellipsoid outside which a surfel has no weight.
-inline constexpr float kSupport = 3.8f;
+inline constexpr float kSupport = 3.7f;
 
 /// One surfel on its way into the tree.
 struct BuildSurfel {

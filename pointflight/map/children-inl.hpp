@@ -10,6 +10,8 @@
 #define POINTFLIGHT_MAP_CHILDREN_INL_HPP
 #endif
 
+#include <hwy/cache_control.h>
+
 #include <bit>
 #include <cstddef>
 #include <cstdint>
@@ -58,21 +60,31 @@ POINTFLIGHT_INLINE Entry child_of(const Bvh8Node& node,
           own};
 }
 
-/// Pushes the children of a node that have their bit in `which`, the nearest on top; `fetch` is
-/// told of each. Returns the new depth of the stack.
-template <class Fetch>
-POINTFLIGHT_INLINE std::size_t push_children(const Bvh8Node& node,
+POINTFLIGHT_INLINE void prefetch(const Bvh8Node* nodes,
+                                 const SurfelWord* words,
+                                 const Entry& entry) {
+  const char* place = entry.meta == Bvh8Node::kInner
+                          ? reinterpret_cast<const char*>(nodes + entry.index)
+                          : reinterpret_cast<const char*>(words + entry.index);
+  hwy::Prefetch(place);
+  hwy::Prefetch(place + 64);
+}
+
+/// Pushes the children of a node that have their bit in `which`, the nearest on top. Returns the
+/// new depth of the stack.
+POINTFLIGHT_INLINE std::size_t push_children(const Bvh8Node* nodes,
+                                             const SurfelWord* words,
+                                             const Bvh8Node& node,
                                              std::uint32_t which,
                                              const float* distances,
                                              Entry* stack,
-                                             std::size_t depth,
-                                             const Fetch& fetch) {
+                                             std::size_t depth) {
   const std::uint64_t meta = meta_of(node);
   const std::size_t bottom = depth;
   for (; which != 0 && depth < kStack; which &= which - 1) {
     const Entry child = child_of(node, meta, distances, std::countr_zero(which));
     if (child.meta == 0) continue;
-    fetch(child);
+    prefetch(nodes, words, child);
     std::size_t at = depth++;
     for (; at > bottom && stack[at - 1].t < child.t; --at) stack[at] = stack[at - 1];
     stack[at] = child;

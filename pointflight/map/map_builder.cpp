@@ -30,11 +30,12 @@ constexpr double kGridPhase = -0.37;
 double tau_for(double points_per_cell) {
   constexpr double kThin = 2.0;
   constexpr double kFair = 6.0;
-  constexpr double kDense = 40.0;
+  constexpr double kMany = 32.0;
+  constexpr double kDense = 64.0;
   const auto share = [&](double from, double to) {
     return std::clamp((points_per_cell - from) / (to - from), 0.0, 1.0);
   };
-  return 0.24 + 0.13 * share(kThin, kFair) + 0.03 * share(kFair, kDense);
+  return 0.23 + 0.13 * share(kThin, kFair) + 0.04 * share(kMany, kDense);
 }
 
 /// One import: the passes over the points in order.

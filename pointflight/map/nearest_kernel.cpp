@@ -88,7 +88,7 @@ static NearestWord nearest(const Bvh8Node* nodes,
     const F8 distances = child_bounds(node, p);
     store(distances, bounds);
     const std::uint32_t near_by = bits(distances <= splat(best.squared_distance));
-    depth = push_children(node, near_by, bounds, stack, depth, [](const Entry&) {});
+    depth = push_children(nodes, words, node, near_by, bounds, stack, depth);
   }
   return best;
 }

@@ -8,8 +8,6 @@
 #define POINTFLIGHT_RENDER_BEAM_KERNEL_INL_HPP
 #endif
 
-#include <hwy/cache_control.h>
-
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -97,14 +95,6 @@ POINTFLIGHT_INLINE std::uint32_t test_node(RayState& s) {
   }
   store(enter, s.enter);
   return bits(enter <= leave);
-}
-
-POINTFLIGHT_INLINE void prefetch(const KernelMap& map, const Entry& entry) {
-  const char* place = entry.meta == Bvh8Node::kInner
-                          ? reinterpret_cast<const char*>(map.nodes + entry.index)
-                          : reinterpret_cast<const char*>(map.words + entry.index);
-  hwy::Prefetch(place);
-  hwy::Prefetch(place + 64);
 }
 
 /// Looks for the surface; what lies behind it no longer matters.
@@ -196,10 +186,10 @@ POINTFLIGHT_INLINE bool advance(const KernelMap& map,
     const std::uint32_t others = entered & (entered - 1);
     if ((others & (others - 1)) == 0) {
       Entry next = child_of(*s.node, meta, s.enter, std::countr_zero(entered));
-      prefetch(map, next);
+      prefetch(map.nodes, map.words, next);
       if (others != 0 && s.depth < kStack) {
         const Entry other = child_of(*s.node, meta, s.enter, std::countr_zero(others));
-        prefetch(map, other);
+        prefetch(map.nodes, map.words, other);
         const bool swapped = other.t < next.t;
         s.stack[s.depth++] = swapped ? next : other;
         next = swapped ? other : next;
@@ -211,8 +201,7 @@ POINTFLIGHT_INLINE bool advance(const KernelMap& map,
         return true;
       }
     } else {
-      const auto fetch = [&map](const Entry& child) { prefetch(map, child); };
-      s.depth = push_children(*s.node, entered, s.enter, s.stack, s.depth, fetch);
+      s.depth = push_children(map.nodes, map.words, *s.node, entered, s.enter, s.stack, s.depth);
     }
   }
   while (s.depth > 0) {

@@ -298,7 +298,6 @@ POINTFLIGHT_INLINE void walk(const KernelMap& map, Packet& p) {
   stack[depth++] = {0.0f, 0, Bvh8Node::kInner};
   std::size_t steps = map.node_count * 8 + 8;  // more visits than children: a cycle
   alignas(32) float distances[8];
-  const auto fetch = [&map](const Entry& child) { prefetch(map, child); };
   while (depth > 0 && steps-- > 0) {
     const Entry entry = stack[--depth];
     if (entry.t > p.end) continue;
@@ -308,7 +307,8 @@ POINTFLIGHT_INLINE void walk(const KernelMap& map, Packet& p) {
     }
     if (entry.index >= map.node_count) continue;
     const Bvh8Node& node = map.nodes[entry.index];
-    depth = push_children(node, test_node(p, node, distances), distances, stack, depth, fetch);
+    const std::uint32_t entered = test_node(p, node, distances);
+    depth = push_children(map.nodes, map.words, node, entered, distances, stack, depth);
   }
 }
 
