@@ -13,6 +13,8 @@
 #include "pointflight/io/pcd_writer.hpp"
 #include "pointflight/lidar/lidar.hpp"
 #include "pointflight/map/map_builder.hpp"
+#include "pointflight/render/beam_kernel.hpp"
+#include "pointflight/render/direction_order.hpp"
 #include "pointflight/vehicle/controller.hpp"
 #include "pointflight/vehicle/multirotor.hpp"
 
@@ -93,6 +95,53 @@ BENCHMARK_CAPTURE(scan, grid_paper, "marsim_grid", "paper")
     ->UseRealTime()
     ->Unit(benchmark::kMillisecond);
 
+/// A beam kernel of one instruction set, one thread, beams in the order of their directions.
+void kernel(benchmark::State& state,
+            const std::string& name,
+            const std::string& lidar_name,
+            BeamGrouping grouping) {
+  bench();
+  use_kernel(name);
+  const Executor executor(1);
+  const Lidar lidar(load_lidar(lidar_name), 0);
+  const Vector3d origin(30, 30, 2);
+  std::vector<Ray> rays;
+  for (const Beam& beam : lidar.beams(0, executor)) {
+    rays.push_back({origin, beam.direction_sensor, 40.0f});
+  }
+  const std::vector<std::uint32_t> order = direction_order(rays, executor);
+  const KernelMap map = kernel_map_of(*bench().map);
+  std::vector<KernelHit> hits(rays.size());
+  for (auto _ : state) benchmark::DoNotOptimize(trace_beams(map, rays, order, hits, grouping));
+  state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(rays.size()));
+  use_kernel("");
+}
+
+void register_kernels() {
+  for (const std::string& name : kernel_names()) {
+    for (const char* lidar : {"mid360", "marsim_grid"}) {
+      const auto add = [&](const char* how, BeamGrouping grouping) {
+        benchmark::RegisterBenchmark(
+            fmt::format("kernel/{}/{}/{}", name, lidar, how).c_str(),
+            [=](benchmark::State& state) { kernel(state, name, lidar, grouping); })
+            ->Unit(benchmark::kMillisecond);
+      };
+      add("as_suits", BeamGrouping::kAsSuits);
+      add("singly", BeamGrouping::kSingly);
+    }
+  }
+}
+
+void sort_beams(benchmark::State& state) {
+  const Executor executor(1);
+  const Lidar lidar(load_lidar("mid360"), 0);
+  std::vector<Vector3f> directions;
+  for (const Beam& beam : lidar.beams(0, executor)) directions.push_back(beam.direction_sensor);
+  for (auto _ : state) benchmark::DoNotOptimize(direction_order(directions, executor));
+  state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(directions.size()));
+}
+BENCHMARK(sort_beams)->Unit(benchmark::kMillisecond);
+
 void pattern(benchmark::State& state) {
   const Lidar lidar(load_lidar("mid360"), 0);
   const Executor executor(1);
@@ -147,4 +196,10 @@ BENCHMARK(physics_step);
 }  // namespace
 }  // namespace pointflight
 
-BENCHMARK_MAIN();
+int main(int argc, char** argv) {
+  pointflight::register_kernels();
+  benchmark::Initialize(&argc, argv);
+  if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 2;
+  benchmark::RunSpecifiedBenchmarks();
+  return 0;
+}
