@@ -33,6 +33,13 @@ struct Entry {
   std::uint32_t meta;   ///< Bvh8Node::meta
 };
 
+/// True for a leaf whose words all exist, with the padding that a reader may touch. Offsets of a
+/// corrupt map can be anything, so no sum of 32 bits.
+POINTFLIGHT_INLINE bool is_readable_leaf(const Entry& entry, std::size_t word_count) {
+  const std::size_t first = entry.index;
+  return entry.meta - 1u <= 7u && first + entry.meta + kLeafPadding < word_count;
+}
+
 POINTFLIGHT_INLINE std::uint64_t meta_of(const Bvh8Node& node) {
   std::uint64_t meta = 0;
   std::memcpy(&meta, node.meta, 8);

@@ -70,7 +70,7 @@ static NearestWord nearest(const Bvh8Node* nodes,
     const Entry entry = stack[--depth];
     if (entry.t > best.squared_distance) continue;
     if (entry.meta != Bvh8Node::kInner) {
-      if (entry.meta - 1u > 7u || entry.index + entry.meta + kLeafPadding >= word_count) continue;
+      if (!is_readable_leaf(entry, word_count)) continue;
       const LeafHeader leaf = decode_leaf(words[entry.index]);
       const float v[3] = {static_cast<float>(leaf.x * resolution - point[0]),
                           static_cast<float>(leaf.y * resolution - point[1]),

@@ -142,7 +142,7 @@ POINTFLIGHT_INLINE void visit_leaf(const KernelMap& map,
                                    RayState& s,
                                    const Entry& entry,
                                    std::uint64_t& overflows) {
-  if (entry.meta - 1u > 7u || entry.index + entry.meta + kLeafPadding >= map.word_count) return;
+  if (!is_readable_leaf(entry, map.word_count)) return;
   const LeafHeader leaf = decode_leaf(map.words[entry.index]);
   // in double: maps may be kilometres wide; and nothing here depends on the way to the leaf
   const auto vx = static_cast<float>(leaf.x * map.resolution - s.origin[0]);

@@ -250,7 +250,7 @@ POINTFLIGHT_INLINE void meet_group(
 }
 
 POINTFLIGHT_INLINE void visit_leaf(const KernelMap& map, Packet& p, const Entry& entry) {
-  if (entry.meta - 1u > 7u || entry.index + entry.meta + kLeafPadding >= map.word_count) return;
+  if (!is_readable_leaf(entry, map.word_count)) return;
   const LeafHeader header = decode_leaf(map.words[entry.index]);
   PacketLeaf leaf;  // NOLINT(cppcoreguidelines-pro-type-member-init): written before it is read
   leaf.lanes = load_surfels(map.scale, map.words + entry.index + 1);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstring>
 
 #include "pointflight/core/hash.hpp"
@@ -381,6 +382,22 @@ TEST(MapFile, OpensFromDiskAndVerifies) {
   EXPECT_EQ(map->resolution(), 0.1);
   expect_contains(std::string(map->metadata()), "\"sources\"");
   EXPECT_LT(static_cast<double>(map->file_size()) / static_cast<double>(map->surfel_count()), 16.0);
+}
+
+TEST(MapFile, LeavesAtTheEndOf32BitsAreNotRead) {
+  ImportOptions options;
+  options.resolution = 0.2;
+  const ImportedMap imported = import_points(cloud_of(room(), 800.0), options);
+  auto bytes = map_bytes(imported.tree, imported.description);
+  // with a surfel or two more, such an offset is small again in 32 bits
+  for (std::size_t i = 0; i < imported.tree.nodes.size(); ++i) {
+    std::memset(&bytes[kMapHeaderSize + i * sizeof(Bvh8Node) + offsetof(Bvh8Node, first_leaf_word)],
+                0xff,
+                4);
+  }
+  const auto map = SurfelMap::from_bytes(bytes, "a.pfmap");
+  ASSERT_EQ(map->nodes()[0].first_leaf_word, 0xffffffffu);
+  EXPECT_NO_THROW(static_cast<void>(map->nearest({3, 2, 2}, 10.0)));
 }
 
 TEST(MapFile, DamageIsFoundAndNeverCrashes) {
