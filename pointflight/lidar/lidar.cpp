@@ -67,6 +67,7 @@ Scan Lidar::take(const ScanRequest& request,
   const Pose middle = pose_at(request.start + period() / 2);
   const bool snapshot = request.snapshot || renderer.is_snapshot();
   std::vector<Ray> rays(beams.size());
+  std::vector<Duration> offsets(request.bodies.empty() || snapshot ? 0 : beams.size());
   const auto range_max = static_cast<float>(settings_.range_max);
   executor.parallel_for(beams.size(), kChunk, [&](std::size_t begin, std::size_t end) {
     Pose pose = middle;
@@ -80,6 +81,7 @@ Scan Lidar::take(const ScanRequest& request,
       rays[i].direction_world =
           (pose.rotation * beams[i].direction_sensor.cast<double>()).cast<float>().normalized();
       rays[i].range_max = range_max;
+      if (!offsets.empty()) offsets[i] = beams[i].time_offset;
     }
   });
 
@@ -89,6 +91,10 @@ Scan Lidar::take(const ScanRequest& request,
   batch.order = ordered->order;
   batch.T_world_sensor = middle;
   batch.range_max = range_max;
+  batch.bodies = request.bodies;
+  batch.snapshot_time = request.start + period() / 2;
+  batch.time = snapshot ? batch.snapshot_time : request.start;
+  batch.time_offsets = offsets;
   batch.image_resolution = settings_.image_resolution_deg * kDegree;
   renderer.render(batch, hits, executor);
 
@@ -111,7 +117,8 @@ Scan Lidar::take(const ScanRequest& request,
                            hits[i].intensity,
                            beams[i].time_offset,
                            beams[i].ring,
-                           static_cast<std::uint32_t>(i)});
+                           static_cast<std::uint32_t>(i),
+                           hits[i].label});
   }
   return scan;
 }

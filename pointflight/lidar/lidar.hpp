@@ -1,19 +1,16 @@
 #pragma once
 
-#include <functional>
 #include <memory>
 #include <mutex>
 
 #include "pointflight/core/parallel.hpp"
+#include "pointflight/geometry/motion.hpp"
 #include "pointflight/lidar/beam_pattern.hpp"
 #include "pointflight/lidar/lidar_settings.hpp"
 #include "pointflight/lidar/scan.hpp"
 #include "pointflight/render/renderer.hpp"
 
 namespace pointflight {
-
-/// Where the sensor is at an instant: T_world_sensor. Must be callable from several threads.
-using PoseAt = std::function<Pose(SimTime)>;
 
 /// Which scan to take.
 struct ScanRequest {
@@ -22,6 +19,7 @@ struct ScanRequest {
   bool snapshot = false;    ///< All beams from the pose at the scan's middle, as in the paper.
   bool noise = true;
   std::uint64_t seed = 0;
+  std::span<const Body> bodies;  ///< What moves in the map, without what carries the sensor.
 };
 
 /// A LiDAR: pattern, renderer, noise.
@@ -33,8 +31,8 @@ class Lidar {
   [[nodiscard]] const LidarSettings& settings() const { return settings_; }
   [[nodiscard]] Duration period() const;
 
-  /// Takes one scan in arrears: `pose_at` must know all instants of the scan. The result does not
-  /// depend on the executor's threads.
+  /// Takes one scan in arrears: `pose_at` (T_world_sensor) and the bodies must know all instants of
+  /// the scan. The result does not depend on the executor's threads.
   [[nodiscard]] Scan take(const ScanRequest& request,
                           const PoseAt& pose_at,
                           const Renderer& renderer,

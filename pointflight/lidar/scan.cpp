@@ -8,7 +8,7 @@ namespace pointflight {
 
 void write_scan_pcd(const std::string& path, const Scan& scan) {
   constexpr std::size_t kFloats = 6;
-  constexpr std::size_t kRow = kFloats * sizeof(float) + sizeof(std::uint16_t);
+  constexpr std::size_t kRow = kFloats * sizeof(float) + 2 * sizeof(std::uint16_t);
   std::vector<std::byte> rows(scan.points.size() * kRow);
   std::byte* at = rows.data();
   for (const ScanPoint& point : scan.points) {
@@ -19,7 +19,8 @@ void write_scan_pcd(const std::string& path, const Scan& scan) {
                                    point.range,
                                    static_cast<float>(to_seconds(point.time_offset))};
     std::memcpy(at, values, sizeof values);
-    std::memcpy(at + sizeof values, &point.ring, sizeof point.ring);
+    const std::uint16_t integers[2] = {point.ring, static_cast<std::uint16_t>(point.label)};
+    std::memcpy(at + sizeof values, integers, sizeof integers);
     at += kRow;
   }
   write_pcd(OutputFile(path),
@@ -29,7 +30,8 @@ void write_scan_pcd(const std::string& path, const Scan& scan) {
              {"intensity", 'F', 4},
              {"range", 'F', 4},
              {"time", 'F', 4},
-             {"ring", 'U', 2}},
+             {"ring", 'U', 2},
+             {"label", 'U', 2}},
             scan.points.size(),
             rows);
 }

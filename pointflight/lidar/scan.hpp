@@ -6,6 +6,7 @@
 
 #include "pointflight/core/time.hpp"
 #include "pointflight/geometry/types.hpp"
+#include "pointflight/map/scene.hpp"
 
 namespace pointflight {
 
@@ -16,7 +17,8 @@ struct ScanPoint {
   float intensity;           ///< Of the map, in its cloud's scale; 0 where it had none.
   Duration time_offset;      ///< After the scan's start.
   std::uint16_t ring;
-  std::uint32_t beam;  ///< Index of the beam in the scan's pattern.
+  std::uint32_t beam;       ///< Index of the beam in the scan's pattern.
+  Label label = kMapLabel;  ///< What it is of: the map, a vehicle, an obstacle.
 };
 
 /// What a LiDAR delivers for one scan: the returns in firing order.
@@ -29,8 +31,8 @@ struct Scan {
   std::vector<ScanPoint> points;
 };
 
-/// Writes x y z intensity range time (float32; time in seconds after the scan's start) and ring
-/// (uint16) as binary PCD. Throws InputError.
+/// Writes x y z intensity range time (float32; time in seconds after the scan's start), ring
+/// (uint16) and label (uint16) as binary PCD. Throws InputError.
 void write_scan_pcd(const std::string& path, const Scan& scan);
 
 }  // namespace pointflight

@@ -3,6 +3,7 @@
 #include <array>
 #include <vector>
 
+#include "pointflight/render/body_renderer.hpp"
 #include "pointflight/render/direction_order.hpp"
 
 namespace pointflight {
@@ -31,6 +32,7 @@ void BeamRenderer::render(const RayBatch& batch,
     if (overflows > 0) overflows_ += overflows;
     for (const std::uint32_t i : part) hits[i] = hit_of(found[i]);
   });
+  render_bodies(batch, hits, executor);
 }
 
 Hit BeamRenderer::trace(const Ray& ray) const {

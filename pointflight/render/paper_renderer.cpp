@@ -109,7 +109,30 @@ Hit look_up(const PaperImage& image, float azimuth, float elevation) {
   const std::size_t at =
       static_cast<std::size_t>(row) * image.stride + static_cast<std::size_t>(column);
   if (!(image.depth[at] <= image.range_max)) return {};
-  return {image.depth[at], image.cosine[at], image.intensity[at]};
+  return {image.depth[at], image.cosine[at], image.intensity[at], kMapLabel};
+}
+
+/// Points on the surface of a solid, about `spacing` apart (its frame). Their normals are not used.
+PaperPoints points_of(const Solid& solid, double spacing) {
+  const auto count = static_cast<std::size_t>(surface_area(solid) / (spacing * spacing)) + 16;
+  constexpr double kGolden = 0.6180339887498949;  // spreads v evenly whatever the count
+  PaperPoints points;
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto k = static_cast<double>(i);
+    const double v = k * kGolden - std::floor(k * kGolden);
+    const Vector3d p = surface_point(solid, (k + 0.5) / static_cast<double>(count), v);
+    points.add(p.cast<float>(), Vector3f::UnitZ(), false, 0.0f);
+  }
+  return points;
+}
+
+PaperPoints points_of(const SurfelMap& map, double gamma_max) {
+  PaperPoints points;
+  map.for_each_surfel(
+      [&](const Vector3d& center, const Vector3d& normal, double thickness, std::uint32_t) {
+        points.add(center.cast<float>(), normal.cast<float>(), thickness < gamma_max, 0.0f);
+      });
+  return points;
 }
 
 }  // namespace
@@ -190,6 +213,32 @@ void PaperRenderer::draw(const std::vector<std::size_t>& seen,
   }
 }
 
+void PaperRenderer::draw_bodies(const RayBatch& batch,
+                                const Pose& T_sensor_world,
+                                PaperImage& image) const {
+  std::fill(image.depth.begin(), image.depth.end(), kEmpty);
+  for (std::size_t number = 0; number < batch.bodies.size(); ++number) {
+    const Body& body = batch.bodies[number];
+    if (batch.snapshot_time < body.from || batch.snapshot_time >= body.until) continue;
+    const Pose T_sensor_body = T_sensor_world * body.T_world_body(batch.snapshot_time);
+    if (!may_see(image, T_sensor_body.translation, bounding_radius(body.shape))) continue;
+    const auto* solid = std::get_if<Solid>(&body.shape);
+    PaperPoints points = solid != nullptr
+                             ? points_of(*solid, map_->resolution())
+                             : points_of(*std::get<std::shared_ptr<const SurfelMap>>(body.shape),
+                                         options_.gamma_threshold * map_->resolution());
+    std::fill(points.intensity.begin(), points.intensity.end(), static_cast<float>(number));
+    points.finish();
+    std::vector<PaperSplat> splats;
+    paper_project(image,
+                  points,
+                  T_sensor_body.translation.cast<float>(),
+                  T_sensor_body.rotation.toRotationMatrix().cast<float>(),
+                  splats);
+    paper_fill(image, splats, 0, image.rows);
+  }
+}
+
 void PaperRenderer::render(const RayBatch& batch,
                            std::span<Hit> hits,
                            const Executor& executor) const {
@@ -216,6 +265,15 @@ void PaperRenderer::render(const RayBatch& batch,
       if (hits[i].range > batch.rays[i].range_max) hits[i] = {};
     }
   });
+  if (batch.bodies.empty()) return;
+  draw_bodies(batch, T_sensor_world, image);
+  for (std::size_t i = 0; i < hits.size(); ++i) {
+    const Hit met = look_up(image, angles.azimuth[i], angles.elevation[i]);
+    if (!met.is_return() || met.range > batch.rays[i].range_max) continue;
+    if (hits[i].is_return() && hits[i].range <= met.range) continue;
+    const Body& body = batch.bodies[static_cast<std::size_t>(met.intensity)];
+    hits[i] = {met.range, met.cos_incidence, body.intensity, body.label};
+  }
 }
 
 }  // namespace pointflight

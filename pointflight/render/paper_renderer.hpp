@@ -19,7 +19,9 @@ struct PaperOptions {
 /// 1), a point on a plane with the depth at which the pixel's ray meets that plane; pixels keep the
 /// smallest depth. A ray returns the depth of its pixel.
 ///
-/// All rays start at the sensor's pose, as in the paper: no rolling scan.
+/// All rays start at the sensor's pose, as in the paper: no rolling scan. Bodies are drawn as
+/// points of their surfaces, about r apart, where they are at that instant (the paper, section
+/// IV.E).
 class PaperRenderer : public Renderer {
  public:
   PaperRenderer(const Scene& scene, const PaperOptions& options);
@@ -38,6 +40,9 @@ class PaperRenderer : public Renderer {
             const Pose& T_sensor_world,
             PaperImage& image,
             const Executor& executor) const;
+
+  /// The batch's bodies in an image of their own, whose intensities are their numbers.
+  void draw_bodies(const RayBatch& batch, const Pose& T_sensor_world, PaperImage& image) const;
 
   std::shared_ptr<const SurfelMap> map_;
   PaperOptions options_;

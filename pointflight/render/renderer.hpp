@@ -8,11 +8,12 @@
 
 #include "pointflight/core/parallel.hpp"
 #include "pointflight/geometry/types.hpp"
+#include "pointflight/map/scene.hpp"
 #include "pointflight/map/surfel_map.hpp"
 
 namespace pointflight {
 
-/// What there is to see: the map, and later bodies that move (obstacles, other vehicles).
+/// What is always there to see: the map. Bodies that move come with each batch of rays.
 struct Scene {
   std::shared_ptr<const SurfelMap> map;
 };
@@ -28,6 +29,16 @@ struct RayBatch {
   Pose T_world_sensor;
   float range_max = 100.0f;                               ///< Longest range of any ray, m.
   double image_resolution = 0.2 * 0.0174532925199432958;  ///< theta_res of image renderers, rad.
+
+  /// Obstacles and other vehicles; each ray sees them where they are at its own time.
+  std::span<const Body> bodies;
+  SimTime time;                            ///< What `time_offsets` count from.
+  std::span<const Duration> time_offsets;  ///< Of each ray, or empty: all at `time`.
+  SimTime snapshot_time;                   ///< Of `T_world_sensor`: for renderers of images.
+
+  [[nodiscard]] SimTime time_of(std::size_t ray) const {
+    return time_offsets.empty() ? time : time + time_offsets[ray];
+  }
 };
 
 /// What a ray met.
@@ -35,6 +46,7 @@ struct Hit {
   float range = -1.0f;         ///< Metres along the ray; negative where it met nothing.
   float cos_incidence = 0.0f;  ///< |cos| of the angle between the ray and the surface normal.
   float intensity = 0.0f;      ///< The cloud's own scale; 0 where it had none.
+  Label label = kMapLabel;     ///< What it is of.
   [[nodiscard]] bool is_return() const { return range >= 0.0f; }
 };
 

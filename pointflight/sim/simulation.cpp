@@ -247,7 +247,8 @@ void Simulation::take_scan(MountedLidar& mounted, SampleSink& sink) {
                             mounted.schedule.at(mounted.next),
                             mounted.snapshot,
                             mounted.noise,
-                            static_cast<std::uint64_t>(scenario_.seed)};
+                            static_cast<std::uint64_t>(scenario_.seed),
+                            {}};
   const Scan scan = mounted.lidar.take(request, pose_at, *mounted.renderer, executor_);
   ++mounted.next;
   ++summary_.scans;

@@ -1,0 +1,67 @@
+#pragma once
+
+#include <optional>
+#include <variant>
+
+#include "pointflight/geometry/types.hpp"
+
+namespace pointflight {
+
+/// Convex solids around the origin of their own frame: hulls of vehicles and obstacles.
+struct Ball {
+  double radius = 0.0;  ///< m
+};
+struct Cuboid {
+  Vector3d half = Vector3d::Zero();  ///< Half sides, m.
+};
+struct Cylinder {
+  double radius = 0.0;       ///< m
+  double half_height = 0.0;  ///< Along z, m.
+};
+/// All points within `radius` of a segment along z.
+struct Capsule {
+  double radius = 0.0;       ///< m
+  double half_length = 0.0;  ///< Of the segment, without the caps, m.
+};
+using Solid = std::variant<Ball, Cuboid, Cylinder, Capsule>;
+
+/// Where a ray enters a solid.
+struct SolidHit {
+  double range;     ///< m
+  Vector3d normal;  ///< Outward unit normal, the solid's frame.
+};
+
+/// First meeting of a ray (the solid's frame, unit `direction`) with the solid's surface. A ray
+/// that starts inside meets nothing: a sensor does not see the hull it sits in.
+std::optional<SolidHit> intersect(const Solid& solid,
+                                  const Vector3d& origin,
+                                  const Vector3d& direction);
+
+/// The farthest point of the solid from its origin, m.
+double bounding_radius(const Solid& solid);
+
+/// Half sides of the smallest box along the solid's own axes.
+Vector3d half_extent(const Solid& solid);
+
+/// How far two solids are apart.
+struct Separation {
+  /// m; where they overlap, minus the shortest way that takes them apart (with a cylinder against
+  /// anything but a ball: at most a little longer than the shortest).
+  double distance;
+  Vector3d place;  ///< A point of the second solid nearest to the first one.
+};
+
+/// Distance between solids a and b at their poses: closed form where one is a ball, else the
+/// algorithm of Gilbert, Johnson and Keerthi (1988) between their cores; to 1e-9 m.
+Separation separation(const Solid& a, const Pose& T_world_a, const Solid& b, const Pose& T_world_b);
+
+/// Signed distance of a point (the solid's frame) to the solid's surface: negative inside.
+double signed_distance(const Solid& solid, const Vector3d& point);
+
+/// Point of the surface of a solid for (u, v) in [0, 1)^2, uniform by area.
+Vector3d surface_point(const Solid& solid, double u, double v);
+
+/// m^2
+double surface_area(const Solid& solid);
+
+}  // namespace pointflight

@@ -1,0 +1,194 @@
+#include "pointflight/render/body_renderer.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+#include <vector>
+
+#include "pointflight/render/beam_kernel.hpp"
+#include "pointflight/render/beam_renderer.hpp"
+
+namespace pointflight {
+namespace {
+
+constexpr std::size_t kChunk = 2048;  // rays
+constexpr std::size_t kLanes = 8;
+
+/// The directions in which a body can be met while the batch is fired: around the middle of the
+/// rays' origins, as wide as it and everybody's motion make it.
+struct Cone {
+  const Body* body = nullptr;
+  Vector3f axis = Vector3f::UnitX();
+  float cos_limit = -1.0f;  ///< -1: all around.
+};
+
+/// Room for the rounding of directions to float.
+constexpr double kCosSlack = 1e-6;
+
+/// Where the rays of a batch start and when.
+struct Start {
+  Vector3d middle = Vector3d::Zero();
+  double spread = 0.0;  ///< No origin lies farther from the middle, m.
+  SimTime first, last;
+};
+
+Start start_of(const RayBatch& batch) {
+  Start start;
+  Aabb box;
+  for (const Ray& ray : batch.rays) box.add(ray.origin_world);
+  start.middle = 0.5 * (box.min + box.max);
+  start.spread = 0.5 * box.size().norm();
+  start.first = start.last = batch.time;
+  if (!batch.time_offsets.empty()) {
+    const auto [low, high] =
+        std::minmax_element(batch.time_offsets.begin(), batch.time_offsets.end());
+    start.first = batch.time + *low;
+    start.last = batch.time + *high;
+  }
+  return start;
+}
+
+/// Bodies that some ray may meet.
+std::vector<Cone> cones_of(const RayBatch& batch) {
+  const Start start = start_of(batch);
+  std::vector<Cone> cones;
+  for (const Body& body : batch.bodies) {
+    const SimTime first = std::max(start.first, body.from);
+    const SimTime last = std::min(start.last, body.until);
+    if (first > last) continue;
+    const SimTime middle = first + (last - first) / 2;
+    const double moved = body.speed_max * to_seconds(last - middle);
+    const double radius = bounding_radius(body.shape) + moved + start.spread;
+    const Vector3d way = body.T_world_body(middle).translation - start.middle;
+    const double distance = way.norm();
+    if (distance - radius > static_cast<double>(batch.range_max)) continue;
+    Cone cone;
+    cone.body = &body;
+    if (distance > 1.001 * radius) {
+      cone.axis = (way / distance).cast<float>();
+      const double sine = radius / distance;
+      cone.cos_limit = static_cast<float>(std::sqrt(1.0 - sine * sine) - kCosSlack);
+    }
+    cones.push_back(cone);
+  }
+  return cones;
+}
+
+/// Directions of a chunk's rays as arrays, in whole groups of eight.
+struct Directions {
+  std::array<float, kChunk> x, y, z;
+  std::size_t count = 0;
+
+  explicit Directions(std::span<const Ray> rays) : count(rays.size()) {
+    const std::size_t groups = (count + kLanes - 1) / kLanes * kLanes;
+    for (std::size_t i = 0; i < groups; ++i) {
+      const Vector3f& d = rays[std::min(i, count - 1)].direction_world;
+      x[i] = d.x();
+      y[i] = d.y();
+      z[i] = d.z();
+    }
+  }
+
+  /// Appends `first` + the numbers of the rays within a cone.
+  void within(const Cone& cone, std::size_t first, std::vector<std::uint32_t>& found) const {
+    for (std::size_t g = 0; g < count; g += kLanes) {
+      std::array<float, kLanes> cosine;
+      float most = -2.0f;
+      for (std::size_t k = 0; k < kLanes; ++k) {
+        cosine[k] = cone.axis.x() * x[g + k] + cone.axis.y() * y[g + k] + cone.axis.z() * z[g + k];
+      }
+      for (const float c : cosine) most = std::max(most, c);
+      if (most < cone.cos_limit) continue;
+      for (std::size_t k = 0; k < kLanes && g + k < count; ++k) {
+        if (cosine[k] >= cone.cos_limit) found.push_back(static_cast<std::uint32_t>(first + g + k));
+      }
+    }
+  }
+};
+
+/// A ray in the frame of a body at the ray's own time.
+Ray in_body(const Ray& ray, const Pose& T_world_body) {
+  Ray own = ray;
+  own.origin_world = T_world_body.inverse() * ray.origin_world;
+  own.direction_world = (T_world_body.rotation.conjugate() * ray.direction_world.cast<double>())
+                            .cast<float>()
+                            .normalized();
+  return own;
+}
+
+bool is_nearer(float range, const Ray& ray, const Hit& hit) {
+  return range <= ray.range_max && (!hit.is_return() || range < hit.range);
+}
+
+void meet_solid(const RayBatch& batch,
+                const Body& body,
+                std::span<const std::uint32_t> rays,
+                std::span<Hit> hits) {
+  const Solid& solid = std::get<Solid>(body.shape);
+  for (const std::uint32_t i : rays) {
+    const SimTime time = batch.time_of(i);
+    if (time < body.from || time >= body.until) continue;
+    const Ray& ray = batch.rays[i];
+    const Pose T_body_world = body.T_world_body(time).inverse();
+    const Vector3d direction = T_body_world.rotation * ray.direction_world.cast<double>();
+    const auto met = intersect(solid, T_body_world * ray.origin_world, direction.normalized());
+    if (!met || !is_nearer(static_cast<float>(met->range), ray, hits[i])) continue;
+    hits[i].range = static_cast<float>(met->range);
+    hits[i].cos_incidence = static_cast<float>(std::abs(met->normal.dot(direction)));
+    hits[i].intensity = body.intensity;
+    hits[i].label = body.label;
+  }
+}
+
+void meet_points(const RayBatch& batch,
+                 const Body& body,
+                 std::span<const std::uint32_t> rays,
+                 std::span<Hit> hits) {
+  const SurfelMap& map = *std::get<std::shared_ptr<const SurfelMap>>(body.shape);
+  std::vector<Ray> own;
+  std::vector<std::uint32_t> number;
+  for (const std::uint32_t i : rays) {
+    const SimTime time = batch.time_of(i);
+    if (time < body.from || time >= body.until) continue;
+    own.push_back(in_body(batch.rays[i], body.T_world_body(time)));
+    number.push_back(i);
+  }
+  std::vector<std::uint32_t> order(own.size());
+  std::iota(order.begin(), order.end(), 0u);
+  std::vector<KernelHit> found(own.size());
+  // one by one: rays of one batch lie in frames that differ by the body's motion
+  trace_beams(kernel_map_of(map), own, order, found, BeamGrouping::kSingly);
+  for (std::size_t k = 0; k < own.size(); ++k) {
+    Hit& hit = hits[number[k]];
+    if (found[k].range < 0.0f || !is_nearer(found[k].range, own[k], hit)) continue;
+    hit.range = found[k].range;
+    hit.cos_incidence = found[k].cos_incidence;
+    hit.intensity = map.intensity(found[k].strongest);
+    hit.label = body.label;
+  }
+}
+
+}  // namespace
+
+void render_bodies(const RayBatch& batch, std::span<Hit> hits, const Executor& executor) {
+  if (batch.bodies.empty() || batch.rays.empty()) return;
+  const std::vector<Cone> cones = cones_of(batch);
+  if (cones.empty()) return;
+  executor.parallel_for(batch.rays.size(), kChunk, [&](std::size_t begin, std::size_t end) {
+    const Directions directions(batch.rays.subspan(begin, end - begin));
+    std::vector<std::uint32_t> candidates;
+    for (const Cone& cone : cones) {
+      candidates.clear();
+      directions.within(cone, begin, candidates);
+      if (candidates.empty()) continue;
+      if (std::holds_alternative<Solid>(cone.body->shape)) {
+        meet_solid(batch, *cone.body, candidates, hits);
+      } else {
+        meet_points(batch, *cone.body, candidates, hits);
+      }
+    }
+  });
+}
+
+}  // namespace pointflight
