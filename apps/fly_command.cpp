@@ -37,39 +37,49 @@ struct FlyFlags {
 /// Passes samples on to the files and to the picture, and says collisions as they happen.
 class FlySink : public SampleSink {
  public:
-  FlySink(FlightRecorder& recorder, OverviewSink& overview)
-      : recorder_(recorder), overview_(overview) {}
+  FlySink(const Simulation& simulation, FlightRecorder& recorder, RunPicture& picture)
+      : simulation_(simulation), recorder_(recorder), picture_(picture) {}
 
   void on_state(const StateSample& sample) override {
     recorder_.on_state(sample);
-    overview_.on_state(sample);
+    picture_.on_state(sample);
   }
-  void on_imu(const ImuSample& sample) override { recorder_.on_imu(sample); }
+  void on_odometry(const OdometrySample& sample) override { recorder_.on_odometry(sample); }
+  void on_imu(std::uint32_t vehicle, const ImuSample& sample) override {
+    recorder_.on_imu(vehicle, sample);
+  }
   void on_scan(const Scan& scan, const PoseAt& pose_at) override {
     recorder_.on_scan(scan, pose_at);
-    overview_.on_scan(scan, pose_at);
+    picture_.on_scan(scan, pose_at);
+  }
+  void on_obstacle(const ObstacleSample& sample) override {
+    recorder_.on_obstacle(sample);
+    picture_.on_obstacle(sample);
   }
   void on_collision(const CollisionEvent& event) override {
     recorder_.on_collision(event);
-    overview_.on_collision(event);
+    picture_.on_collision(event);
     constexpr int kSaid = 20;
     if (!event.entered || said_ > kSaid) return;
     log(said_++ == kSaid
             ? std::string("more collisions: see events.csv")
-            : fmt::format("warning: collision at {:.3f} s, vehicle at ({:.2f}, {:.2f}, {:.2f}), "
-                          "with the map at ({:.2f}, {:.2f}, {:.2f})",
+            : fmt::format("warning: collision at {:.3f} s, {} at ({:.2f}, {:.2f}, {:.2f}), "
+                          "with {} at ({:.2f}, {:.2f}, {:.2f})",
                           to_seconds(event.time),
+                          simulation_.vehicle(event.vehicle).setup().name,
                           event.vehicle_world.x(),
                           event.vehicle_world.y(),
                           event.vehicle_world.z(),
+                          label_name(simulation_, event.partner),
                           event.place_world.x(),
                           event.place_world.y(),
                           event.place_world.z()));
   }
 
  private:
+  const Simulation& simulation_;
   FlightRecorder& recorder_;
-  OverviewSink& overview_;
+  RunPicture& picture_;
   int said_ = 0;
 };
 
@@ -120,15 +130,15 @@ void check_folder(const FlyFlags& flags) {
   }
 }
 
-/// Removes what an earlier run left, so that `--force` never mixes two runs.
-void clear_earlier_run(const FlyFlags& flags) {
+/// Removes what an earlier run left in the folder of a vehicle, or of the run.
+void clear_files(const fs::path& folder) {
   std::error_code error;
   const auto is_scan = [](const std::string& name) {
     return name.ends_with(".pcd") && name.find('_') != std::string::npos &&
            name.find_first_not_of("0123456789_") == name.size() - 4;
   };
   // what others have put there stays
-  for (const auto& entry : fs::directory_iterator(fs::path(flags.output) / "scans", error)) {
+  for (const auto& entry : fs::directory_iterator(folder / "scans", error)) {
     if (is_scan(entry.path().filename().string())) fs::remove(entry.path(), error);
   }
   for (const char* name : {"summary.json",
@@ -137,9 +147,19 @@ void clear_earlier_run(const FlyFlags& flags) {
                            "trajectory.csv",
                            "trajectory.tum",
                            "imu.csv",
+                           "odometry.csv",
                            "events.csv",
+                           "obstacles.csv",
                            "scans.csv"}) {
-    fs::remove(fs::path(flags.output) / name, error);
+    fs::remove(folder / name, error);
+  }
+}
+
+/// So that `--force` never mixes two runs.
+void clear_earlier_run(const FlyFlags& flags, const Simulation& simulation) {
+  clear_files(flags.output);
+  for (std::size_t v = 0; v < simulation.vehicle_count(); ++v) {
+    clear_files(fs::path(flags.output) / simulation.vehicle(v).setup().name);
   }
 }
 
@@ -153,21 +173,22 @@ void write_timing(const FlyFlags& flags, const Simulation& simulation, double wa
   file.commit();
 }
 
-void print_result(const FlyFlags& flags, const Simulation& simulation, double wall) {
-  const RunSummary& s = simulation.summary();
-  fmt::print("{}\n", flags.output);
-  fmt::print("  end               {}\n", to_string(s.end));
-  fmt::print("  flown             {:.1f} m in {:.1f} s, up to {:.2f} m/s\n",
+void print_vehicle(const Simulation& simulation, std::size_t v) {
+  const VehicleSummary& s = simulation.summary(v);
+  const VehicleStatus& status = simulation.status(v);
+  if (simulation.vehicle_count() > 1) fmt::print("{}\n", simulation.vehicle(v).setup().name);
+  fmt::print("  flown             {:.1f} m, up to {:.2f} m/s{}\n",
              s.distance_flown,
-             to_seconds(s.time),
-             s.speed_max);
+             s.speed_max,
+             status.crashed ? "; crashed" : "");
   fmt::print("  scans             {}, {} points of {} beams\n",
              s.scans,
              short_count(static_cast<double>(s.points)),
              short_count(static_cast<double>(s.beams)));
   fmt::print("  closest approach  {}\n",
-             s.closest_approach ? fmt::format("{:.2f} m at ({:.2f}, {:.2f}, {:.2f})",
+             s.closest_approach ? fmt::format("{:.2f} m to {} at ({:.2f}, {:.2f}, {:.2f})",
                                               *s.closest_approach,
+                                              label_name(simulation, s.closest_label),
                                               s.closest_place_world.x(),
                                               s.closest_place_world.y(),
                                               s.closest_place_world.z())
@@ -176,7 +197,25 @@ void print_result(const FlyFlags& flags, const Simulation& simulation, double wa
   fmt::print("  tracking error    {:.0f} mm RMS, {:.0f} mm at most\n",
              s.tracking_error_rms * 1e3,
              s.tracking_error_max * 1e3);
-  fmt::print("  real-time factor  {:.1f}\n", to_seconds(s.time) / wall);
+  if (simulation.vehicle(v).setup().battery) {
+    fmt::print("  battery           {:.2f} Ah used, {:.1f} V now\n",
+               status.battery.used,
+               status.battery.voltage);
+  }
+  if (status.autopilot.rejected > 0) {
+    fmt::print("  commands          {} rejected; the last: {}\n",
+               status.autopilot.rejected,
+               status.autopilot.last_rejection);
+  }
+}
+
+void print_result(const FlyFlags& flags, const Simulation& simulation, double wall) {
+  fmt::print("{}\n", flags.output);
+  fmt::print("  end               {}, after {:.1f} s\n",
+             to_string(simulation.end()),
+             to_seconds(simulation.time()));
+  for (std::size_t v = 0; v < simulation.vehicle_count(); ++v) print_vehicle(simulation, v);
+  fmt::print("  real-time factor  {:.1f}\n", to_seconds(simulation.time()) / wall);
   fmt::print("  picture           {}\n", (fs::path(flags.output) / "overview.png").string());
 }
 
@@ -197,15 +236,17 @@ int fly(const FlyFlags& flags) {
   const Executor executor(flags.threads);
   Scenario scenario = load_input(flags, executor);
   if (flags.seed >= 0) scenario.seed = flags.seed;
-  for (LidarMount& mount : scenario.lidars) mount.snapshot = mount.snapshot || flags.snapshot;
+  for (VehicleSetup& vehicle : scenario.vehicles) {
+    for (LidarMount& mount : vehicle.lidars) mount.snapshot = mount.snapshot || flags.snapshot;
+  }
   const auto map = scenario.open_map();
   Simulation simulation(scenario, map, executor);
   warn_about(scenario, *map);
-  if (flags.force) clear_earlier_run(flags);
+  if (flags.force) clear_earlier_run(flags, simulation);
 
-  FlightRecorder recorder(flags.output, scenario, simulation.state().rotors.size());
-  OverviewSink overview;
-  FlySink sink(recorder, overview);
+  FlightRecorder recorder(flags.output, simulation);
+  RunPicture picture;
+  FlySink sink(simulation, recorder, picture);
   catch_interrupts();
   const Progress progress = terminal_progress();
   const Pace pace(rate);
@@ -220,10 +261,11 @@ int fly(const FlyFlags& flags) {
   const double wall = std::chrono::duration<double>(Clock::now() - start).count();
   end_progress();
   write_timing(flags, simulation, wall, executor.threads());
-  draw_overview(*map, simulation, overview, (fs::path(flags.output) / "overview.png").string());
+  describe_run(simulation, picture);
+  draw_overview(*map, picture, (fs::path(flags.output) / "overview.png").string());
   recorder.finish(simulation);
   print_result(flags, simulation, wall);
-  return exit_code_of(simulation.summary().end);
+  return exit_code_of(simulation.end());
 }
 
 }  // namespace

@@ -226,90 +226,188 @@ void draw_scan(const std::vector<Beam>& beams,
   canvas.save(path);
 }
 
-void OverviewSink::on_state(const StateSample& sample) {
+void RunPicture::add_path_point(std::size_t vehicle, const Vector3d& p) {
   constexpr double kApart = 0.05;  // m
-  const Vector3d& p = sample.state.body.p_world;
-  if (path_.empty() || (path_.back() - p).norm() > kApart) path_.push_back(p);
+  if (paths.size() <= vehicle) paths.resize(vehicle + 1);
+  auto& path = paths[vehicle];
+  if (path.empty() || (path.back() - p).norm() > kApart) path.push_back(p);
 }
 
-void OverviewSink::on_scan(const Scan& scan, const PoseAt& pose_at) {
-  constexpr std::size_t kPointsMax = 400000;
-  const std::size_t stride = points_.size() < kPointsMax / 2 ? 40 : 200;
-  if (points_.size() >= kPointsMax) return;
-  for (std::size_t i = scan.index % stride; i < scan.points.size(); i += stride) {
+void RunPicture::add_seen(const Vector3d& p) {
+  // ever fewer, so that a long run and many vehicles fit
+  const std::size_t stride = 40 * (1 + seen.size() / 100000);
+  if (seen_offered_++ % stride == 0) seen.push_back(p);
+}
+
+void RunPicture::add_obstacle(std::uint32_t label, const Vector3d& p, double radius) {
+  constexpr double kJump = 2.0;  // m between two samples: another one took its place
+  auto trace = std::find_if(
+      traces.rbegin(), traces.rend(), [&](const Trace& t) { return t.label == label; });
+  if (trace == traces.rend() || (trace->points.back() - p).norm() > kJump) {
+    traces.push_back({label, radius, {p}});
+    return;
+  }
+  trace->points.push_back(p);
+}
+
+void RunPicture::on_state(const StateSample& sample) {
+  add_path_point(sample.vehicle, sample.state.body.p_world);
+}
+
+void RunPicture::on_scan(const Scan& scan, const PoseAt& pose_at) {
+  for (std::size_t i = 0; i < scan.points.size(); ++i) {
     const ScanPoint& point = scan.points[i];
-    points_.push_back(pose_at(scan.start + point.time_offset) *
-                      point.position_sensor.cast<double>());
+    const bool moving = point.label != kMapLabel;
+    if (!moving && i % 40 != scan.index % 40) {
+      ++seen_offered_;
+      continue;
+    }
+    const Vector3d p =
+        pose_at(scan.start + point.time_offset) * point.position_sensor.cast<double>();
+    if (moving) {
+      if (seen_moving.size() < 400000 && i % 4 == 0) seen_moving.push_back(p);
+    } else {
+      seen_offered_ -= seen_offered_ % 40;
+      add_seen(p);
+    }
   }
 }
 
-void OverviewSink::on_collision(const CollisionEvent& event) {
-  if (event.entered) collisions_.push_back(event.place_world);
+void RunPicture::on_collision(const CollisionEvent& event) {
+  if (event.entered) collisions.push_back(event.place_world);
 }
 
-void draw_overview(const SurfelMap& map,
-                   const Simulation& simulation,
-                   const OverviewSink& run,
-                   const std::string& path) {
+void RunPicture::on_obstacle(const ObstacleSample& sample) {
+  add_obstacle(sample.label,
+               sample.T_world_body.translation,
+               std::max(sample.half_extent.x(), sample.half_extent.y()));
+}
+
+void describe_run(const Simulation& simulation, RunPicture& picture) {
+  double flown = 0.0;
+  double closest = Simulation::kClearanceReach;
+  std::uint64_t scans = 0;
+  std::uint64_t points = 0;
+  std::uint64_t collisions = 0;
+  picture.waypoints.clear();
+  for (std::size_t v = 0; v < simulation.vehicle_count(); ++v) {
+    const VehicleSummary& s = simulation.summary(v);
+    flown += s.distance_flown;
+    scans += s.scans;
+    points += s.points;
+    collisions += s.collisions;
+    closest = std::min(closest, s.closest_approach.value_or(closest));
+    picture.waypoints.push_back(simulation.vehicle(v).setup().mission.waypoints);
+  }
+  const std::size_t count = simulation.vehicle_count();
+  picture.title = fmt::format("{}{:.1f} m flown in {:.1f} s, {}",
+                              count > 1 ? fmt::format("{} vehicles, ", count) : std::string(),
+                              flown,
+                              to_seconds(simulation.time()),
+                              to_string(simulation.end()));
+  picture.subtitle =
+      fmt::format("{} scans, {:.2f} M points; closest approach {}; {} collision{}",
+                  scans,
+                  static_cast<double>(points) * 1e-6,
+                  closest < Simulation::kClearanceReach ? fmt::format("{:.2f} m", closest)
+                                                        : std::string("over 10 m"),
+                  collisions,
+                  collisions == 1 ? "" : "s");
+}
+
+namespace {
+
+/// Colours of the vehicles' paths, in turn: told apart by those who see no red or green (Okabe, Ito
+/// 2008).
+constexpr Color kPaths[] = {
+    {0.84, 0.37, 0.0}, {0.0, 0.45, 0.70}, {0.80, 0.47, 0.65}, {0.0, 0.62, 0.45}, {0.90, 0.62, 0.0}};
+constexpr Color kMoving{0.45, 0.2, 0.6};
+
+void draw_traces(Canvas& canvas, const View& view, const RunPicture& run) {
+  for (const RunPicture::Trace& trace : run.traces) {
+    std::vector<std::pair<double, double>> line;
+    for (const Vector3d& p : trace.points) line.push_back(view.at(p));
+    canvas.line(line, 1.2, kMoving);
+    const auto [x, y] = line.back();
+    const double radius = std::max(2.0, trace.radius * view.scale);
+    canvas.dot(x, y, radius, kMoving, 0.35);
+    canvas.ring(x, y, radius, 1.0, kMoving);
+  }
+}
+
+void draw_run(Canvas& canvas, const View& view, const RunPicture& run) {
+  canvas.begin_pixels();
+  const auto put = [&](const Vector3d& p, Color color) {
+    const auto [x, y] = view.at(p);
+    canvas.put(static_cast<int>(x), static_cast<int>(y), color, 0.5);
+  };
+  for (const Vector3d& p : run.seen) put(p, kSeen);
+  for (const Vector3d& p : run.seen_moving) put(p, kMoving);
+  canvas.end_pixels();
+  draw_traces(canvas, view, run);
+  for (std::size_t v = 0; v < run.paths.size(); ++v) {
+    std::vector<std::pair<double, double>> line;
+    for (const Vector3d& p : run.paths[v]) line.push_back(view.at(p));
+    if (line.empty()) continue;
+    canvas.line(line, 4.5, kPaper);
+    canvas.line(line, 2.5, kPaths[v % std::size(kPaths)]);
+    canvas.dot(line.front().first, line.front().second, 6.0, kInk);
+  }
+  for (const auto& waypoints : run.waypoints) {
+    for (const Vector3d& p : waypoints) {
+      const auto [x, y] = view.at(p);
+      canvas.ring(x, y, 5.0, 1.5, kInk);
+    }
+  }
+  for (const Vector3d& p : run.collisions) {
+    const auto [x, y] = view.at(p);
+    canvas.line({{x - 7, y - 7}, {x + 7, y + 7}}, 3.0, kPath);
+    canvas.line({{x - 7, y + 7}, {x + 7, y - 7}}, 3.0, kPath);
+  }
+}
+
+/// What the marks mean, those that are there.
+void draw_legend(Canvas& canvas, const RunPicture& run, double left, double y) {
+  double x = left;
+  const auto entry = [&](double width, const char* words, const auto& mark) {
+    mark(x);
+    canvas.text(x + width, y + 4, words, 12.0, kInk);
+    x += width + 7.0 * static_cast<double>(std::string(words).size()) + 12.0;
+  };
+  entry(32, run.paths.size() > 1 ? "flown paths" : "flown path", [&](double at) {
+    canvas.line({{at, y}, {at + 26, y}}, 2.5, kPaths[0]);
+  });
+  entry(12, "start", [&](double at) { canvas.dot(at + 3, y, 5.0, kInk); });
+  entry(14, "waypoint", [&](double at) { canvas.ring(at + 4, y, 5.0, 1.5, kInk); });
+  entry(10, "measured", [&](double at) { canvas.dot(at + 3, y, 3.0, kSeen); });
+  if (!run.traces.empty()) {
+    entry(34, "obstacle, last seen at the ball", [&](double at) {
+      canvas.line({{at, y}, {at + 20, y}}, 1.2, kMoving);
+      canvas.ring(at + 24, y, 5.0, 1.0, kMoving);
+    });
+  }
+  if (!run.collisions.empty()) {
+    entry(16, "collision", [&](double at) {
+      canvas.line({{at, y - 5}, {at + 10, y + 5}}, 3.0, kPath);
+      canvas.line({{at, y + 5}, {at + 10, y - 5}}, 3.0, kPath);
+    });
+  }
+  entry(16, "map (higher is darker)", [&](double at) {
+    canvas.box(at, y - 5, 10, 10, {0.65, 0.65, 0.65});
+  });
+}
+
+}  // namespace
+
+void draw_overview(const SurfelMap& map, const RunPicture& run, const std::string& path) {
   constexpr double kHeader = 112.0;
   const Page page = lay_out(map, kHeader);
   Canvas canvas(page.width, page.height, kPaper);
   draw_surfels(canvas, map, page, true);
-  const RunSummary& s = simulation.summary();
-  for (const View* view : {&page.top, &page.side}) {
-    canvas.begin_pixels();
-    for (const Vector3d& p : run.points()) {
-      const auto [x, y] = view->at(p);
-      canvas.put(static_cast<int>(x), static_cast<int>(y), kSeen, 0.5);
-    }
-    canvas.end_pixels();
-    std::vector<std::pair<double, double>> line;
-    for (const Vector3d& p : run.path()) line.push_back(view->at(p));
-    canvas.line(line, 4.5, kPaper);
-    canvas.line(line, 2.5, kPath);
-    for (const Vector3d& p : simulation.scenario().mission.waypoints) {
-      const auto [x, y] = view->at(p);
-      canvas.ring(x, y, 5.0, 1.5, kInk);
-    }
-    if (!run.path().empty()) {
-      const auto [x, y] = view->at(run.path().front());
-      canvas.dot(x, y, 6.0, kInk);
-    }
-    for (const Vector3d& p : run.collisions()) {
-      const auto [x, y] = view->at(p);
-      canvas.line({{x - 7, y - 7}, {x + 7, y + 7}}, 3.0, kPath);
-      canvas.line({{x - 7, y + 7}, {x + 7, y - 7}}, 3.0, kPath);
-    }
-  }
-  canvas.text(
-      page.top.left,
-      30.0,
-      fmt::format(
-          "{:.1f} m flown in {:.1f} s, {}", s.distance_flown, to_seconds(s.time), to_string(s.end)),
-      19.0,
-      kInk);
-  canvas.text(page.top.left,
-              52.0,
-              fmt::format("{} scans, {:.2f} M points; closest approach {}; {} collision{}",
-                          s.scans,
-                          static_cast<double>(s.points) * 1e-6,
-                          s.closest_approach ? fmt::format("{:.2f} m", *s.closest_approach)
-                                             : std::string("over 10 m"),
-                          s.collisions,
-                          s.collisions == 1 ? "" : "s"),
-              13.0,
-              kInk);
-  const double y = 72.0;
-  canvas.line({{page.top.left, y}, {page.top.left + 26, y}}, 2.5, kPath);
-  canvas.text(page.top.left + 32, y + 4, "flown path", 12.0, kInk);
-  canvas.dot(page.top.left + 122, y, 5.0, kInk);
-  canvas.text(page.top.left + 132, y + 4, "start", 12.0, kInk);
-  canvas.ring(page.top.left + 182, y, 5.0, 1.5, kInk);
-  canvas.text(page.top.left + 192, y + 4, "waypoint", 12.0, kInk);
-  canvas.dot(page.top.left + 272, y, 3.0, kSeen);
-  canvas.text(page.top.left + 282, y + 4, "measured points", 12.0, kInk);
-  canvas.box(page.top.left + 394, y - 5, 10, 10, {0.65, 0.65, 0.65});
-  canvas.text(page.top.left + 410, y + 4, "map (higher is darker)", 12.0, kInk);
+  for (const View* view : {&page.top, &page.side}) draw_run(canvas, *view, run);
+  canvas.text(page.top.left, 30.0, run.title, 19.0, kInk);
+  canvas.text(page.top.left, 52.0, run.subtitle, 13.0, kInk);
+  draw_legend(canvas, run, page.top.left, 72.0);
   draw_captions(canvas, page, kHeader);
   canvas.save(path);
 }

@@ -19,27 +19,40 @@ void draw_scan(const std::vector<Beam>& beams,
                const LidarSettings& lidar,
                const std::string& path);
 
-/// Collects what `draw_overview` needs while a run goes on.
-class OverviewSink : public SampleSink {
+/// What a picture of a run shows, collected while the run goes on or read from its files.
+class RunPicture : public SampleSink {
  public:
   void on_state(const StateSample& sample) override;
   void on_scan(const Scan& scan, const PoseAt& pose_at) override;
   void on_collision(const CollisionEvent& event) override;
+  void on_obstacle(const ObstacleSample& sample) override;
 
-  [[nodiscard]] const std::vector<Vector3d>& path() const { return path_; }
-  [[nodiscard]] const std::vector<Vector3d>& points() const { return points_; }
-  [[nodiscard]] const std::vector<Vector3d>& collisions() const { return collisions_; }
+  void add_path_point(std::size_t vehicle, const Vector3d& p_world);
+  void add_seen(const Vector3d& p_world);
+  void add_obstacle(std::uint32_t label, const Vector3d& p_world, double radius);
+
+  /// Where an obstacle went; a new trace where it was replaced.
+  struct Trace {
+    std::uint32_t label = 0;
+    double radius = 0.0;
+    std::vector<Vector3d> points;
+  };
+  std::vector<std::vector<Vector3d>> paths;      ///< Of each vehicle.
+  std::vector<std::vector<Vector3d>> waypoints;  ///< Of each vehicle.
+  std::vector<Vector3d> seen;                    ///< Measured points of the map, some of them.
+  std::vector<Vector3d> seen_moving;             ///< Measured points of bodies.
+  std::vector<Vector3d> collisions;
+  std::vector<Trace> traces;
+  std::string title, subtitle;
 
  private:
-  std::vector<Vector3d> path_;
-  std::vector<Vector3d> points_;
-  std::vector<Vector3d> collisions_;
+  std::size_t seen_offered_ = 0;
 };
 
-/// Top and side view of map, flown path, waypoints and what the LiDAR saw.
-void draw_overview(const SurfelMap& map,
-                   const Simulation& simulation,
-                   const OverviewSink& run,
-                   const std::string& path);
+/// Titles and waypoints of a run that has ended.
+void describe_run(const Simulation& simulation, RunPicture& picture);
+
+/// Top and side view of map, flown paths, obstacles, waypoints and what the LiDARs saw.
+void draw_overview(const SurfelMap& map, const RunPicture& run, const std::string& path);
 
 }  // namespace pointflight::apps

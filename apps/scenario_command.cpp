@@ -17,6 +17,7 @@
 #include "pointflight/core/output_file.hpp"
 #include "pointflight/core/resources.hpp"
 #include "pointflight/sim/simulation.hpp"
+#include "pointflight/world/clearance.hpp"
 #include "pointflight/world/free_space.hpp"
 
 namespace pointflight::apps {
@@ -58,7 +59,8 @@ void new_scenario(const NewFlags& flags) {
                                     flags.length,
                                     flags.speed,
                                     executor);
-  for (std::string* model : {&scenario.lidars.front().model, &scenario.vehicle.model}) {
+  VehicleSetup& vehicle = scenario.vehicles.front();
+  for (std::string* model : {&vehicle.lidars.front().model, &vehicle.model}) {
     if (is_model_path(*model)) *model = from_folder(*model);
   }
   OutputFile file(flags.output);
@@ -66,9 +68,9 @@ void new_scenario(const NewFlags& flags) {
       "# A pointflight scenario; every key: docs/scenario.md, or pointflight scenario keys\n" +
       scenario_yaml(scenario));
   file.commit();
-  const Mission mission(scenario.vehicle.start, 0.0, scenario.mission);
+  const Mission mission(vehicle.start, 0.0, vehicle.mission);
   log(fmt::format("{} waypoints, {:.0f} m; fly it: pointflight fly {} -o run",
-                  scenario.mission.waypoints.size(),
+                  vehicle.mission.waypoints.size(),
                   mission.length(),
                   flags.output));
   fmt::print("{}\n", flags.output);
@@ -80,11 +82,18 @@ void check_scenario(const std::string& path) {
   const Executor executor;
   const Simulation simulation(scenario, map, executor);
   warn_about(scenario, *map);
-  fmt::print("{}: ready: {} waypoints, {:.1f} m, {:.1f} s\n",
-             path,
-             scenario.mission.waypoints.size(),
-             simulation.mission().length(),
-             to_seconds(simulation.end_time()));
+  fmt::print("{}: ready: {:.1f} s\n", path, to_seconds(simulation.end_time()));
+  for (std::size_t v = 0; v < simulation.vehicle_count(); ++v) {
+    const VehicleAgent& agent = simulation.vehicle(v);
+    fmt::print("  {}: {} with {} lidar{}, {} waypoints, {:.1f} m\n",
+               agent.setup().name,
+               agent.setup().model,
+               agent.lidars().size(),
+               agent.lidars().size() == 1 ? "" : "s",
+               agent.setup().mission.waypoints.size(),
+               agent.mission().length());
+  }
+  if (simulation.obstacle_count() > 0) fmt::print("  {} obstacles\n", simulation.obstacle_count());
 }
 
 }  // namespace
@@ -102,7 +111,7 @@ Scenario make_scenario(const std::string& map_path,
   std::optional<Tour> tour;
   for (const double margin : {0.5, 0.3, 0.15}) {
     TourOptions options;
-    options.radius = airframe.radius;
+    options.radius = bounding_radius(airframe.hull());
     options.margin = margin;
     options.length_min = length;
     auto found = find_tour(*map, options, executor);
@@ -110,40 +119,47 @@ Scenario make_scenario(const std::string& map_path,
     if (tour && tour->length >= length) break;
   }
   if (!tour) {
-    throw InputError(fmt::format(
-        "{}: no free place for a vehicle of radius {:.2f} m was found; write vehicle.start and "
-        "mission.waypoints yourself",
-        map_path,
-        airframe.radius));
+    throw InputError(
+        fmt::format("{}: no free place for a vehicle of radius {:.2f} m was found; write start and "
+                    "mission.waypoints yourself",
+                    map_path,
+                    bounding_radius(airframe.hull())));
   }
   Scenario scenario;
   scenario.map = map_key;
-  scenario.vehicle.model = vehicle;
-  scenario.vehicle.start = rounded(tour->points_world.front());
-  scenario.lidars.front().model = lidar;
-  scenario.mission.motion.speed = speed;
+  VehicleSetup& flown = scenario.vehicles.front();
+  flown.model = vehicle;
+  flown.start = rounded(tour->points_world.front());
+  flown.lidars.front().model = lidar;
+  flown.mission.motion.speed = speed;
   for (std::size_t i = 1; i < tour->points_world.size(); ++i) {
-    scenario.mission.waypoints.push_back(rounded(tour->points_world[i]));
+    flown.mission.waypoints.push_back(rounded(tour->points_world[i]));
   }
-  const Vector3d first = scenario.mission.waypoints.front() - scenario.vehicle.start;
-  scenario.vehicle.start_yaw_deg = std::round(std::atan2(first.y(), first.x()) / kDegree);
+  const Vector3d first = flown.mission.waypoints.front() - flown.start;
+  flown.start_yaw_deg = std::round(std::atan2(first.y(), first.x()) / kDegree);
   return scenario;
 }
 
 void warn_about(const Scenario& scenario, const SurfelMap& map) {
-  const double radius = load_vehicle(scenario.vehicle.model, scenario.folder()).radius;
-  Vector3d from = scenario.vehicle.start;
-  for (std::size_t i = 0; i < scenario.mission.waypoints.size(); ++i) {
-    const Vector3d& to = scenario.mission.waypoints[i];
-    const double free = clearance_along(map, from, to, radius, 1.0);
-    if (free <= 0.0) {
-      log(
-          fmt::format("{}: warning: the leg to waypoint {} passes through the map; a collision is "
-                      "likely",
-                      scenario.place(fmt::format("mission.waypoints[{}]", i)),
-                      i + 1));
+  const auto fleet = scenario.fleet();
+  for (std::size_t v = 0; v < fleet.size(); ++v) {
+    const VehicleSetup& setup = fleet[v];
+    const double radius = bounding_radius(load_vehicle(setup.model, scenario.folder()).hull());
+    Vector3d from = setup.start;
+    for (std::size_t i = 0; i < setup.mission.waypoints.size(); ++i) {
+      const Vector3d& to = setup.mission.waypoints[i];
+      const double free = clearance_along(map, from, to, radius, 1.0);
+      if (free <= 0.0) {
+        const std::string key = scenario.vehicle_key(v, fmt::format("mission.waypoints[{}]", i));
+        log(fmt::format(
+            "{}: warning: {}'s leg to waypoint {} passes through the map; a collision is "
+            "likely",
+            scenario.place(key),
+            setup.name,
+            i + 1));
+      }
+      from = to;
     }
-    from = to;
   }
 }
 

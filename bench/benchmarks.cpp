@@ -185,11 +185,12 @@ BENCHMARK(import_cloud)
 void physics_step(benchmark::State& state) {
   const VehicleSettings settings = load_vehicle("quad_330");
   const Multirotor vehicle(settings);
-  const auto controller = make_controller(settings);
+  const auto controller = make_controller("cascade", settings);
+  ControllerMemory memory;
   VehicleState s = vehicle.hover_at({0, 0, 0}, 0.0);
   PositionCommand command;
   command.p_world = {1, 0, 0};
-  for (auto _ : state) vehicle.step(s, controller->update(s.body, command, 1e-3), 1e-3);
+  for (auto _ : state) vehicle.step(s, controller->update(s.body, command, 1e-3, memory), 1e-3);
 }
 BENCHMARK(physics_step);
 

@@ -17,19 +17,18 @@ class NearestReturn : public SampleSink {
 int main() try {
   Scenario scenario;
   scenario.map = "room.pfmap";
-  scenario.vehicle.start = {2, 3, 1.5};
-  scenario.mission.waypoints = {{3.5, 3, 1.5}, {3.5, 1.5, 1.5}};
+  scenario.vehicles[0].start = {2, 3, 1.5};
+  scenario.vehicles[0].mission.waypoints = {{3.5, 3, 1.5}, {3.5, 1.5, 1.5}};
   const Executor executor;
   Simulation simulation(scenario, SurfelMap::open(scenario.map), executor);
   NearestReturn sink;
   while (simulation.step(sink)) {
   }
-  const RunSummary& summary = simulation.summary();
   std::printf("%s: %.1f m flown, nearest return %.2f m\n",
-              to_string(summary.end),
-              summary.distance_flown,
+              to_string(simulation.end()),
+              simulation.summary(0).distance_flown,
               static_cast<double>(sink.nearest));
-  return summary.end == RunEnd::kCompleted ? 0 : 1;
+  return simulation.end() == RunEnd::kCompleted ? 0 : 1;
 } catch (const std::exception& error) {
   std::fprintf(stderr, "%s\n", error.what());
   return 2;

@@ -16,9 +16,9 @@ allowed() {
     map) echo "core geometry io map" ;;
     render) echo "core geometry map render" ;;
     lidar) echo "core geometry io map render lidar" ;;
-    vehicle) echo "core geometry vehicle" ;;
+    vehicle) echo "core geometry io vehicle" ;;
     fidelity) echo "core geometry io map render fidelity" ;;
-    world) echo "core geometry map world" ;;
+    world) echo "core geometry io map world" ;;
     sim) echo "core geometry io map render lidar vehicle world sim" ;;
   esac
 }

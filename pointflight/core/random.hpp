@@ -8,7 +8,7 @@ namespace pointflight {
 /// What a random draw is for. The list only grows and numbers are never reused: a draw's address is
 /// part of every recorded result.
 enum class StreamId : std::uint32_t {
-  kLidarRangeNoise = 1,  ///< index: scan << 32 | beam
+  kLidarRangeNoise = 1,  ///< entity: vehicle << 8 | lidar, index: scan << 32 | beam
   kImuGyroNoise = 2,     ///< index: sample * 3 + axis
   kImuGyroBias = 3,      ///< index: sample * 3 + axis
   kImuAccelNoise = 4,    ///< index: sample * 3 + axis
@@ -17,9 +17,12 @@ enum class StreamId : std::uint32_t {
   kCloudSampling = 7,    ///< points on analytic shapes; entity: shape, index: point
   kMissionSearch = 8,    ///< candidate places in `scenario new`; index: candidate
   // 9: was blocks of a cloud, now a plain hash
-  kScenePoses = 10,  ///< where sensors stand in an exact scene; index: try
-  kAimedBeams = 11,  ///< beams at the targets of a small scene; entity: pose, index: beam
-  kTest = 1000,      ///< inputs of tests and benchmarks
+  kScenePoses = 10,    ///< where sensors stand in an exact scene; index: try
+  kAimedBeams = 11,    ///< beams at the targets of a small scene; entity: pose, index: beam
+  kObstacles = 12,     ///< entity: obstacle, index: (times replaced << 12) + draw
+  kGusts = 13,         ///< entity: vehicle, index: physics step * 4 + draw
+  kDroppedScans = 14,  ///< entity: vehicle << 8 | lidar, index: scan
+  kTest = 1000,        ///< inputs of tests and benchmarks
 };
 
 /// Random numbers addressed by (seed, stream, entity, index): Philox 4x32-10 as a pure function.

@@ -69,8 +69,12 @@ struct SettingsReader::Document {
 
   std::string name;
   std::vector<Level> levels;
-  YAML::Node list;
-  std::string list_path;
+  /// Lists that are being read, the innermost last.
+  struct List {
+    YAML::Node node;
+    std::string path;
+  };
+  std::vector<List> lists;
 
   [[nodiscard]] std::string place(const YAML::Node& node) const {
     return fmt::format("{}:{}", name, node.Mark().line + 1);
@@ -210,26 +214,26 @@ bool SettingsReader::enter(const Key& key) {
 
 std::size_t SettingsReader::enter_list(const Key& key, std::size_t /*size*/) {
   const auto node = document_->find(key);
-  document_->list_path = document_->full_name(key);
-  document_->list = YAML::Node();
   if (!node) return kAbsent;
   if (!node->IsSequence()) {
     document_->fail(*node, document_->full_name(key), "expected a list, one `- ` per entry");
   }
   lines_[document_->full_name(key)] = node->Mark().line + 1;
-  document_->list = *node;
+  document_->lists.push_back({*node, document_->full_name(key)});
   return node->size();
 }
 
 void SettingsReader::enter_item(std::size_t index) {
-  const YAML::Node item = document_->list[index];
-  const std::string path = fmt::format("{}[{}]", document_->list_path, index);
+  const auto& list = document_->lists.back();
+  const YAML::Node item = list.node[index];
+  const std::string path = fmt::format("{}[{}]", list.path, index);
   if (!item.IsMap()) document_->fail(item, path, "expected indented `key: value` lines");
+  lines_[path] = item.Mark().line + 1;
   document_->push(item, path + ".");
 }
 
 void SettingsReader::leave_list() {
-  document_->list = YAML::Node();
+  document_->lists.pop_back();
 }
 
 void SettingsReader::value(const Key& key, double& value) {

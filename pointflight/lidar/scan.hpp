@@ -24,7 +24,8 @@ struct ScanPoint {
 /// What a LiDAR delivers for one scan: the returns in firing order.
 struct Scan {
   std::uint64_t index = 0;
-  std::uint32_t sensor = 0;  ///< Number of the LiDAR in the scenario.
+  std::uint32_t vehicle = 0;  ///< Number of the vehicle in the scenario.
+  std::uint32_t sensor = 0;   ///< Number of the LiDAR on it.
   SimTime start;
   SimTime end;
   std::size_t beams = 0;  ///< Fired, whether they returned or not.

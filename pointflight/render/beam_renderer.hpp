@@ -19,8 +19,7 @@ class BeamRenderer : public Renderer {
 
   void render(const RayBatch& batch, std::span<Hit> hits, const Executor& executor) const override;
 
-  /// One ray by itself.
-  [[nodiscard]] Hit trace(const Ray& ray) const;
+  [[nodiscard]] Hit trace(const Ray& ray) const override;
 
   /// Beams whose list of surfels overflowed and lost its farthest entry: there the result may
   /// depend on the shape of the tree (never on threads).

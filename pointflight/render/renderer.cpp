@@ -28,6 +28,16 @@ constexpr Entry kRenderers[] = {
 
 }  // namespace
 
+Hit Renderer::trace(const Ray& ray) const {
+  RayBatch batch;
+  batch.rays = {&ray, 1};
+  batch.T_world_sensor.translation = ray.origin_world;
+  batch.range_max = ray.range_max;
+  Hit hit;
+  render(batch, {&hit, 1}, Executor(1));
+  return hit;
+}
+
 std::vector<std::string> renderer_names() {
   std::vector<std::string> names;
   for (const Entry& entry : kRenderers) names.emplace_back(entry.name);

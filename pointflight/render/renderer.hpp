@@ -63,6 +63,9 @@ class Renderer {
                       std::span<Hit> hits,
                       const Executor& executor) const = 0;
 
+  /// One ray against the map by itself.
+  [[nodiscard]] virtual Hit trace(const Ray& ray) const;
+
   /// True if all rays are rendered from `T_world_sensor` whatever their own origins are.
   [[nodiscard]] virtual bool is_snapshot() const { return false; }
 };

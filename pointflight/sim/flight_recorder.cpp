@@ -13,11 +13,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Makes the folder for the run's files and one for its scans; returns the first.
-std::string make_folders(const std::string& folder, bool scans) {
+/// Makes a folder; returns it.
+std::string made_folder(const std::string& folder) {
   std::error_code error;
-  const fs::path innermost = scans ? fs::path(folder) / "scans" : fs::path(folder);
-  fs::create_directories(innermost, error);
+  fs::create_directories(folder, error);
   if (error) {
     throw InputError(fmt::format(
         "{}: cannot make the folder: {}; choose another with -o", folder, error.message()));
@@ -43,110 +42,30 @@ std::string at(const std::string& folder, const char* name) {
   return (fs::path(folder) / name).string();
 }
 
-}  // namespace
-
-FlightRecorder::FlightRecorder(const std::string& folder,
-                               const Scenario& scenario,
-                               std::size_t rotors)
-    : folder_(make_folders(folder, scenario.output.scans)),
-      write_scans_(scenario.output.scans),
-      trajectory_(at(folder, "trajectory.csv")),
-      tum_(at(folder, "trajectory.tum")),
-      events_(at(folder, "events.csv")),
-      scans_(at(folder, "scans.csv")) {
-  trajectory_.write(
-      "time,px,py,pz,qw,qx,qy,qz,vx,vy,vz,wx,wy,wz,command_px,command_py,command_pz,clearance");
-  for (std::size_t i = 0; i < rotors; ++i) trajectory_.write(fmt::format(",rotor{}", i));
-  trajectory_.write("\n");
-  tum_.write("# timestamp tx ty tz qx qy qz qw (T_world_body)\n");
-  events_.write("time,event,vehicle_x,vehicle_y,vehicle_z,place_x,place_y,place_z,penetration\n");
-  scans_.write("file,lidar,scan,start,end,beams,points\n");
-  if (scenario.output.imu) {
-    imu_.emplace(at(folder, "imu.csv"));
-    imu_->write("time,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z\n");
-  }
-}
-
-void FlightRecorder::on_state(const StateSample& sample) {
-  const RigidBodyState& b = sample.state.body;
+std::string row_of(const RigidBodyState& b) {
   const Quaterniond& q = b.q_world_body;
-  const std::string time = seconds(sample.time);
-  std::string row = fmt::format("{},{},{},{},{},{},{},{},{},",
-                                time,
-                                csv(b.p_world),
-                                q.w(),
-                                q.x(),
-                                q.y(),
-                                q.z(),
-                                csv(b.v_world),
-                                csv(b.omega_body),
-                                csv(sample.command.p_world));
-  // empty: farther than the simulation looks
-  if (sample.clearance) row += fmt::format("{}", *sample.clearance);
-  for (const RotorState& rotor : sample.state.rotors) row += fmt::format(",{}", rotor.speed);
-  trajectory_.write(row + "\n");
-  tum_.write(fmt::format("{} {} {} {} {} {} {} {}\n",
-                         time,
-                         b.p_world.x(),
-                         b.p_world.y(),
-                         b.p_world.z(),
-                         q.x(),
-                         q.y(),
-                         q.z(),
-                         q.w()));
+  return fmt::format("{},{},{},{},{},{},{}",
+                     csv(b.p_world),
+                     q.w(),
+                     q.x(),
+                     q.y(),
+                     q.z(),
+                     csv(b.v_world),
+                     csv(b.omega_body));
 }
 
-void FlightRecorder::on_imu(const ImuSample& sample) {
-  if (!imu_) return;
-  imu_->write(fmt::format("{},{},{}\n", seconds(sample.time), csv(sample.gyro), csv(sample.accel)));
-}
+constexpr const char* kStateColumns = "px,py,pz,qw,qx,qy,qz,vx,vy,vz,wx,wy,wz";
 
-void FlightRecorder::on_scan(const Scan& scan, const PoseAt& /*pose_at*/) {
-  if (!write_scans_) return;
-  const std::string name = fmt::format("scans/{}_{:06}.pcd", scan.sensor, scan.index);
-  write_scan_pcd(at(folder_, name.c_str()), scan);
-  scans_.write(fmt::format("{},{},{},{},{},{},{}\n",
-                           name,
-                           scan.sensor,
-                           scan.index,
-                           seconds(scan.start),
-                           seconds(scan.end),
-                           scan.beams,
-                           scan.points.size()));
-}
-
-void FlightRecorder::on_collision(const CollisionEvent& event) {
-  events_.write(fmt::format("{},{},{},{},{}\n",
-                            seconds(event.time),
-                            event.entered ? "collision" : "collision_end",
-                            csv(event.vehicle_world),
-                            csv(event.place_world),
-                            event.penetration));
-}
-
-void FlightRecorder::finish(const Simulation& simulation) {
-  trajectory_.commit();
-  tum_.commit();
-  if (imu_) imu_->commit();
-  events_.commit();
-  scans_.commit();
-  OutputFile summary(at(folder_, "summary.json"));
-  summary.write(summary_json(simulation));
-  summary.commit();
-}
-
-std::string summary_json(const Simulation& simulation) {
-  const RunSummary& s = simulation.summary();
-  const Scenario& scenario = simulation.scenario();
+nlohmann::ordered_json json_of(const Simulation& simulation, std::size_t number) {
+  const VehicleAgent& agent = simulation.vehicle(number);
+  const VehicleStatus& status = simulation.status(number);
+  const VehicleSummary& s = status.summary;
   nlohmann::ordered_json json;
-  json["pointflight"] = kVersion;
-  json["end"] = to_string(s.end);
-  json["seed"] = scenario.seed;
-  json["map"] = fs::path(scenario.map).filename().string();
-  json["vehicle"] = scenario.vehicle.model;
-  json["simulated_time"] = to_seconds(s.time);
+  json["name"] = agent.setup().name;
+  json["model"] = fs::path(agent.setup().model).filename().string();
+  json["label"] = agent.label();
   json["distance_flown"] = s.distance_flown;
-  json["mission_length"] = simulation.mission().length();
+  json["mission_length"] = agent.mission().length();
   json["speed_max"] = s.speed_max;
   json["tracking_error_rms"] = s.tracking_error_rms;
   json["tracking_error_max"] = s.tracking_error_max;
@@ -156,11 +75,205 @@ std::string summary_json(const Simulation& simulation) {
   json["beams"] = s.beams;
   json["points"] = s.points;
   json["collisions"] = s.collisions;
+  json["crashed"] = status.crashed;
   if (s.closest_approach) {
     json["closest_approach"] = *s.closest_approach;
     json["closest_place"] = json_of(s.closest_place_world);
+    json["closest_to"] = label_name(simulation, s.closest_label);
   } else {
     json["closest_approach"] = nullptr;
+  }
+  json["commands_rejected"] = status.autopilot.rejected;
+  json["command_timeouts"] = status.autopilot.timeouts;
+  if (agent.setup().battery) json["battery_used_ah"] = status.battery.used;
+  return json;
+}
+
+}  // namespace
+
+/// What one vehicle's samples go to.
+struct FlightRecorder::VehicleFiles {
+  VehicleFiles(const std::string& in, const OutputSetup& output)
+      : folder(made_folder(in)),
+        trajectory(at(folder, "trajectory.csv")),
+        tum(at(folder, "trajectory.tum")),
+        scans(at(folder, "scans.csv")) {
+    if (output.scans) made_folder(at(folder, "scans"));
+    if (output.imu) imu.emplace(at(folder, "imu.csv"));
+    if (output.odometry) odometry.emplace(at(folder, "odometry.csv"));
+  }
+
+  void commit() {
+    trajectory.commit();
+    tum.commit();
+    scans.commit();
+    if (imu) imu->commit();
+    if (odometry) odometry->commit();
+  }
+
+  std::string folder;
+  OutputFile trajectory;
+  OutputFile tum;
+  OutputFile scans;
+  std::optional<OutputFile> imu;
+  std::optional<OutputFile> odometry;
+};
+
+std::string vehicle_folder(const std::string& folder, const Simulation& simulation, std::size_t v) {
+  return simulation.vehicle_count() == 1
+             ? folder
+             : (fs::path(folder) / simulation.vehicle(v).setup().name).string();
+}
+
+std::string label_name(const Simulation& simulation, Label label) {
+  if (label == kMapLabel) return "map";
+  if (label >= kFirstObstacle) return fmt::format("obstacle {}", label - kFirstObstacle);
+  return simulation.vehicle(label - kFirstVehicle).setup().name;
+}
+
+FlightRecorder::FlightRecorder(const std::string& folder, const Simulation& simulation)
+    : folder_(made_folder(folder)),
+      write_scans_(simulation.scenario().output.scans),
+      events_(at(folder, "events.csv")) {
+  const OutputSetup& output = simulation.scenario().output;
+  events_.write(
+      "time,event,vehicle,partner,vehicle_x,vehicle_y,vehicle_z,place_x,place_y,place_z,"
+      "penetration\n");
+  if (!simulation.scenario().obstacles.empty()) {
+    obstacles_.emplace(at(folder, "obstacles.csv"));
+    obstacles_->write("time,label,px,py,pz,qw,qx,qy,qz,half_x,half_y,half_z\n");
+  }
+  for (std::size_t v = 0; v < simulation.vehicle_count(); ++v) {
+    names_.push_back(simulation.vehicle(v).setup().name);
+    auto files = std::make_unique<VehicleFiles>(vehicle_folder(folder, simulation, v), output);
+    files->trajectory.write(
+        fmt::format("time,{},command_px,command_py,command_pz,clearance,nearest", kStateColumns));
+    for (std::size_t i = 0; i < simulation.status(v).state.rotors.size(); ++i) {
+      files->trajectory.write(fmt::format(",rotor{}", i));
+    }
+    files->trajectory.write("\n");
+    files->tum.write("# timestamp tx ty tz qx qy qz qw (T_world_body)\n");
+    files->scans.write("file,lidar,scan,start,end,beams,points,px,py,pz,qw,qx,qy,qz\n");
+    if (files->imu) files->imu->write("time,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z\n");
+    if (files->odometry) {
+      files->odometry->write(fmt::format("time,delivered,{}\n", kStateColumns));
+    }
+    vehicles_.push_back(std::move(files));
+  }
+}
+
+FlightRecorder::~FlightRecorder() = default;
+
+void FlightRecorder::on_state(const StateSample& sample) {
+  VehicleFiles& files = *vehicles_[sample.vehicle];
+  const RigidBodyState& b = sample.state.body;
+  const Quaterniond& q = b.q_world_body;
+  const std::string time = seconds(sample.time);
+  std::string row = fmt::format("{},{},{},", time, row_of(b), csv(sample.command.p_world));
+  // empty: farther than the simulation looks
+  row += sample.nearest ? fmt::format("{},{}", sample.nearest->distance, sample.nearest->label)
+                        : std::string(",");
+  for (const RotorState& rotor : sample.state.rotors) row += fmt::format(",{}", rotor.speed);
+  files.trajectory.write(row + "\n");
+  files.tum.write(fmt::format("{} {} {} {} {} {} {} {}\n",
+                              time,
+                              b.p_world.x(),
+                              b.p_world.y(),
+                              b.p_world.z(),
+                              q.x(),
+                              q.y(),
+                              q.z(),
+                              q.w()));
+}
+
+void FlightRecorder::on_odometry(const OdometrySample& sample) {
+  VehicleFiles& files = *vehicles_[sample.vehicle];
+  if (!files.odometry) return;
+  files.odometry->write(fmt::format(
+      "{},{},{}\n", seconds(sample.time), seconds(sample.delivered), row_of(sample.state)));
+}
+
+void FlightRecorder::on_imu(std::uint32_t vehicle, const ImuSample& sample) {
+  auto& imu = vehicles_[vehicle]->imu;
+  if (!imu) return;
+  imu->write(fmt::format("{},{},{}\n", seconds(sample.time), csv(sample.gyro), csv(sample.accel)));
+}
+
+void FlightRecorder::on_scan(const Scan& scan, const PoseAt& pose_at) {
+  if (!write_scans_) return;
+  VehicleFiles& files = *vehicles_[scan.vehicle];
+  const std::string name = fmt::format("scans/{}_{:06}.pcd", scan.sensor, scan.index);
+  write_scan_pcd(at(files.folder, name.c_str()), scan);
+  // T_world_sensor in the middle of the scan
+  const Pose pose = pose_at(scan.start + (scan.end - scan.start) / 2);
+  const Quaterniond& q = pose.rotation;
+  files.scans.write(fmt::format("{},{},{},{},{},{},{},{},{},{},{},{}\n",
+                                name,
+                                scan.sensor,
+                                scan.index,
+                                seconds(scan.start),
+                                seconds(scan.end),
+                                scan.beams,
+                                scan.points.size(),
+                                csv(pose.translation),
+                                q.w(),
+                                q.x(),
+                                q.y(),
+                                q.z()));
+}
+
+void FlightRecorder::on_collision(const CollisionEvent& event) {
+  std::string partner = "map";
+  if (event.partner >= kFirstObstacle) {
+    partner = fmt::format("obstacle {}", event.partner - kFirstObstacle);
+  } else if (event.partner != kMapLabel) {
+    partner = names_[event.partner - kFirstVehicle];
+  }
+  events_.write(fmt::format("{},{},{},{},{},{},{}\n",
+                            seconds(event.time),
+                            event.entered ? "collision" : "collision_end",
+                            names_[event.vehicle],
+                            partner,
+                            csv(event.vehicle_world),
+                            csv(event.place_world),
+                            event.penetration));
+}
+
+void FlightRecorder::on_obstacle(const ObstacleSample& sample) {
+  if (!obstacles_) return;
+  const Pose& pose = sample.T_world_body;
+  obstacles_->write(fmt::format("{},{},{},{},{},{},{},{}\n",
+                                seconds(sample.time),
+                                sample.label,
+                                csv(pose.translation),
+                                pose.rotation.w(),
+                                pose.rotation.x(),
+                                pose.rotation.y(),
+                                pose.rotation.z(),
+                                csv(sample.half_extent)));
+}
+
+void FlightRecorder::finish(const Simulation& simulation) {
+  for (const auto& files : vehicles_) files->commit();
+  if (obstacles_) obstacles_->commit();
+  events_.commit();
+  OutputFile summary(at(folder_, "summary.json"));
+  summary.write(summary_json(simulation));
+  summary.commit();
+}
+
+std::string summary_json(const Simulation& simulation) {
+  const Scenario& scenario = simulation.scenario();
+  nlohmann::ordered_json json;
+  json["pointflight"] = kVersion;
+  json["end"] = to_string(simulation.end());
+  json["seed"] = scenario.seed;
+  json["map"] = fs::path(scenario.map).filename().string();
+  json["simulated_time"] = to_seconds(simulation.time());
+  json["obstacles"] = simulation.obstacle_count();
+  json["vehicles"] = nlohmann::ordered_json::array();
+  for (std::size_t v = 0; v < simulation.vehicle_count(); ++v) {
+    json["vehicles"].push_back(json_of(simulation, v));
   }
   return json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
 }

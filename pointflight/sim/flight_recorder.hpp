@@ -1,40 +1,54 @@
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "pointflight/core/output_file.hpp"
 #include "pointflight/sim/simulation.hpp"
 
 namespace pointflight {
 
-/// Writes a run into a folder: trajectory.csv, trajectory.tum, imu.csv, events.csv, scans.csv and
-/// scans/<lidar>_<number>.pcd, and at last summary.json. Files appear under their names when
-/// `finish` is called; scans as they are taken. Throws InputError (disk full, not writable).
+/// Writes a run into a folder. For each vehicle, in the folder itself where there is only one and
+/// in one of its name else: trajectory.csv, trajectory.tum, imu.csv, odometry.csv, scans.csv and
+/// scans/<lidar>_<number>.pcd. For all: events.csv, obstacles.csv and at last summary.json. Files
+/// appear under their names when `finish` is called; scans as they are taken. Throws InputError
+/// (disk full, not writable).
 class FlightRecorder : public SampleSink {
  public:
-  /// Makes the folder; it must be writable.
-  FlightRecorder(const std::string& folder, const Scenario& scenario, std::size_t rotors);
+  /// Makes the folders; they must be writable.
+  FlightRecorder(const std::string& folder, const Simulation& simulation);
+  ~FlightRecorder() override;
 
   void on_state(const StateSample& sample) override;
-  void on_imu(const ImuSample& sample) override;
+  void on_odometry(const OdometrySample& sample) override;
+  void on_imu(std::uint32_t vehicle, const ImuSample& sample) override;
   void on_scan(const Scan& scan, const PoseAt& pose_at) override;
   void on_collision(const CollisionEvent& event) override;
+  void on_obstacle(const ObstacleSample& sample) override;
 
   /// Closes the files and writes summary.json.
   void finish(const Simulation& simulation);
 
  private:
+  struct VehicleFiles;
+
   std::string folder_;
   bool write_scans_;
-  std::optional<OutputFile> imu_;
-  OutputFile trajectory_;
-  OutputFile tum_;
+  std::vector<std::string> names_;  ///< Of the vehicles.
+  std::vector<std::unique_ptr<VehicleFiles>> vehicles_;
   OutputFile events_;
-  OutputFile scans_;
+  std::optional<OutputFile> obstacles_;
 };
+
+/// Folder of a vehicle's files within a run's.
+std::string vehicle_folder(const std::string& folder, const Simulation& simulation, std::size_t v);
 
 /// summary.json as text: what happened, without wall-clock figures.
 std::string summary_json(const Simulation& simulation);
+
+/// "map", "drone1", "obstacle 3": what a label stands for in a run.
+std::string label_name(const Simulation& simulation, Label label);
 
 }  // namespace pointflight

@@ -12,21 +12,14 @@ namespace pointflight {
 namespace {
 
 constexpr std::array<std::string_view, 2> kRenderers = {"beam", "paper"};
-constexpr std::array<std::string_view, 2> kReactions = {"report", "stop"};
+constexpr std::array<std::string_view, 3> kReactions = {"report", "stop", "crash"};
+constexpr std::array<std::string_view, 3> kControllers = {"vehicle", "cascade", "geometric"};
 constexpr std::array<std::string_view, 2> kYawModes = {"along_path", "fixed"};
 constexpr double kFar = 1e7;  // m: coordinates of a UTM zone fit
 
 Key required(Key key) {
   key.required = true;
   return key;
-}
-
-void describe_vehicle(SettingsVisitor& v, VehicleSetup& s) {
-  v.value({"model", "", "name of a shipped vehicle, or a path"}, s.model);
-  v.value({"start", "m", "where it hovers at first", -kFar, kFar}, s.start);
-  v.value({"start_yaw_deg", "deg", "heading at first, from x towards y", -360, 360},
-          s.start_yaw_deg);
-  v.choice({"on_collision", "", "go on, or end the run"}, s.on_collision, kReactions);
 }
 
 void describe_lidar(SettingsVisitor& v, LidarMount& s) {
@@ -49,15 +42,66 @@ void describe_mission(SettingsVisitor& v, MissionSettings& s) {
   v.value({"waypoints", "m", "straight legs between them", -kFar, kFar}, s.waypoints);
 }
 
+void describe_limits(SettingsVisitor& v, LimitSetup& s) {
+  v.value({"speed_max", "m/s", "of velocity and position commands", 0, 200}, s.speed_max);
+  v.value({"acceleration_max", "m/s^2", "horizontal", 0, 100}, s.acceleration_max);
+  v.value({"climb_acceleration_max", "m/s^2", "up", 0, 100}, s.climb_acceleration_max);
+  v.value({"tilt_max_deg", "deg", "greatest tilt", 0, 180}, s.tilt_max_deg);
+  v.value({"body_rate_max", "rad/s", "greatest demanded rates", 0, 100}, s.body_rate_max);
+}
+
+void describe_airframe(SettingsVisitor& v, VehicleSetup& s) {
+  v.value({"name", "", "of its files; empty: drone and its number"}, s.name);
+  v.value({"model", "", "name of a shipped vehicle, or a path"}, s.model);
+  v.value({"start", "m", "where it hovers at first", -kFar, kFar}, s.start);
+  v.value({"start_yaw_deg", "deg", "heading at first, from x towards y", -360, 360},
+          s.start_yaw_deg);
+  v.value({"landed", "", "start with rotors off, carried by the ground"}, s.landed);
+  v.value({"copies", "", "so many alike, each with its own number", 1, 1000}, s.copies);
+  v.value({"copy_offset", "m", "of start and waypoints, from copy to copy", -kFar, kFar},
+          s.copy_offset);
+  v.value({"seed", "", "of its sensors and gusts; -1: the run's", -1, 9e15}, s.seed);
+  v.choice({"on_collision", "", "go on, end the run, or fall with rotors off"},
+           s.on_collision,
+           kReactions);
+  v.choice({"controller", "", "vehicle: the one of its file"}, s.controller, kControllers);
+  v.value({"command_timeout", "s", "hover without a command for so long; 0: never", 0, 3600},
+          s.command_timeout);
+  v.value({"battery", "", "fly on the vehicle's battery"}, s.battery);
+  v.section({"limits", "", "instead of the vehicle file's; 0: its own"},
+            [&](SettingsVisitor& w) { describe_limits(w, s.limits); });
+}
+
+void describe_equipment(SettingsVisitor& v, VehicleSetup& s) {
+  v.list({"lidars", "", "what it carries"}, s.lidars, [](SettingsVisitor& w, LidarMount& mount) {
+    describe_lidar(w, mount);
+  });
+  v.section({"mission", "", "where it flies; without waypoints it hovers"},
+            [&](SettingsVisitor& w) { describe_mission(w, s.mission); });
+  v.list({"commands", "", "what it is told, in the order of time"},
+         s.commands,
+         [](SettingsVisitor& w, CommandSettings& command) { describe(w, command); });
+  v.list({"faults", "", "what goes wrong"}, s.faults, [](SettingsVisitor& w, FaultSettings& fault) {
+    describe(w, fault);
+  });
+}
+
 void describe_output(SettingsVisitor& v, OutputSetup& s) {
   v.value({"trajectory_rate", "Hz", "rows of trajectory.csv and trajectory.tum", 0.1, 100000},
           s.trajectory_rate);
   v.value({"scans", "", "write scans as PCD"}, s.scans);
   v.value({"imu", "", "write imu.csv"}, s.imu);
+  v.value({"odometry", "", "write odometry.csv"}, s.odometry);
+  v.value({"odometry_rate", "Hz", "of odometry", 0.1, 10000}, s.odometry_rate);
+  v.value({"obstacle_rate", "Hz", "rows of obstacles.csv for each obstacle", 0.1, 1000},
+          s.obstacle_rate);
 }
 
 Scenario read(SettingsReader& reader, const std::string& path) {
   Scenario scenario;
+  for (const char* key : {"vehicle", "lidars", "mission", "commands", "faults"}) {
+    scenario.is_short = scenario.is_short || reader.has(key);
+  }
   describe(reader, scenario);
   reader.finish();
   scenario.path = path;
@@ -72,15 +116,67 @@ void describe(SettingsVisitor& v, Scenario& s) {
   v.value({"seed", "", "of everything random", 0, 9e15}, s.seed);
   v.value({"duration", "s", "0: as long as the mission takes", 0, 1e6}, s.duration);
   v.value({"physics_step", "s", "of the integrator", 0.0001, 0.005}, s.physics_step);
-  v.section({"vehicle", "", "what flies"},
-            [&](SettingsVisitor& w) { describe_vehicle(w, s.vehicle); });
-  v.list({"lidars", "", "what it carries"}, s.lidars, [](SettingsVisitor& w, LidarMount& mount) {
-    describe_lidar(w, mount);
+  if (s.is_short) {
+    VehicleSetup& vehicle = s.vehicles.front();
+    v.section({"vehicle", "", "what flies"},
+              [&](SettingsVisitor& w) { describe_airframe(w, vehicle); });
+    describe_equipment(v, vehicle);
+  } else {
+    v.list(
+        {"vehicles", "", "what flies"}, s.vehicles, [](SettingsVisitor& w, VehicleSetup& vehicle) {
+          describe_airframe(w, vehicle);
+          describe_equipment(w, vehicle);
+        });
+  }
+  v.list({"obstacles", "", "what moves by itself"},
+         s.obstacles,
+         [](SettingsVisitor& w, ObstacleSettings& obstacle) { describe(w, obstacle); });
+  v.section({"air", "", "wind and ground effect"}, [&](SettingsVisitor& w) {
+    w.section({"wind", "", "over the whole map"},
+              [&](SettingsVisitor& x) { describe(x, s.air.wind); });
+    w.value({"ground_effect", "", "more thrust near the ground, for vehicles with rotor.radius"},
+            s.air.ground_effect);
   });
-  v.section({"mission", "", "where it flies; without waypoints it hovers"},
-            [&](SettingsVisitor& w) { describe_mission(w, s.mission); });
   v.section({"output", "", "what is written"},
             [&](SettingsVisitor& w) { describe_output(w, s.output); });
+}
+
+std::vector<VehicleSetup> Scenario::fleet() const {
+  std::vector<VehicleSetup> fleet;
+  for (const VehicleSetup& setup : vehicles) {
+    for (std::int64_t copy = 0; copy < setup.copies; ++copy) {
+      VehicleSetup& one = fleet.emplace_back(setup);
+      const Vector3d offset = static_cast<double>(copy) * setup.copy_offset;
+      one.copies = 1;
+      one.start += offset;
+      for (Vector3d& waypoint : one.mission.waypoints) waypoint += offset;
+      for (CommandSettings& command : one.commands) {
+        if (command.kind == "position" || command.kind == "waypoint") command.vector += offset;
+      }
+      if (one.name.empty()) {
+        one.name = fmt::format("drone{}", fleet.size() - 1);
+      } else if (setup.copies > 1) {
+        one.name += fmt::format("{}", copy);
+      }
+    }
+  }
+  return fleet;
+}
+
+std::string Scenario::vehicle_key(std::size_t number, const std::string& key) const {
+  if (is_short) {
+    for (const char* section : {"lidars", "mission", "commands", "faults"}) {
+      if (key.starts_with(section)) return key;
+    }
+    return "vehicle." + key;
+  }
+  std::size_t entry = 0;
+  for (; entry + 1 < vehicles.size(); ++entry) {
+    const auto copies = static_cast<std::size_t>(vehicles[entry].copies);
+    if (number < copies) break;
+    number -= copies;
+  }
+  return fmt::format("vehicles[{}].{}", entry, key);
 }
 
 std::string Scenario::folder() const {
@@ -114,7 +210,10 @@ std::string scenario_yaml(const Scenario& scenario) {
 }
 
 std::string scenario_reference() {
-  Scenario defaults;
+  Scenario defaults;  // with one of each, so that all keys are listed
+  defaults.vehicles.front().commands.resize(1);
+  defaults.vehicles.front().faults.resize(1);
+  defaults.obstacles.resize(1);
   SettingsTable table;
   describe(table, defaults);
   return table.text();

@@ -10,7 +10,11 @@
 #include "pointflight/core/settings.hpp"
 #include "pointflight/core/time.hpp"
 #include "pointflight/map/surfel_map.hpp"
-#include "pointflight/sim/mission.hpp"
+#include "pointflight/sim/command_script.hpp"
+#include "pointflight/sim/faults.hpp"
+#include "pointflight/vehicle/mission.hpp"
+#include "pointflight/world/obstacles.hpp"
+#include "pointflight/world/wind.hpp"
 
 namespace pointflight {
 
@@ -23,17 +27,50 @@ struct LidarMount {
   bool noise = true;
 };
 
+/// Limits of the vehicle file that a scenario tightens or widens; 0: the file's.
+struct LimitSetup {
+  double speed_max = 0.0;               ///< m/s
+  double acceleration_max = 0.0;        ///< Horizontal, m/s^2.
+  double climb_acceleration_max = 0.0;  ///< m/s^2
+  double tilt_max_deg = 0.0;
+  double body_rate_max = 0.0;  ///< rad/s
+};
+
+/// One vehicle, or several alike.
 struct VehicleSetup {
+  std::string name;  ///< Of its files and topics; empty: "drone<number>".
   std::string model = "quad_330";
   Vector3d start = Vector3d::Zero();
   double start_yaw_deg = 0.0;
-  std::string on_collision = "report";  ///< or "stop"
+  bool landed = false;  ///< Starts with rotors off, carried by the ground.
+  std::int64_t copies = 1;
+  Vector3d copy_offset =
+      Vector3d(0.0, 2.0, 0.0);          ///< Of start and waypoints, from copy to copy, m.
+  std::int64_t seed = -1;               ///< Of its sensors and gusts; -1: the run's.
+  std::string on_collision = "report";  ///< or "stop", "crash"
+  std::string controller = "vehicle";   ///< As its file says; or "cascade", ...
+  double command_timeout = 0.5;         ///< s; 0: commands hold for ever.
+  bool battery = false;                 ///< Fly on the vehicle's battery.
+  LimitSetup limits;
+  std::vector<LidarMount> lidars = {LidarMount{}};
+  MissionSettings mission;
+  std::vector<CommandSettings> commands;
+  std::vector<FaultSettings> faults;
+};
+
+/// The air.
+struct AirSetup {
+  WindSettings wind;
+  bool ground_effect = true;  ///< Where the vehicle's file has its propellers' radius.
 };
 
 struct OutputSetup {
   double trajectory_rate = 200.0;  ///< Hz
   bool scans = true;
   bool imu = true;
+  bool odometry = false;
+  double odometry_rate = 200.0;  ///< Hz
+  double obstacle_rate = 10.0;   ///< Hz
 };
 
 /// A run: what a scenario file says.
@@ -44,12 +81,21 @@ struct Scenario {
   std::int64_t seed = 1;
   double duration = 0.0;        ///< s; 0: as long as the mission takes.
   double physics_step = 0.001;  ///< s
-  VehicleSetup vehicle;
-  std::vector<LidarMount> lidars = {LidarMount{}};
-  MissionSettings mission;
+  std::vector<VehicleSetup> vehicles = {VehicleSetup{}};
+  bool is_short =
+      false;  ///< The file is for one vehicle: `vehicle`, `lidars`, `mission`, ... on top.
+  std::vector<ObstacleSettings> obstacles;
+  AirSetup air;
   OutputSetup output;
 
   [[nodiscard]] std::string folder() const;
+
+  /// The vehicles with their copies written out, each with a name. Keys of number i in messages:
+  /// `vehicle_key`.
+  [[nodiscard]] std::vector<VehicleSetup> fleet() const;
+
+  /// "vehicles[1].start" for a vehicle of the fleet.
+  [[nodiscard]] std::string vehicle_key(std::size_t number, const std::string& key) const;
 
   /// "scenario.yaml:12" for a key, or the path where the key is not in the file.
   [[nodiscard]] std::string place(const std::string& key) const;

@@ -3,31 +3,52 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
+#include <map>
+#include <set>
+#include <tuple>
 
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/input_error.hpp"
-#include "pointflight/core/resources.hpp"
-#include "pointflight/geometry/rotation.hpp"
+#include "pointflight/core/random.hpp"
 
 namespace pointflight {
 namespace {
 
-constexpr double kSettleTime = 1.0;      // s after the mission's last instant
-constexpr double kHoverDuration = 10.0;  // s, without a mission
-constexpr double kGoalTolerance = 0.5;   // m
+constexpr double kHoverDuration = 10.0;     // s, where nobody has anything to do
+constexpr double kGoalTolerance = 0.5;      // m
+constexpr double kStartRoom = 1.0;          // m that random obstacles keep from starts
+constexpr std::size_t kVehiclesAChunk = 4;  // that one thread steps
+
+/// Names make folders and topics: each its own, and nothing but plain letters.
+void check_names(const Scenario& scenario, const std::vector<VehicleSetup>& fleet) {
+  std::set<std::string> names;
+  for (std::size_t i = 0; i < fleet.size(); ++i) {
+    const std::string& name = fleet[i].name;
+    const bool plain = std::all_of(name.begin(), name.end(), [](unsigned char c) {
+      return std::isalnum(c) != 0 || c == '_' || c == '-';
+    });
+    if (plain && names.insert(name).second) continue;
+    throw InputError(fmt::format("{}: '{}' {}",
+                                 scenario.place(scenario.vehicle_key(i, "name")),
+                                 name,
+                                 plain ? "is the name of two vehicles; give each its own"
+                                       : "names a folder: letters, digits, _ and - only"));
+  }
+}
 
 }  // namespace
 
-/// A LiDAR on the vehicle with its renderer and the number of its next scan.
-struct Simulation::MountedLidar {
-  Lidar lidar;
-  std::unique_ptr<Renderer> renderer;
-  Pose T_body_sensor;
-  Schedule schedule;
-  bool snapshot;
-  bool noise;
-  std::int64_t next = 0;
+/// What does not change in a run; copies of a simulation share it.
+struct Simulation::Setup {
+  Scenario scenario;
+  std::shared_ptr<const SurfelMap> map;
+  std::vector<std::unique_ptr<VehicleAgent>> agents;
+  Obstacles obstacles;
+  Duration step{0};
+  SimTime end_time;
+  Schedule obstacle_schedule{10.0};
 };
 
 const char* to_string(RunEnd end) {
@@ -49,212 +70,439 @@ const char* to_string(RunEnd end) {
 Simulation::Simulation(const Scenario& scenario,
                        std::shared_ptr<const SurfelMap> map,
                        const Executor& executor)
-    : scenario_(scenario),
-      map_(std::move(map)),
-      executor_(executor),
-      dynamics_(
-          scenario.at("vehicle.model",
-                      [&] { return load_vehicle(scenario.vehicle.model, scenario.folder()); })),
-      controller_(make_controller(dynamics_.settings())),
-      imu_(dynamics_.settings().imu, static_cast<std::uint64_t>(scenario.seed), 0),
-      mission_(scenario.vehicle.start, scenario.vehicle.start_yaw_deg * kDegree, scenario.mission),
-      step_(from_seconds(scenario.physics_step)),
-      state_schedule_(scenario.output.trajectory_rate),
-      imu_schedule_(dynamics_.settings().imu.rate) {
-  for (const LidarMount& mount : scenario_.lidars) {
-    const Vector3d rpy = mount.rotation_rpy_deg * kDegree;
-    const auto number = static_cast<std::uint32_t>(lidars_.size());
-    Lidar lidar = scenario_.at(fmt::format("lidars[{}].model", number), [&] {
-      return Lidar(load_lidar(mount.model, scenario_.folder()), number);
-    });
-    const double rate = lidar.settings().rate;
-    lidars_.push_back({std::move(lidar),
-                       make_renderer(mount.renderer, Scene{map_}),
-                       {quaternion_from_rpy(rpy.x(), rpy.y(), rpy.z()), mount.position},
-                       Schedule(rate),
-                       mount.snapshot,
-                       mount.noise});
+    : executor_(&executor) {
+  auto setup = std::make_shared<Setup>();
+  setup->scenario = scenario;
+  setup->map = std::move(map);
+  setup->step = from_seconds(scenario.physics_step);
+  setup->obstacle_schedule = Schedule(scenario.output.obstacle_rate);
+
+  std::map<std::string, std::shared_ptr<const Renderer>> renderers;
+  const RendererByName renderer = [&](const std::string& name) {
+    auto& made = renderers[name];
+    if (!made) made = make_renderer(name, Scene{setup->map});
+    return made;
+  };
+  const auto fleet = scenario.fleet();
+  if (fleet.empty()) {
+    throw InputError(fmt::format("{}: no vehicles; add one", scenario.place("vehicles")));
   }
-  state_ = dynamics_.hover_at(scenario_.vehicle.start, scenario_.vehicle.start_yaw_deg * kDegree);
-  rotor_commands_.assign(state_.rotors.size(), dynamics_.settings().hover_speed());
-  const double natural =
-      scenario_.mission.waypoints.empty() ? kHoverDuration : mission_.duration() + kSettleTime;
-  end_time_ = SimTime(from_seconds(scenario_.duration > 0.0 ? scenario_.duration : natural));
+  check_names(scenario, fleet);
+  ObstacleWorld world;
+  world.map = setup->map;
+  world.seed = static_cast<std::uint64_t>(scenario.seed);
+  world.folder = scenario.folder();
+  world.place = [&](std::size_t entry, const char* key) {
+    const std::string name = fmt::format("obstacles[{}].{}", entry, key);
+    const std::string item = fmt::format("obstacles[{}]", entry);
+    return scenario.place(scenario.lines.contains(name) ? name : item) + ": " + name;
+  };
+  double busy = 0.0;
+  for (std::size_t i = 0; i < fleet.size(); ++i) {
+    setup->agents.push_back(std::make_unique<VehicleAgent>(scenario, i, fleet[i], renderer));
+    const VehicleAgent& agent = *setup->agents.back();
+    state_.vehicles.push_back(agent.start());
+    world.keep_free.push_back({fleet[i].start, bounding_radius(agent.hull()) + kStartRoom});
+    busy = std::max(busy, agent.busy_time());
+  }
+  setup->obstacles = Obstacles(scenario.obstacles, world, executor);
+  const double natural = busy > 0.0 ? busy : kHoverDuration;
+  setup->end_time = SimTime(from_seconds(scenario.duration > 0.0 ? scenario.duration : natural));
+  sources_.resize(fleet.size());
+  setup_ = std::move(setup);
   check_start();
 }
 
-Simulation::~Simulation() = default;
+SimTime Simulation::end_time() const {
+  return setup_->end_time;
+}
+
+const Scenario& Simulation::scenario() const {
+  return setup_->scenario;
+}
+
+const VehicleAgent& Simulation::vehicle(std::size_t number) const {
+  return *setup_->agents[number];
+}
+
+std::size_t Simulation::obstacle_count() const {
+  return setup_->obstacles.size();
+}
+
+std::vector<Body> Simulation::obstacles(SimTime from, SimTime until) const {
+  return setup_->obstacles.bodies(from, until);
+}
 
 void Simulation::check_start() {
-  const auto here =
-      clearance(*map_, state_.body.p_world, dynamics_.settings().radius, kClearanceReach);
-  if (here && here->distance < 0.0) {
-    const Vector3d& p = scenario_.vehicle.start;
-    throw InputError(fmt::format(
-        "{}: vehicle.start: ({:.2f}, {:.2f}, {:.2f}) is {:.2f} m inside the map for a vehicle of "
-        "radius {:.2f} m; move it, or let `pointflight scenario new` find a free place",
-        scenario_.place("vehicle.start"),
-        p.x(),
-        p.y(),
-        p.z(),
-        -here->distance,
-        dynamics_.settings().radius));
+  const Scenario& scenario = setup_->scenario;
+  for (std::size_t i = 0; i < vehicle_count(); ++i) {
+    const VehicleAgent& agent = vehicle(i);
+    const Pose pose = status(i).state.body.T_world_body();
+    const Vector3d& p = pose.translation;
+    const std::string key = scenario.vehicle_key(i, "start");
+    const auto here = contact_with_map(*setup_->map, agent.hull(), pose, 0.0);
+    if (here && here->distance < 0.0) {
+      throw InputError(
+          fmt::format("{}: {}: ({:.2f}, {:.2f}, {:.2f}) of {} is {:.2f} m inside the map for a "
+                      "hull that reaches "
+                      "{:.2f} m; move it, or let `pointflight scenario new` find a free place",
+                      scenario.place(key),
+                      key,
+                      p.x(),
+                      p.y(),
+                      p.z(),
+                      agent.setup().name,
+                      -here->distance,
+                      bounding_radius(agent.hull())));
+    }
+    for (std::size_t j = 0; j < i; ++j) {
+      const VehicleAgent& other = vehicle(j);
+      const Pose pose_j = status(j).state.body.T_world_body();
+      const double apart = separation(agent.hull(), pose, other.hull(), pose_j).distance;
+      if (apart > 0.0) continue;
+      throw InputError(fmt::format("{}: {}: {} starts {:.2f} m inside {}; move one of them",
+                                   scenario.place(key),
+                                   key,
+                                   agent.setup().name,
+                                   -apart,
+                                   other.setup().name));
+    }
+    for (const Body& body : obstacles(SimTime{}, SimTime{})) {
+      const auto met = contact_with_body(
+          body.shape, body.T_world_body(SimTime{}), body.label, agent.hull(), pose, 0.0);
+      if (!met || met->distance > 0.0) continue;
+      throw InputError(
+          fmt::format("{}: {}: {} starts {:.2f} m inside obstacle {}; move one of them",
+                      scenario.place(key),
+                      key,
+                      agent.setup().name,
+                      -met->distance,
+                      body.label - kFirstObstacle));
+    }
   }
 }
 
-bool Simulation::step(SampleSink& sink) {
-  if (summary_.end != RunEnd::kRunning) return false;
-  command_ = mission_.at(time_);
-  rotor_commands_ = controller_->update(state_.body, command_, to_seconds(step_));
-  history_.record(time_, state_.body.T_world_body());
-  sense_clearance(sink);
-  const bool stops = colliding_ && scenario_.vehicle.on_collision == "stop";
-  sample_until(stops ? time_ + Duration{1} : time_ + step_, sink);
-  take_due_scans(time_, sink);
-  if (stops) {
-    finish(RunEnd::kCollision);
-    return false;
-  }
-  if (time_ >= end_time_) {
-    // the last scan ends with the run; its late channels need poses of one step more
-    history_.record(time_ + step_, state_at(time_ + step_).body.T_world_body());
-    take_due_scans(time_ + step_, sink);
-    const bool arrived = (state_.body.p_world - mission_.goal()).norm() < kGoalTolerance &&
-                         to_seconds(time_) >= mission_.duration();
-    finish(scenario_.mission.waypoints.empty() || arrived ? RunEnd::kCompleted
-                                                          : RunEnd::kMissionUnfinished);
-    return false;
-  }
+std::optional<std::string> Simulation::command(std::size_t vehicle_number, const Command& command) {
+  VehicleStatus& status = state_.vehicles[vehicle_number];
+  auto reason = vehicle(vehicle_number)
+                    .autopilot()
+                    .give(status.autopilot, command, state_.time, status.state.body);
+  if (!reason) status.scripted = false;
+  return reason;
+}
 
-  const Vector3d before = state_.body.p_world;
-  dynamics_.step(state_, rotor_commands_, to_seconds(step_));
-  time_ += step_;
-  if (!state_.body.p_world.allFinite()) {
-    throw InputError(fmt::format(
-        "{}: the dynamics diverged at {:.3f} s; give a smaller physics_step or softer loops",
-        scenario_.place("physics_step"),
-        to_seconds(time_)));
-  }
-  ++steps_;
-  summary_.time = time_;
-  summary_.distance_flown += (state_.body.p_world - before).norm();
-  summary_.speed_max = std::max(summary_.speed_max, state_.body.v_world.norm());
-  const double error = (state_.body.p_world - mission_.at(time_).p_world).norm();
-  squared_error_sum_ += error * error;
-  summary_.tracking_error_max = std::max(summary_.tracking_error_max, error);
-  summary_.tracking_error_rms = std::sqrt(squared_error_sum_ / static_cast<double>(steps_));
-  return true;
+void Simulation::follow(std::size_t vehicle, std::shared_ptr<StateSource> source) {
+  sources_[vehicle] = std::move(source);
+}
+
+void Simulation::restore(const SimulationState& state) {
+  state_ = state;
 }
 
 void Simulation::interrupt() {
-  finish(RunEnd::kInterrupted);
+  state_.end = RunEnd::kInterrupted;
 }
 
-void Simulation::finish(RunEnd end) {
-  summary_.end = end;
-  summary_.time = time_;
-}
-
-/// True if the sphere met the map between the last two steps: fast, small vehicles, thin walls.
-bool Simulation::passed_through() const {
-  if (!previous_p_world_ || !clearance_) return false;
-  const double moved = (state_.body.p_world - *previous_p_world_).norm();
-  if (clearance_->distance >= moved) return false;
-  const double radius = dynamics_.settings().radius;
-  return clearance_along(*map_, *previous_p_world_, state_.body.p_world, radius, moved) < 0.0;
-}
-
-void Simulation::sense_clearance(SampleSink& sink) {
-  const double radius = dynamics_.settings().radius;
-  clearance_ = clearance(*map_, state_.body.p_world, radius, kClearanceReach);
-  if (clearance_ &&
-      (!summary_.closest_approach || clearance_->distance < *summary_.closest_approach)) {
-    summary_.closest_approach = clearance_->distance;
-    summary_.closest_place_world = clearance_->place_world;
+bool Simulation::advance_to(SimTime time, SampleSink& sink) {
+  while (state_.time < time) {
+    if (!step(sink)) return false;
   }
-  const bool inside = (clearance_ && clearance_->distance < 0.0) || passed_through();
-  previous_p_world_ = state_.body.p_world;
-  if (inside != colliding_) {
-    colliding_ = inside;
-    summary_.collisions += inside ? 1 : 0;
-    CollisionEvent event;
-    event.time = time_;
-    event.entered = inside;
-    event.vehicle_world = state_.body.p_world;
-    if (clearance_) event.place_world = clearance_->place_world;
-    event.penetration = inside ? std::max(0.0, -clearance_->distance) : 0.0;
-    sink.on_collision(event);
+  return state_.end == RunEnd::kRunning;
+}
+
+/// What is near each hull, now that everybody is where they are.
+void Simulation::sense(std::vector<StepSamples>& samples) {
+  const SimTime now = state_.time;
+  const SimTime before = state_.step_number > 0 ? now - setup_->step : now;
+  const std::vector<Body> bodies = obstacles(before, now);
+  std::vector<PlacedBody> placed;
+  placed.reserve(vehicle_count() + bodies.size());
+  for (std::size_t i = 0; i < vehicle_count(); ++i) {
+    const VehicleAgent& agent = vehicle(i);
+    const Pose pose = status(i).state.body.T_world_body();
+    const ProximityState& known = status(i).proximity;
+    placed.push_back({agent.label(),
+                      &agent.shape(),
+                      bounding_radius(agent.hull()),
+                      known.started ? known.T_world_body : pose,
+                      pose});
   }
+  for (const Body& body : bodies) {
+    if (body.until <= now || body.from > now) continue;  // was replaced within the step
+    const Pose pose = body.T_world_body(now);
+    placed.push_back({body.label,
+                      &body.shape,
+                      bounding_radius(body.shape),
+                      body.from > before ? pose : body.T_world_body(before),
+                      pose});
+  }
+  executor_->parallel_for(
+      vehicle_count(), kVehiclesAChunk, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) {
+          VehicleStatus& status = state_.vehicles[i];
+          const VehicleAgent& agent = vehicle(i);
+          ProximityQuery query;
+          query.vehicle = agent.number();
+          query.own_label = agent.label();
+          query.hull = &agent.hull();
+          query.T_world_body = placed[i].now;
+          query.now = now;
+          query.step = setup_->step;
+          query.reach = kClearanceReach;
+          query.ignores_map = status.landed || status.crashed;
+          sense_proximity(query, *setup_->map, placed, status.proximity, samples[i].collisions);
+          const auto& nearest = status.proximity.nearest;
+          VehicleSummary& summary = status.summary;
+          if (nearest && !status.crashed &&
+              (!summary.closest_approach || nearest->distance < *summary.closest_approach)) {
+            summary.closest_approach = nearest->distance;
+            summary.closest_place_world = nearest->place_world;
+            summary.closest_label = nearest->label;
+          }
+          // a wreck lies still on what is below it
+          if (status.crashed && nearest && nearest->label == kMapLabel &&
+              nearest->distance <= 0.0) {
+            const Vector3d up = query.T_world_body.translation - nearest->place_world;
+            status.at_rest = status.at_rest || up.z() > 0.5 * up.norm();
+            if (status.at_rest) {
+              status.state.body.v_world.setZero();
+              status.state.body.omega_body.setZero();
+            }
+          }
+        }
+      });
 }
 
-/// The state within the present step, by the same integrator.
-VehicleState Simulation::state_at(SimTime time) const {
-  VehicleState state = state_;
-  if (time > time_) dynamics_.step(state, rotor_commands_, to_seconds(time - time_));
-  return state;
-}
-
-/// Samples due in [time_, end), in the order (time, kind).
-void Simulation::sample_until(SimTime end, SampleSink& sink) {
-  for (;;) {
-    const SimTime state_time = state_schedule_.at(next_state_);
-    const SimTime imu_time = imu_schedule_.at(next_imu_);
-    const SimTime next = std::min(state_time, imu_time);
-    if (next >= end || next > end_time_) return;
-    const VehicleState state = state_at(next);
-    if (state_time == next) {
-      StateSample sample{next, state, mission_.at(next), std::nullopt};
-      if (clearance_) sample.clearance = clearance_->distance;
-      sink.on_state(sample);
-      ++next_state_;
-      ++summary_.states;
+/// Collisions of this step: who stops, who falls. True where the run ends.
+bool Simulation::react(std::vector<StepSamples>& samples) {
+  bool stops = false;
+  for (std::size_t i = 0; i < vehicle_count(); ++i) {
+    const VehicleAgent& agent = vehicle(i);
+    VehicleStatus& status = state_.vehicles[i];
+    for (const CollisionEvent& event : samples[i].collisions) {
+      if (!event.entered) continue;
+      ++status.summary.collisions;
+      if (agent.setup().on_collision == "stop") stops = true;
+      if (agent.setup().on_collision == "crash") agent.crash(status);
     }
-    if (imu_time == next) {
-      sink.on_imu(
-          imu_.sample(next_imu_, next, state.body, dynamics_.acceleration(state, rotor_commands_)));
-      ++next_imu_;
-      ++summary_.imu_samples;
+  }
+  return stops;
+}
+
+bool Simulation::step(SampleSink& sink) {
+  if (state_.end != RunEnd::kRunning) return false;
+  const SimTime now = state_.time;
+  const double dt = to_seconds(setup_->step);
+  std::vector<StepSamples> samples(vehicle_count());
+  sense(samples);
+  const bool stops = react(samples);
+  const bool last = now >= setup_->end_time;
+  const SimTime samples_end = stops || last ? now + Duration{1} : now + setup_->step;
+  executor_->parallel_for(
+      vehicle_count(), kVehiclesAChunk, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) {
+          VehicleStatus& status = state_.vehicles[i];
+          status.history.record(now, status.state.body.T_world_body());
+          vehicle(i).control(status, *setup_->map, now, setup_->step, state_.step_number);
+          vehicle(i).sample(status, now, samples_end, samples[i]);
+        }
+      });
+  deliver(samples, sink);
+  sample_obstacles(samples_end, sink);
+  take_due_scans(now, sink);
+  if (stops) {
+    state_.end = RunEnd::kCollision;
+    return false;
+  }
+  if (last) {
+    finish_run(sink);
+    return false;
+  }
+  std::vector<char> fine(vehicle_count(), 1);
+  executor_->parallel_for(
+      vehicle_count(), kVehiclesAChunk, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) {
+          if (!sources_[i]) fine[i] = vehicle(i).integrate(state_.vehicles[i], dt) ? 1 : 0;
+        }
+      });
+  for (std::size_t i = 0; i < vehicle_count(); ++i) {
+    if (sources_[i]) {
+      VehicleStatus& status = state_.vehicles[i];
+      if (auto state = sources_[i]->state_at(now + setup_->step)) {
+        status.summary.distance_flown += (state->p_world - status.state.body.p_world).norm();
+        status.state.body = *state;
+      }
+    }
+    if (fine[i] != 0) continue;
+    throw InputError(fmt::format(
+        "{}: the dynamics of {} diverged at {:.3f} s; give a smaller physics_step or softer loops",
+        setup_->scenario.place("physics_step"),
+        vehicle(i).setup().name,
+        to_seconds(now)));
+  }
+  state_.time = now + setup_->step;
+  ++state_.step_number;
+  return true;
+}
+
+/// The last scans end with the run; their late channels need poses of one step more.
+void Simulation::finish_run(SampleSink& sink) {
+  const SimTime beyond = state_.time + setup_->step;
+  for (std::size_t i = 0; i < vehicle_count(); ++i) {
+    VehicleStatus& status = state_.vehicles[i];
+    const VehicleState next = vehicle(i).state_after(status, to_seconds(setup_->step));
+    status.history.record(beyond, next.body.T_world_body());
+  }
+  take_due_scans(beyond, sink);
+  state_.end = arrived() ? RunEnd::kCompleted : RunEnd::kMissionUnfinished;
+}
+
+/// All that have a mission and nothing else to do are at their goals; nobody lies broken.
+bool Simulation::arrived() const {
+  for (std::size_t i = 0; i < vehicle_count(); ++i) {
+    const VehicleSetup& setup = vehicle(i).setup();
+    if (status(i).crashed) return false;
+    if (setup.mission.waypoints.empty() || !setup.commands.empty()) continue;
+    const Mission& mission = vehicle(i).mission();
+    const double away = (status(i).state.body.p_world - mission.goal()).norm();
+    if (away >= kGoalTolerance || to_seconds(state_.time) < mission.duration()) return false;
+  }
+  return true;
+}
+
+/// All vehicles' samples in the order (time, kind, vehicle).
+void Simulation::deliver(std::vector<StepSamples>& samples, SampleSink& sink) {
+  struct Due {
+    SimTime time;
+    int kind;
+    std::size_t vehicle;
+    std::size_t index;
+  };
+  std::vector<Due> due;
+  for (std::size_t v = 0; v < samples.size(); ++v) {
+    const StepSamples& s = samples[v];
+    for (std::size_t i = 0; i < s.collisions.size(); ++i) {
+      due.push_back({s.collisions[i].time, 0, v, i});
+    }
+    for (std::size_t i = 0; i < s.states.size(); ++i) due.push_back({s.states[i].time, 1, v, i});
+    for (std::size_t i = 0; i < s.odometry.size(); ++i) {
+      due.push_back({s.odometry[i].delivered, 2, v, i});
+    }
+    for (std::size_t i = 0; i < s.imu.size(); ++i) due.push_back({s.imu[i].time, 3, v, i});
+  }
+  std::stable_sort(due.begin(), due.end(), [](const Due& a, const Due& b) {
+    return std::tie(a.time, a.kind, a.vehicle) < std::tie(b.time, b.kind, b.vehicle);
+  });
+  for (const Due& d : due) {
+    const StepSamples& s = samples[d.vehicle];
+    if (d.kind == 0) sink.on_collision(s.collisions[d.index]);
+    if (d.kind == 1) sink.on_state(s.states[d.index]);
+    if (d.kind == 2) sink.on_odometry(s.odometry[d.index]);
+    if (d.kind == 3) sink.on_imu(static_cast<std::uint32_t>(d.vehicle), s.imu[d.index]);
+  }
+}
+
+void Simulation::sample_obstacles(SimTime end, SampleSink& sink) {
+  if (setup_->obstacles.size() == 0) return;
+  for (;; ++state_.next_obstacle_sample) {
+    const SimTime time = setup_->obstacle_schedule.at(state_.next_obstacle_sample);
+    if (time >= end) return;
+    for (const Body& body : obstacles(time, time)) {
+      if (time < body.from || time >= body.until) continue;
+      ObstacleSample sample;
+      sample.time = time;
+      sample.label = body.label;
+      sample.T_world_body = body.T_world_body(time);
+      if (const auto* solid = std::get_if<Solid>(&body.shape)) {
+        sample.half_extent = half_extent(*solid);
+      }
+      sink.on_obstacle(sample);
     }
   }
 }
 
-/// Scans whose last beam lies before `known`, the newest record: rendered in arrears.
+std::vector<Body> Simulation::bodies_for_scan(SimTime from, SimTime until) const {
+  std::vector<Body> bodies = obstacles(from, until);
+  for (std::size_t i = 0; i < vehicle_count(); ++i) {
+    Body body;
+    body.label = vehicle(i).label();
+    body.shape = vehicle(i).shape();
+    body.intensity = static_cast<float>(vehicle(i).settings().intensity);
+    body.speed_max = status(i).history.speed_max(from, until);
+    body.T_world_body = [&history = status(i).history](SimTime t) { return history.at(t); };
+    bodies.push_back(std::move(body));
+  }
+  return bodies;
+}
+
+/// Scans whose last beam lies before `known`, the newest record: rendered in arrears, those that
+/// end together at the same time.
 void Simulation::take_due_scans(SimTime known, SampleSink& sink) {
+  struct Due {
+    std::size_t vehicle, lidar;
+  };
   for (;;) {
-    // in the order of their ends; several may be due where a sensor is faster than the physics
-    MountedLidar* next = nullptr;
-    SimTime next_end = SimTime::max();
-    SimTime oldest_needed = time_;
-    for (MountedLidar& mounted : lidars_) {
-      const SimTime end = mounted.schedule.at(mounted.next + 1);
-      oldest_needed = std::min(oldest_needed, mounted.schedule.at(mounted.next));
-      // a step later than the scan's end: channels of the last cycle fire up to 0.1 ms after it
-      if (end + step_ > known || end >= next_end) continue;
-      next = &mounted;
-      next_end = end;
+    std::vector<Due> due;
+    SimTime first_end = SimTime::max();
+    SimTime oldest_needed = state_.time;
+    for (std::size_t v = 0; v < vehicle_count(); ++v) {
+      for (std::size_t l = 0; l < vehicle(v).lidars().size(); ++l) {
+        const Schedule& schedule = vehicle(v).lidars()[l].schedule;
+        const std::int64_t number = status(v).next_scan[l];
+        const SimTime end = schedule.at(number + 1);
+        oldest_needed = std::min(oldest_needed, schedule.at(number));
+        // a step later than the scan's end: late channels fire up to 0.1 ms after it
+        if (end + setup_->step > known || end > first_end) continue;
+        if (end < first_end) due.clear();
+        first_end = end;
+        due.push_back({v, l});
+      }
     }
-    if (next == nullptr) {
-      history_.forget_before(oldest_needed);
+    if (due.empty()) {
+      for (VehicleStatus& status : state_.vehicles) status.history.forget_before(oldest_needed);
       return;
     }
-    take_scan(*next, sink);
+    std::vector<std::optional<Scan>> scans(due.size());
+    executor_->parallel_for(due.size(), 1, [&](std::size_t k, std::size_t) {
+      const auto [v, l] = due[k];
+      const VehicleAgent& agent = vehicle(v);
+      const MountedLidar& mounted = agent.lidars()[l];
+      const std::int64_t number = status(v).next_scan[l];
+      const SimTime start = mounted.schedule.at(number);
+      if (agent.faults().is_dead(l, start)) return;
+      const double lost = agent.faults().dropped_share(l, start);
+      const RandomStream chance(agent.seed(),
+                                StreamId::kDroppedScans,
+                                agent.number() << 8 | static_cast<std::uint32_t>(l));
+      if (lost > 0.0 && chance.uniform(static_cast<std::uint64_t>(number)) < lost) return;
+      // late channels fire up to a step after the scan's end
+      std::vector<Body> bodies = bodies_for_scan(start, first_end + setup_->step);
+      std::erase_if(bodies, [&](const Body& body) { return body.label == agent.label(); });
+      const ScanRequest request{static_cast<std::uint64_t>(number),
+                                start,
+                                mounted.snapshot,
+                                mounted.noise,
+                                agent.seed(),
+                                bodies};
+      const StateHistory& history = status(v).history;
+      const PoseAt pose_at = [&](SimTime t) { return history.at(t) * mounted.T_body_sensor; };
+      scans[k] = mounted.lidar->take(request, pose_at, *mounted.renderer, *executor_);
+      scans[k]->vehicle = agent.number();
+      scans[k]->sensor = static_cast<std::uint32_t>(l);
+    });
+    for (std::size_t k = 0; k < due.size(); ++k) {
+      const auto [v, l] = due[k];
+      VehicleStatus& status = state_.vehicles[v];
+      ++status.next_scan[l];
+      if (!scans[k]) continue;
+      ++status.summary.scans;
+      status.summary.beams += scans[k]->beams;
+      status.summary.points += scans[k]->points.size();
+      const MountedLidar& mounted = vehicle(v).lidars()[l];
+      const StateHistory& history = status.history;
+      sink.on_scan(*scans[k], [&](SimTime t) { return history.at(t) * mounted.T_body_sensor; });
+    }
   }
-}
-
-void Simulation::take_scan(MountedLidar& mounted, SampleSink& sink) {
-  const PoseAt pose_at = [&](SimTime t) { return history_.at(t) * mounted.T_body_sensor; };
-  const ScanRequest request{static_cast<std::uint64_t>(mounted.next),
-                            mounted.schedule.at(mounted.next),
-                            mounted.snapshot,
-                            mounted.noise,
-                            static_cast<std::uint64_t>(scenario_.seed),
-                            {}};
-  const Scan scan = mounted.lidar.take(request, pose_at, *mounted.renderer, executor_);
-  ++mounted.next;
-  ++summary_.scans;
-  summary_.beams += scan.beams;
-  summary_.points += scan.points.size();
-  sink.on_scan(scan, pose_at);
 }
 
 }  // namespace pointflight

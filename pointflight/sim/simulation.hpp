@@ -7,131 +7,98 @@
 #include <vector>
 
 #include "pointflight/core/parallel.hpp"
-#include "pointflight/lidar/lidar.hpp"
-#include "pointflight/render/renderer.hpp"
+#include "pointflight/sim/samples.hpp"
 #include "pointflight/sim/scenario.hpp"
-#include "pointflight/sim/state_history.hpp"
-#include "pointflight/vehicle/controller.hpp"
-#include "pointflight/vehicle/imu.hpp"
-#include "pointflight/vehicle/multirotor.hpp"
-#include "pointflight/world/clearance.hpp"
+#include "pointflight/sim/state_source.hpp"
+#include "pointflight/sim/vehicle_agent.hpp"
 
 namespace pointflight {
-
-/// Truth at an instant.
-struct StateSample {
-  SimTime time;
-  VehicleState state;
-  PositionCommand command;
-  std::optional<double> clearance;  ///< m; nothing within `Simulation::kClearanceReach`.
-};
-
-/// The vehicle's sphere met the map, or left it again.
-struct CollisionEvent {
-  SimTime time;
-  bool entered = true;
-  Vector3d vehicle_world = Vector3d::Zero();
-  Vector3d place_world = Vector3d::Zero();  ///< What it met.
-  double penetration = 0.0;                 ///< m
-};
-
-/// Where the samples of a run go. Called in the order of their times, from one thread.
-class SampleSink {
- public:
-  virtual ~SampleSink() = default;
-  virtual void on_state(const StateSample& /*sample*/) {}
-  virtual void on_imu(const ImuSample& /*sample*/) {}
-  /// `pose_at` gives T_world_sensor during the scan.
-  virtual void on_scan(const Scan& /*scan*/, const PoseAt& /*pose_at*/) {}
-  virtual void on_collision(const CollisionEvent& /*event*/) {}
-};
 
 enum class RunEnd { kRunning, kCompleted, kMissionUnfinished, kCollision, kInterrupted };
 const char* to_string(RunEnd end);
 
-/// What happened in a run. Holds nothing of the wall clock.
-struct RunSummary {
-  RunEnd end = RunEnd::kRunning;
+/// Everything of a run that changes: a value. What it holds by pointer (trajectories that are
+/// flown) is immutable.
+struct SimulationState {
   SimTime time;
-  double distance_flown = 0.0;      ///< m
-  double speed_max = 0.0;           ///< m/s
-  double tracking_error_rms = 0.0;  ///< Of the position against its command, m.
-  double tracking_error_max = 0.0;
-  std::uint64_t states = 0;
-  std::uint64_t imu_samples = 0;
-  std::uint64_t scans = 0;
-  std::uint64_t beams = 0;
-  std::uint64_t points = 0;
-  std::uint64_t collisions = 0;
-  std::optional<double> closest_approach;  ///< Of the sphere to the map, m; negative inside.
-  Vector3d closest_place_world = Vector3d::Zero();
+  std::uint64_t step_number = 0;
+  std::int64_t next_obstacle_sample = 0;
+  RunEnd end = RunEnd::kRunning;
+  std::vector<VehicleStatus> vehicles;
 };
 
-/// The deterministic loop: control, sense, integrate. A function of scenario and map; threads, wall
-/// clock and sinks change nothing.
+/// The deterministic loop: sense, control, integrate, and scans in arrears. A function of scenario,
+/// map and commands; threads, wall clock and sinks change nothing.
+///
+/// A run can be saved and restored (`state`, `restore`), and branched: a copy of a Simulation goes
+/// its own way and shares what does not change (map, renderers, models) with the original.
 class Simulation {
  public:
   /// Clearance is known up to here, m.
   static constexpr double kClearanceReach = 10.0;
 
-  /// Throws InputError where the scenario cannot be flown (unknown models, start inside the map).
+  /// Throws InputError where the scenario cannot be flown (unknown models, start inside the map or
+  /// in each other, obstacles without room). The executor must outlive it.
   Simulation(const Scenario& scenario,
              std::shared_ptr<const SurfelMap> map,
              const Executor& executor);
-  ~Simulation();
 
   /// One physics step; samples that fall due go to `sink`. False when the run has ended.
   bool step(SampleSink& sink);
 
+  /// Steps until the present time is `time` or later. False when the run has ended.
+  bool advance_to(SimTime time, SampleSink& sink);
+
+  /// Tells a vehicle what to do from now on. Returns why it does not, if so: such commands are
+  /// counted, and change nothing.
+  std::optional<std::string> command(std::size_t vehicle, const Command& command);
+
+  /// From now on the vehicle's states come from elsewhere; null: from the local dynamics again.
+  /// Scans, collisions and samples see no difference. Not part of `state`.
+  void follow(std::size_t vehicle, std::shared_ptr<StateSource> source);
+
   /// Ends the run early.
   void interrupt();
 
-  [[nodiscard]] SimTime time() const { return time_; }
-  [[nodiscard]] SimTime end_time() const { return end_time_; }
-  [[nodiscard]] const VehicleState& state() const { return state_; }
-  [[nodiscard]] const Mission& mission() const { return mission_; }
-  [[nodiscard]] const Scenario& scenario() const { return scenario_; }
-  [[nodiscard]] const VehicleSettings& vehicle() const { return dynamics_.settings(); }
-  [[nodiscard]] const RunSummary& summary() const { return summary_; }
+  [[nodiscard]] const SimulationState& state() const { return state_; }
+  /// Goes on from a state of this simulation or a copy of it: the same bytes as the first time.
+  void restore(const SimulationState& state);
+
+  [[nodiscard]] SimTime time() const { return state_.time; }
+  [[nodiscard]] SimTime end_time() const;
+  [[nodiscard]] RunEnd end() const { return state_.end; }
+  [[nodiscard]] const Scenario& scenario() const;
+
+  [[nodiscard]] std::size_t vehicle_count() const { return state_.vehicles.size(); }
+  [[nodiscard]] const VehicleAgent& vehicle(std::size_t number) const;
+  [[nodiscard]] const VehicleStatus& status(std::size_t number) const {
+    return state_.vehicles[number];
+  }
+  [[nodiscard]] const VehicleSummary& summary(std::size_t number) const {
+    return state_.vehicles[number].summary;
+  }
+
+  [[nodiscard]] std::size_t obstacle_count() const;
+  /// Obstacles between two instants.
+  [[nodiscard]] std::vector<Body> obstacles(SimTime from, SimTime until) const;
 
  private:
-  struct MountedLidar;
+  struct Setup;
 
   void check_start();
-  void sense_clearance(SampleSink& sink);
-  void sample_until(SimTime end, SampleSink& sink);
+  void sense(std::vector<StepSamples>& samples);
+  [[nodiscard]] bool react(std::vector<StepSamples>& samples);
+  void deliver(std::vector<StepSamples>& samples, SampleSink& sink);
+  void sample_obstacles(SimTime end, SampleSink& sink);
   void take_due_scans(SimTime known, SampleSink& sink);
-  void take_scan(MountedLidar& mounted, SampleSink& sink);
-  [[nodiscard]] bool passed_through() const;
-  void finish(RunEnd end);
-  [[nodiscard]] VehicleState state_at(SimTime time) const;
+  void finish_run(SampleSink& sink);
+  [[nodiscard]] std::vector<Body> bodies_for_scan(SimTime from, SimTime until) const;
+  [[nodiscard]] bool arrived() const;
 
-  Scenario scenario_;
-  std::shared_ptr<const SurfelMap> map_;
-  const Executor& executor_;
-  Multirotor dynamics_;
-  std::unique_ptr<Controller> controller_;
-  Imu imu_;
-  Mission mission_;
-  std::vector<MountedLidar> lidars_;
-  StateHistory history_;
-
-  Duration step_;
-  SimTime time_;
-  SimTime end_time_;
-  VehicleState state_;
-  PositionCommand command_;
-  std::vector<double> rotor_commands_;
-  std::optional<Clearance> clearance_;
-  std::optional<Vector3d> previous_p_world_;
-  bool colliding_ = false;
-  Schedule state_schedule_;
-  Schedule imu_schedule_;
-  std::int64_t next_state_ = 0;
-  std::int64_t next_imu_ = 0;
-  double squared_error_sum_ = 0.0;
-  std::uint64_t steps_ = 0;
-  RunSummary summary_;
+  std::shared_ptr<const Setup> setup_;
+  const Executor* executor_;
+  std::vector<std::shared_ptr<StateSource>> sources_;
+  SimulationState state_;
 };
 
 }  // namespace pointflight

@@ -31,4 +31,16 @@ Pose StateHistory::at(SimTime time) const {
           (1.0 - share) * a.pose.translation + share * b.pose.translation};
 }
 
+double StateHistory::speed_max(SimTime from, SimTime until) const {
+  double most = 0.0;
+  for (std::size_t i = 1; i < records_.size(); ++i) {
+    const Record& a = records_[i - 1];
+    const Record& b = records_[i];
+    if (b.time < from || a.time > until) continue;
+    const double moved = (b.pose.translation - a.pose.translation).norm();
+    most = std::max(most, moved / to_seconds(b.time - a.time));
+  }
+  return most;
+}
+
 }  // namespace pointflight

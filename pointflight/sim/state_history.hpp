@@ -8,7 +8,7 @@
 namespace pointflight {
 
 /// Poses of a body at recorded instants, interpolated between them: what scans in arrears look up.
-/// States may come from the local dynamics or from anywhere else.
+/// States may come from the local dynamics or from anywhere else. A value.
 class StateHistory {
  public:
   /// Instants must increase.
@@ -20,6 +20,11 @@ class StateHistory {
   /// T_world_body: linear in position and nearly constant-rate in rotation between the two records
   /// around `time`; the first or last record outside them. Safe to call from several threads.
   [[nodiscard]] Pose at(SimTime time) const;
+
+  /// The greatest speed between records that matter for [from, until], m/s.
+  [[nodiscard]] double speed_max(SimTime from, SimTime until) const;
+
+  [[nodiscard]] bool empty() const { return records_.empty(); }
 
  private:
   struct Record {

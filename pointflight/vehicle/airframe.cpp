@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <cmath>
 
 #include "pointflight/core/constants.hpp"
@@ -10,6 +11,11 @@
 
 namespace pointflight {
 namespace {
+
+constexpr std::array<std::string_view, 3> kShapes = {"sphere", "box", "capsule"};
+constexpr std::array<std::string_view, 2> kControllers = {"cascade", "geometric"};
+constexpr std::array<std::string_view, 6> kLevels = {
+    "rotor_speeds", "body_rates", "attitude", "acceleration", "velocity", "position"};
 
 Key required(Key key) {
   key.required = true;
@@ -29,6 +35,7 @@ void describe_rotor(SettingsVisitor& v, RotorModel& r) {
   v.value({"natural_frequency", "rad/s", "of the speed's response; 0: follows at once", 0, 1e4},
           r.natural_frequency);
   v.value({"damping", "", "of the speed's response", 0.1, 10}, r.damping);
+  v.value({"radius", "m", "of the propeller, for ground effect; 0: none", 0, 10}, r.radius);
 }
 
 void describe_loop(SettingsVisitor& v, LoopDesign& loop) {
@@ -38,6 +45,7 @@ void describe_loop(SettingsVisitor& v, LoopDesign& loop) {
 }
 
 void describe_controller(SettingsVisitor& v, ControllerSettings& c) {
+  v.choice({"kind", "", "cascaded PID, or geometric on SE(3)"}, c.kind, kControllers);
   v.section({"horizontal", "", "position loop, x and y"},
             [&](SettingsVisitor& w) { describe_loop(w, c.horizontal); });
   v.section({"vertical", "", "position loop, z"},
@@ -45,7 +53,9 @@ void describe_controller(SettingsVisitor& v, ControllerSettings& c) {
   v.section({"roll_pitch", "", "attitude loop"},
             [&](SettingsVisitor& w) { describe_loop(w, c.roll_pitch); });
   v.section({"yaw", "", "heading loop"}, [&](SettingsVisitor& w) { describe_loop(w, c.yaw); });
-  v.value({"tilt_max_deg", "deg", "greatest tilt", 1, 85}, c.tilt_max_deg);
+  v.value({"speed_max", "m/s", "of velocity and position commands", 0.1, 200}, c.speed_max);
+  v.value({"tilt_max_deg", "deg", "greatest tilt; from 90 on none (geometric)", 1, 180},
+          c.tilt_max_deg);
   v.value({"acceleration_max", "m/s^2", "of the position loop, horizontal", 0.1, 100},
           c.acceleration_max);
   v.value({"climb_acceleration_max", "m/s^2", "of the position loop, up", 0.1, 100},
@@ -69,6 +79,13 @@ void describe_imu(SettingsVisitor& v, ImuSettings& i) {
           i.accel_bias_walk);
 }
 
+void describe_battery(SettingsVisitor& v, BatterySettings& b) {
+  v.value({"cells", "", "in series; 0: full power for ever", 0, 24}, b.cells);
+  v.value({"capacity", "Ah", "from full to empty", 0, 1000}, b.capacity);
+  v.value({"resistance", "ohm", "of all cells and leads", 0, 10}, b.resistance);
+  v.value({"efficiency", "", "shaft power by electrical power", 0.05, 1}, b.efficiency);
+}
+
 VehicleSettings read(SettingsReader& reader, const std::string& path) {
   VehicleSettings settings;
   describe(reader, settings);
@@ -81,6 +98,15 @@ VehicleSettings read(SettingsReader& reader, const std::string& path) {
   };
   if (settings.rotors.size() < 4) {
     fail("rotors", fmt::format("{} rotors; at least 4 are needed", settings.rotors.size()));
+  }
+  if (settings.shape == "capsule" && settings.height < 2.0 * settings.radius) {
+    fail("height", "less than twice the radius: that is a sphere");
+  }
+  if (settings.controller.kind != "geometric" && settings.controller.tilt_max_deg > 85.0) {
+    fail("controller.tilt_max_deg", "above 85; only the geometric controller flies so");
+  }
+  if (settings.battery.cells > 0.0 && settings.battery.capacity <= 0.0) {
+    fail("battery.capacity", "a battery with cells needs a capacity");
   }
   if (settings.rotor.speed_min >= settings.rotor.speed_max) {
     fail("rotor.speed_min", "not below speed_max");
@@ -107,7 +133,11 @@ void describe(SettingsVisitor& v, VehicleSettings& s) {
   v.value(required({"mass", "kg", "with everything on board", 1e-3, 1e4}), s.mass);
   v.value(required({"inertia_diagonal", "kg m^2", "about the body axes", 1e-9, 1e4}),
           s.inertia_diagonal);
-  v.value({"radius", "m", "of the sphere that must stay free", 0.001, 100}, s.radius);
+  v.choice({"shape", "", "of the hull, which must stay free"}, s.shape, kShapes);
+  v.value({"radius", "m", "of a sphere or capsule", 0.001, 100}, s.radius);
+  v.value({"size", "m", "of a box", 0.001, 100}, s.size);
+  v.value({"height", "m", "of a capsule along z, caps included", 0.001, 100}, s.height);
+  v.value({"intensity", "", "of LiDAR returns from it", 0, 1e6}, s.intensity);
   v.value({"drag_area", "m^2", "c_d A along each body axis", 0, 100}, s.drag_area);
   v.section(required({"rotor", "", "all rotors are alike"}),
             [&](SettingsVisitor& w) { describe_rotor(w, s.rotor); });
@@ -118,10 +148,21 @@ void describe(SettingsVisitor& v, VehicleSettings& s) {
            w.value(required({"yaw_sign", "", "sign of the reaction torque about body z", -1, 1}),
                    rotor.yaw_sign);
          });
-  v.section({"controller", "", "cascaded PID; gains follow from these and the airframe"},
+  v.choice({"lowest_command", "", "the innermost command that its autopilot takes"},
+           s.lowest_command,
+           kLevels);
+  v.section({"controller", "", "gains follow from these and the airframe"},
             [&](SettingsVisitor& w) { describe_controller(w, s.controller); });
   v.section({"imu", "", "continuous-time densities"},
             [&](SettingsVisitor& w) { describe_imu(w, s.imu); });
+  v.section({"battery", "", "LiPo; flown with where the scenario says so"},
+            [&](SettingsVisitor& w) { describe_battery(w, s.battery); });
+}
+
+Solid VehicleSettings::hull() const {
+  if (shape == "box") return Cuboid{0.5 * size};
+  if (shape == "capsule") return Capsule{radius, 0.5 * height - radius};
+  return Ball{radius};
 }
 
 double VehicleSettings::hover_speed() const {

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "pointflight/core/settings.hpp"
+#include "pointflight/geometry/solid.hpp"
 #include "pointflight/geometry/types.hpp"
 
 namespace pointflight {
@@ -25,6 +26,7 @@ struct RotorModel {
   double speed_max = 0.0;           ///< rad/s
   double natural_frequency = 0.0;   ///< Of the speed's second-order response, rad/s; 0: ideal.
   double damping = 1.0;
+  double radius = 0.0;  ///< Of the propeller, m: ground effect; 0: none.
 };
 
 /// Gains follow from these and from the airframe's mass and inertia.
@@ -35,11 +37,13 @@ struct LoopDesign {
 };
 
 struct ControllerSettings {
+  std::string kind = "cascade";  ///< or "geometric"
   LoopDesign horizontal{1.8, 0.9, 0.05};
   LoopDesign vertical{2.5, 0.9, 0.05};
   LoopDesign roll_pitch{12.0, 0.9, 0.0};
   LoopDesign yaw{4.0, 0.9, 0.0};
-  double tilt_max_deg = 35.0;
+  double speed_max = 15.0;         ///< Of velocity and position commands, m/s.
+  double tilt_max_deg = 35.0;      ///< From 90 on: none (geometric only).
   double acceleration_max = 10.0;  ///< Of the position loop, horizontal, m/s^2.
   double climb_acceleration_max = 10.0;
   double error_max = 5.0;       ///< Position errors count no more than this, m.
@@ -57,6 +61,14 @@ struct ImuSettings {
   double accel_bias_walk = 0.0;      ///< m/s^3/sqrt(Hz)
 };
 
+/// LiPo battery: 3.5 V a cell when empty to 4.2 V when full, less what the current takes.
+struct BatterySettings {
+  double cells = 0.0;       ///< In series; 0: none, full power for ever.
+  double capacity = 0.0;    ///< Ah
+  double resistance = 0.0;  ///< Of all cells and leads, ohm.
+  double efficiency = 0.7;  ///< Of motors and speed controllers: shaft power by electrical.
+};
+
 /// A vehicle file, `data/vehicles/<name>.yaml`.
 struct VehicleSettings {
   std::string path;
@@ -64,12 +76,22 @@ struct VehicleSettings {
   std::string source;
   double mass = 1.0;                             ///< kg
   Vector3d inertia_diagonal = Vector3d::Ones();  ///< kg m^2
-  double radius = 0.3;                           ///< Of the sphere that must stay free, m.
+  std::string shape = "sphere";                  ///< Of the hull; or "box", "capsule" (upright)
+  double radius = 0.3;                           ///< Of a sphere or capsule, m.
+  Vector3d size = Vector3d(0.5, 0.5, 0.2);       ///< Of a box, m.
+  double height = 1.0;                           ///< Of a capsule, caps included, m.
+  double intensity = 100.0;                      ///< Of LiDAR returns from it.
   Vector3d drag_area = Vector3d::Zero();         ///< c_d A along each body axis, m^2.
   RotorModel rotor;
   std::vector<RotorPlacement> rotors;
+  /// The innermost command that its autopilot takes: "rotor_speeds", "body_rates", ...
+  std::string lowest_command = "rotor_speeds";
   ControllerSettings controller;
   ImuSettings imu;
+  BatterySettings battery;
+
+  /// What must stay free of everything, and what others see of it; around the body's origin.
+  [[nodiscard]] Solid hull() const;
 
   [[nodiscard]] double hover_speed() const;  ///< rad/s of each rotor.
   [[nodiscard]] double thrust_to_weight() const;

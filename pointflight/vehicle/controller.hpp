@@ -1,41 +1,42 @@
 #pragma once
 
+#include <cstddef>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "pointflight/vehicle/airframe.hpp"
+#include "pointflight/vehicle/command.hpp"
 #include "pointflight/vehicle/state.hpp"
 
 namespace pointflight {
 
-/// Where to be and how to move there; derivatives are feed-forward and may stay zero.
-struct PositionCommand {
-  Vector3d p_world = Vector3d::Zero();
-  Vector3d v_world = Vector3d::Zero();
-  Vector3d a_world = Vector3d::Zero();
-  Vector3d jerk_world = Vector3d::Zero();
-  double yaw = 0.0;       ///< rad, from world x towards y
-  double yaw_rate = 0.0;  ///< rad/s
+/// What a controller remembers from one period to the next: a value, so that a run can be saved,
+/// restored and branched.
+struct ControllerMemory {
+  Vector3d position_integral = Vector3d::Zero();  ///< In m/s^2: gain included.
+  Vector3d attitude_integral = Vector3d::Zero();  ///< In rad/s^2: gain included.
+  Vector3d velocity_integral = Vector3d::Zero();  ///< In m/s^2: gain included.
+  std::size_t level = std::variant_npos;          ///< Of the last setpoint.
 };
 
-/// Turns commands into rotor speeds. It sees the true state (later: an estimate).
+/// Turns setpoints into rotor speeds. It sees the true state.
 ///
-/// To add one: a file in vehicle/controllers/, one line in `make_controller`, a step-response test,
-/// and its keys with defaults in ControllerSettings.
+/// To add one: a file in vehicle/controllers/, one line in the table of `make_controller`, a
+/// step-response test, and its keys with defaults in ControllerSettings.
 class Controller {
  public:
   virtual ~Controller() = default;
 
   /// Rotor speed commands (rad/s) for a period of `dt` seconds.
-  virtual std::vector<double> update(const RigidBodyState& state,
-                                     const PositionCommand& command,
-                                     double dt) = 0;
-
-  /// Forgets integrals: a new flight.
-  virtual void reset() = 0;
+  [[nodiscard]] virtual std::vector<double> update(const RigidBodyState& state,
+                                                   const Setpoint& setpoint,
+                                                   double dt,
+                                                   ControllerMemory& memory) const = 0;
 };
 
-/// The paper's cascaded PID; the only one so far.
-std::unique_ptr<Controller> make_controller(const VehicleSettings& settings);
+/// By name ("cascade", "geometric"). Throws InputError that lists the names.
+std::unique_ptr<Controller> make_controller(const std::string& name,
+                                            const VehicleSettings& settings);
 
 }  // namespace pointflight

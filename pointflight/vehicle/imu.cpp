@@ -18,7 +18,8 @@ Imu::Imu(const ImuSettings& settings, std::uint64_t seed, std::uint32_t vehicle)
 ImuSample Imu::sample(std::int64_t index,
                       SimTime time,
                       const RigidBodyState& state,
-                      const BodyAcceleration& acceleration) {
+                      const BodyAcceleration& acceleration,
+                      Biases& biases) const {
   const double dt = 1.0 / settings_.rate;
   const auto normals = [&](StreamId stream) {
     const RandomStream random(seed_, stream, vehicle_);
@@ -27,8 +28,8 @@ ImuSample Imu::sample(std::int64_t index,
   };
   // the first sample has no bias: walks start at zero
   if (index > 0) {
-    gyro_bias_ += settings_.gyro_bias_walk * std::sqrt(dt) * normals(StreamId::kImuGyroBias);
-    accel_bias_ += settings_.accel_bias_walk * std::sqrt(dt) * normals(StreamId::kImuAccelBias);
+    biases.gyro += settings_.gyro_bias_walk * std::sqrt(dt) * normals(StreamId::kImuGyroBias);
+    biases.accel += settings_.accel_bias_walk * std::sqrt(dt) * normals(StreamId::kImuAccelBias);
   }
   // lever arm: a point off the centre of mass also feels the body turn
   const Vector3d& w = state.omega_body;
@@ -38,9 +39,9 @@ ImuSample Imu::sample(std::int64_t index,
   const Quaterniond q_imu_body = q_body_imu_.conjugate();
   ImuSample sample;
   sample.time = time;
-  sample.gyro = q_imu_body * w + gyro_bias_ +
+  sample.gyro = q_imu_body * w + biases.gyro +
                 settings_.gyro_noise_density / std::sqrt(dt) * normals(StreamId::kImuGyroNoise);
-  sample.accel = q_imu_body * force + accel_bias_ +
+  sample.accel = q_imu_body * force + biases.accel +
                  settings_.accel_noise_density / std::sqrt(dt) * normals(StreamId::kImuAccelNoise);
   return sample;
 }

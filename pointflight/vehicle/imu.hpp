@@ -24,24 +24,29 @@ inline Vector3d specific_force_body(const Quaterniond& q_world_body, const Vecto
 ///
 /// Discrete noise: density / sqrt(dt); bias steps: walk * sqrt(dt) (docs/conventions.md). Draws are
 /// addressed by sample number, so that a sample does not depend on what else was simulated; the
-/// biases are the only state.
+/// biases are the only state, which the caller keeps.
 class Imu {
  public:
   Imu(const ImuSettings& settings, std::uint64_t seed, std::uint32_t vehicle);
+
+  /// What walks from sample to sample.
+  struct Biases {
+    Vector3d gyro = Vector3d::Zero();   ///< rad/s
+    Vector3d accel = Vector3d::Zero();  ///< m/s^2
+  };
 
   /// Sample number `index` (0, 1, ...; ask for each once and in order).
   ImuSample sample(std::int64_t index,
                    SimTime time,
                    const RigidBodyState& state,
-                   const BodyAcceleration& acceleration);
+                   const BodyAcceleration& acceleration,
+                   Biases& biases) const;
 
  private:
   ImuSettings settings_;
   std::uint64_t seed_;
   std::uint32_t vehicle_;
   Quaterniond q_body_imu_;
-  Vector3d gyro_bias_ = Vector3d::Zero();
-  Vector3d accel_bias_ = Vector3d::Zero();
 };
 
 }  // namespace pointflight

@@ -28,19 +28,32 @@ VehicleState Multirotor::hover_at(const Vector3d& p_world, double yaw) const {
   return state;
 }
 
-double Multirotor::clamped(double command) const {
-  return std::clamp(command, settings_.rotor.speed_min, settings_.rotor.speed_max);
+double Multirotor::clamped(double command, double speed_share) const {
+  if (!(command > 0.0)) return 0.0;
+  const double most = speed_share * settings_.rotor.speed_max;
+  return std::min(std::max(command, settings_.rotor.speed_min), most);
+}
+
+double Multirotor::ground_effect(double height) const {
+  const double radius = settings_.rotor.radius;
+  if (radius <= 0.0 || height > 10.0 * radius) return 1.0;  // less than 0.1 %
+  const double share = radius / (4.0 * std::max(height, 0.5 * radius));
+  return 1.0 / (1.0 - share * share);
 }
 
 Multirotor::Rate Multirotor::rate(const VehicleState& state,
-                                  std::span<const double> commands) const {
+                                  std::span<const double> commands,
+                                  const FlightConditions& conditions) const {
   const RotorModel& rotor = settings_.rotor;
   const RigidBodyState& body = state.body;
   const bool ideal = rotor.natural_frequency <= 0.0;
   Rate rate;
   rate.rotors.resize(state.rotors.size());
 
-  const Vector3d v_body = body.q_world_body.conjugate() * body.v_world;
+  const Quaterniond q_body_world = body.q_world_body.conjugate();
+  const Vector3d v_body = q_body_world * (body.v_world - conditions.wind_world);
+  const Vector3d up_body = q_body_world * Vector3d::UnitZ();
+  const double height = body.p_world.z() - conditions.ground_z;
   Vector3d force = Vector3d::Zero();
   Vector3d torque = Vector3d::Zero();
   for (std::size_t i = 0; i < state.rotors.size(); ++i) {
@@ -49,9 +62,10 @@ Multirotor::Rate Multirotor::rate(const VehicleState& state,
     const double dw = state.rotors[i].acceleration;
     // thrust, and drag of the blades against the air that the rotor moves through sideways
     const Vector3d v_rotor = v_body + body.omega_body.cross(place.position);
-    const Vector3d f(-rotor.drag_coefficient * w * v_rotor.x(),
-                     -rotor.drag_coefficient * w * v_rotor.y(),
-                     rotor.thrust_coefficient * w * w);
+    const Vector3d f(
+        -rotor.drag_coefficient * w * v_rotor.x(),
+        -rotor.drag_coefficient * w * v_rotor.y(),
+        rotor.thrust_coefficient * w * w * ground_effect(height + up_body.dot(place.position)));
     force += f;
     torque += place.position.cross(f);
     torque.z() += place.yaw_sign * (rotor.torque_coefficient * w * w + rotor.inertia * dw);
@@ -61,8 +75,8 @@ Multirotor::Rate Multirotor::rate(const VehicleState& state,
     if (!ideal) {
       const double wn = rotor.natural_frequency;
       rate.rotors[i].speed = dw;
-      rate.rotors[i].acceleration =
-          wn * wn * (clamped(commands[i]) - w) - 2.0 * rotor.damping * wn * dw;
+      rate.rotors[i].acceleration = wn * wn * (clamped(commands[i], conditions.speed_share) - w) -
+                                    2.0 * rotor.damping * wn * dw;
     }
   }
   // quadratic drag of the body along its axes
@@ -79,11 +93,14 @@ Multirotor::Rate Multirotor::rate(const VehicleState& state,
   return rate;
 }
 
-void Multirotor::step(VehicleState& state, std::span<const double> commands, double dt) const {
+void Multirotor::step(VehicleState& state,
+                      std::span<const double> commands,
+                      double dt,
+                      const FlightConditions& conditions) const {
   assert(commands.size() == state.rotors.size());
   if (settings_.rotor.natural_frequency <= 0.0) {
     for (std::size_t i = 0; i < commands.size(); ++i) {
-      state.rotors[i] = {clamped(commands[i]), 0.0};
+      state.rotors[i] = {clamped(commands[i], conditions.speed_share), 0.0};
     }
   }
   const auto advanced = [&](const Rate& r, double h) {
@@ -98,10 +115,10 @@ void Multirotor::step(VehicleState& state, std::span<const double> commands, dou
     }
     return s;
   };
-  const Rate k1 = rate(state, commands);
-  const Rate k2 = rate(advanced(k1, 0.5 * dt), commands);
-  const Rate k3 = rate(advanced(k2, 0.5 * dt), commands);
-  const Rate k4 = rate(advanced(k3, dt), commands);
+  const Rate k1 = rate(state, commands, conditions);
+  const Rate k2 = rate(advanced(k1, 0.5 * dt), commands, conditions);
+  const Rate k3 = rate(advanced(k2, 0.5 * dt), commands, conditions);
+  const Rate k4 = rate(advanced(k3, dt), commands, conditions);
   const auto mean = [dt](const auto& a, const auto& b, const auto& c, const auto& d) {
     return (dt / 6.0) * (a + 2.0 * b + 2.0 * c + d);
   };
@@ -123,8 +140,9 @@ void Multirotor::step(VehicleState& state, std::span<const double> commands, dou
 }
 
 BodyAcceleration Multirotor::acceleration(const VehicleState& state,
-                                          std::span<const double> commands) const {
-  const Rate r = rate(state, commands);
+                                          std::span<const double> commands,
+                                          const FlightConditions& conditions) const {
+  const Rate r = rate(state, commands, conditions);
   return {r.a_world, r.alpha_body};
 }
 

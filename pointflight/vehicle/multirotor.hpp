@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -8,6 +9,14 @@
 
 namespace pointflight {
 
+/// What surrounds a vehicle over a step.
+struct FlightConditions {
+  Vector3d wind_world = Vector3d::Zero();  ///< m/s
+  /// Height of the ground below the body's origin, world z, m.
+  double ground_z = -std::numeric_limits<double>::infinity();
+  double speed_share = 1.0;  ///< Of the rotors' greatest speed that the battery allows.
+};
+
 /// Rigid body with rotors (Lee, Leok, McClamroch 2010, with rotor dynamics, drag and gyroscopic
 /// torque added):
 ///
@@ -15,7 +24,10 @@ namespace pointflight {
 ///   J dw/dt = sum_i (r_i x F_i + s_i (k_m w_i^2 + J_r dw_i/dt) e3 + s_i J_r w_i w x e3) - w x J w
 ///   d2w_i/dt2 = wn^2 (w_cmd - w_i) - 2 z wn dw_i/dt
 ///
-/// s_i is the sign of the rotor's reaction torque: a rotor with s = +1 turns in the -z sense.
+/// s_i is the sign of the rotor's reaction torque: a rotor with s = +1 turns in the -z sense. Drag
+/// is against the air, which moves with the wind. Near the ground thrust grows by
+/// 1 / (1 - (R / 4h)^2), h the rotor's height, at least R / 2 (Cheeseman, Bennett, ARC R&M 3021,
+/// 1955).
 class Multirotor {
  public:
   explicit Multirotor(const VehicleSettings& settings);
@@ -24,19 +36,27 @@ class Multirotor {
   [[nodiscard]] VehicleState hover_at(const Vector3d& p_world, double yaw) const;
 
   /// Advances by `dt` seconds (RK4) under rotor speed commands (rad/s, clamped to the rotor's
-  /// limits), held over the step. Without rotor lag speeds take their commands at once.
-  void step(VehicleState& state, std::span<const double> rotor_commands, double dt) const;
+  /// limits; 0 or less: off), held over the step. Without rotor lag speeds take their commands at
+  /// once.
+  void step(VehicleState& state,
+            std::span<const double> rotor_commands,
+            double dt,
+            const FlightConditions& conditions = {}) const;
 
   /// What the state does under the commands: for the IMU.
   [[nodiscard]] BodyAcceleration acceleration(const VehicleState& state,
-                                              std::span<const double> rotor_commands) const;
+                                              std::span<const double> rotor_commands,
+                                              const FlightConditions& conditions = {}) const;
 
   [[nodiscard]] const VehicleSettings& settings() const { return settings_; }
 
  private:
   struct Rate;
-  [[nodiscard]] Rate rate(const VehicleState& state, std::span<const double> commands) const;
-  [[nodiscard]] double clamped(double command) const;
+  [[nodiscard]] Rate rate(const VehicleState& state,
+                          std::span<const double> commands,
+                          const FlightConditions& conditions) const;
+  [[nodiscard]] double clamped(double command, double speed_share) const;
+  [[nodiscard]] double ground_effect(double height) const;
 
   VehicleSettings settings_;
 };

@@ -1,5 +1,5 @@
 // Any text as a table of beam angles: numbers, or an InputError of one line.
-#include "pointflight/lidar/patterns/csv_table.hpp"
+#include "pointflight/io/csv_table.hpp"
 
 #include <cstdint>
 #include <string>

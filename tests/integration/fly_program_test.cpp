@@ -56,7 +56,7 @@ TEST_F(Program, ScenarioNewCheckAndFly) {
   }
   const auto summary = nlohmann::json::parse(read_file(folder / "run/summary.json"));
   EXPECT_EQ(summary["end"], "completed");
-  EXPECT_EQ(summary["collisions"], 0);
+  EXPECT_EQ(summary["vehicles"][0]["collisions"], 0);
   // a second run into the same folder needs --force
   expect_user_error(run(fmt::format("fly {} -o {}", yaml, folder / "run")), "--force");
   EXPECT_EQ(run(fmt::format("fly {} -o {} --force", yaml, folder / "run")).code, 0);
@@ -127,7 +127,8 @@ TEST_F(Program, EndsOneForAMissionCutShortAndForACollisionUnderStop) {
                   map()));
   const Result crash = run(fmt::format("fly {} -o {}", folder / "t.yaml", folder / "b"));
   EXPECT_EQ(crash.code, 1);
-  expect_contains(crash.err, "t.yaml:8: warning: the leg to waypoint 1 passes through the map");
+  expect_contains(crash.err,
+                  "t.yaml:8: warning: drone0's leg to waypoint 1 passes through the map");
   expect_contains(crash.err, "warning: collision at");
   const auto summary = nlohmann::json::parse(read_file(folder / "b/summary.json"));
   EXPECT_EQ(summary["end"], "collision");

@@ -115,10 +115,10 @@ TEST(Lidar, DropsReturnsNearerThanItsMinimum) {
 TEST(Scan, PcdHasAllFields) {
   const testing::TemporaryFolder folder;
   Scan scan;
-  scan.points.push_back({{1, 2, 3}, 3.74f, 77.0f, Duration(50'000'000), 9, 0});
+  scan.points.push_back({{1, 2, 3}, 3.74f, 77.0f, Duration(50'000'000), 9, 0, kFirstObstacle});
   write_scan_pcd(folder / "s.pcd", scan);
   testing::expect_contains(testing::read_file(folder / "s.pcd"),
-                           "FIELDS x y z intensity range time ring\nSIZE 4 4 4 4 4 4 2\n");
+                           "FIELDS x y z intensity range time ring label\nSIZE 4 4 4 4 4 4 2 2\n");
   std::vector<CloudPoint> batch;
   ASSERT_TRUE(open_cloud(folder / "s.pcd")->read(batch));
   EXPECT_EQ(batch.at(0).position, Vector3d(1, 2, 3));

@@ -8,9 +8,9 @@
 #include <set>
 
 #include "pointflight/core/constants.hpp"
+#include "pointflight/io/csv_table.hpp"
 #include "pointflight/lidar/beam_pattern.hpp"
 #include "pointflight/lidar/lidar_settings.hpp"
-#include "pointflight/lidar/patterns/csv_table.hpp"
 #include "tests/support.hpp"
 
 namespace pointflight {

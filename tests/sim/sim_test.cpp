@@ -8,10 +8,10 @@
 #include "pointflight/core/output_file.hpp"
 #include "pointflight/core/resources.hpp"
 #include "pointflight/geometry/rotation.hpp"
-#include "pointflight/sim/mission.hpp"
 #include "pointflight/sim/scenario.hpp"
 #include "pointflight/sim/simulation.hpp"
 #include "pointflight/sim/state_history.hpp"
+#include "pointflight/vehicle/mission.hpp"
 #include "tests/support.hpp"
 
 namespace pointflight {
@@ -59,9 +59,9 @@ TEST(Mission, PassesThroughItsWaypointsAndTurnsFirst) {
   const Mission mission({0, 0, 0}, 0.0, settings);
   EXPECT_NEAR(mission.length(), 13.0, 1e-12);
   std::vector<double> nearest(settings.waypoints.size(), 1e9);
-  Vector3d last = mission.at(SimTime{}).p_world;
+  Vector3d last = mission.at(0.0).p_world;
   for (double t = 0; t < mission.duration() + 1; t += 0.002) {
-    const PositionCommand c = mission.at(SimTime(from_seconds(t)));
+    const PositionCommand c = mission.at(t);
     EXPECT_LT((c.p_world - last).norm(), 0.002 * 2.0 + 1e-9);
     last = c.p_world;
     for (std::size_t i = 0; i < nearest.size(); ++i) {
@@ -73,7 +73,7 @@ TEST(Mission, PassesThroughItsWaypointsAndTurnsFirst) {
     }
   }
   for (const double d : nearest) EXPECT_LT(d, 1e-6);
-  EXPECT_EQ(mission.at(SimTime(from_seconds(1e4))).p_world, settings.waypoints.back());
+  EXPECT_EQ(mission.at(1e4).p_world, settings.waypoints.back());
 }
 
 TEST(StateHistory, InterpolatesOnTheWayAndForgetsWhatIsOld) {
@@ -93,16 +93,17 @@ TEST(StateHistory, InterpolatesOnTheWayAndForgetsWhatIsOld) {
 TEST(Scenario, WhatIsWrittenReadsBackTheSame) {
   Scenario scenario;
   scenario.map = "maps/a hall.pfmap";
-  scenario.mission.waypoints = {{1, 2, 3}, {4.25, -5, 6}};
-  scenario.lidars.push_back(LidarMount{"avia", {0.1, 0, 0.2}, {0, 10, 0}, "paper", true, false});
+  scenario.vehicles[0].mission.waypoints = {{1, 2, 3}, {4.25, -5, 6}};
+  scenario.vehicles[0].lidars.push_back(
+      LidarMount{"avia", {0.1, 0, 0.2}, {0, 10, 0}, "paper", true, false});
   const Scenario again = parse_scenario(scenario_yaml(scenario), "s.yaml");
   EXPECT_EQ(again.map, scenario.map);
-  EXPECT_EQ(again.mission.waypoints, scenario.mission.waypoints);
-  ASSERT_EQ(again.lidars.size(), 2u);
-  EXPECT_EQ(again.lidars[1].renderer, "paper");
-  EXPECT_TRUE(again.lidars[1].snapshot);
+  EXPECT_EQ(again.vehicles[0].mission.waypoints, scenario.vehicles[0].mission.waypoints);
+  ASSERT_EQ(again.vehicles[0].lidars.size(), 2u);
+  EXPECT_EQ(again.vehicles[0].lidars[1].renderer, "paper");
+  EXPECT_TRUE(again.vehicles[0].lidars[1].snapshot);
   EXPECT_EQ(scenario_yaml(again), scenario_yaml(scenario));
-  EXPECT_EQ(again.place("mission.speed").rfind("s.yaml:", 0), 0u);
+  EXPECT_EQ(again.place("vehicles[0].mission.speed").rfind("s.yaml:", 0), 0u);
 }
 
 /// Everything that a run delivers, folded into one number.
@@ -113,9 +114,10 @@ class HashSink : public SampleSink {
     add(s.state.body.p_world.x());
     add(s.state.body.q_world_body.w());
     add(s.state.rotors[1].speed);
-    if (s.clearance) add(*s.clearance);
+    if (s.nearest) add(s.nearest->distance);
   }
-  void on_imu(const ImuSample& s) override {
+  void on_imu(std::uint32_t vehicle, const ImuSample& s) override {
+    add(vehicle);
     for (int i = 0; i < 3; ++i) {
       add(s.gyro[i]);
       add(s.accel[i]);
@@ -128,6 +130,7 @@ class HashSink : public SampleSink {
       add(p.range);
       add(p.position_sensor.x());
       add(p.time_offset.count());
+      add(p.label);
     }
   }
   void on_collision(const CollisionEvent& event) override {
@@ -157,25 +160,31 @@ std::shared_ptr<const SurfelMap> hall() {
 Scenario short_flight() {
   Scenario scenario;
   scenario.path = "s.yaml";
-  scenario.vehicle.start = {3, 3, 1.5};
-  scenario.mission.waypoints = {{6, 3, 2}};
+  scenario.vehicles[0].start = {3, 3, 1.5};
+  scenario.vehicles[0].mission.waypoints = {{6, 3, 2}};
   return scenario;
 }
 
-RunSummary run(const Scenario& scenario,
-               const std::shared_ptr<const SurfelMap>& map,
-               SampleSink& sink,
-               int threads = 2) {
+/// What there is to know of a run of one vehicle.
+struct Ran : VehicleSummary {
+  RunEnd end;
+  SimTime time;
+};
+
+Ran run(const Scenario& scenario,
+        const std::shared_ptr<const SurfelMap>& map,
+        SampleSink& sink,
+        int threads = 2) {
   const Executor executor(threads);
   Simulation simulation(scenario, map, executor);
   while (simulation.step(sink)) {
   }
-  return simulation.summary();
+  return {simulation.summary(0), simulation.end(), simulation.time()};
 }
 
 TEST(Simulation, FliesItsMissionAndCountsWhatItDid) {
   HashSink sink;
-  const RunSummary s = run(short_flight(), hall(), sink);
+  const Ran s = run(short_flight(), hall(), sink);
   EXPECT_EQ(s.end, RunEnd::kCompleted);
   EXPECT_NEAR(s.distance_flown, 3.04, 0.1);
   EXPECT_EQ(s.collisions, 0u);
@@ -193,7 +202,8 @@ TEST(Simulation, TheSameBytesWithOneTwoAndEightThreads) {
   const auto map = hall();
   Scenario scenario = short_flight();
   scenario.duration = 0.6;
-  scenario.lidars.push_back(LidarMount{"avia", {0.1, 0, 0}, {0, 20, 0}, "paper", true, true});
+  scenario.vehicles[0].lidars.push_back(
+      LidarMount{"avia", {0.1, 0, 0}, {0, 20, 0}, "paper", true, true});
   std::uint64_t first = 0;
   for (const int threads : {1, 2, 8}) {
     HashSink sink;
@@ -220,7 +230,7 @@ TEST(Simulation, AddingASensorMovesNoOtherDraw) {
   scenario.duration = 0.3;
   FirstScan alone;
   run(scenario, map, alone);
-  scenario.lidars.push_back(LidarMount{"vlp32c"});
+  scenario.vehicles[0].lidars.push_back(LidarMount{"vlp32c"});
   FirstScan both;
   run(scenario, map, both);
   ASSERT_EQ(alone.points.size(), both.points.size());
@@ -232,18 +242,18 @@ TEST(Simulation, AddingASensorMovesNoOtherDraw) {
 TEST(Simulation, ReportsACollisionOrStopsAtIt) {
   const auto map = hall();
   Scenario scenario = short_flight();
-  scenario.lidars.clear();
-  scenario.vehicle.start = {3, 5, 2};
-  scenario.mission.waypoints = {{13, 5, 2}};  // through the pillar
+  scenario.vehicles[0].lidars.clear();
+  scenario.vehicles[0].start = {3, 5, 2};
+  scenario.vehicles[0].mission.waypoints = {{13, 5, 2}};  // through the pillar
   HashSink sink;
-  const RunSummary reported = run(scenario, map, sink);
+  const Ran reported = run(scenario, map, sink);
   EXPECT_EQ(reported.end, RunEnd::kCompleted);
   EXPECT_EQ(reported.collisions, 1u);
   EXPECT_EQ(sink.collisions, 2);  // entered and left
   EXPECT_FALSE(sink.last.entered);
-  scenario.vehicle.on_collision = "stop";
+  scenario.vehicles[0].on_collision = "stop";
   HashSink stopped_sink;
-  const RunSummary stopped = run(scenario, map, stopped_sink);
+  const Ran stopped = run(scenario, map, stopped_sink);
   EXPECT_EQ(stopped.end, RunEnd::kCollision);
   EXPECT_TRUE(stopped_sink.last.entered);
   // at the moment of contact: the sphere's radius before the pillar
@@ -253,11 +263,11 @@ TEST(Simulation, ReportsACollisionOrStopsAtIt) {
 
 TEST(Simulation, AMissionCutShortIsUnfinished) {
   Scenario scenario = short_flight();
-  scenario.lidars.clear();
+  scenario.vehicles[0].lidars.clear();
   scenario.duration = 1.0;
   HashSink sink;
   EXPECT_EQ(run(scenario, hall(), sink).end, RunEnd::kMissionUnfinished);
-  scenario.mission.waypoints.clear();
+  scenario.vehicles[0].mission.waypoints.clear();
   EXPECT_EQ(run(scenario, hall(), sink).end, RunEnd::kCompleted);
 }
 
@@ -273,10 +283,10 @@ TEST(Simulation, AStartInsideTheMapIsAnError) {
 TEST(Simulation, WhateverTheRatesNothingIsLost) {
   Scenario scenario = short_flight();
   scenario.duration = 1.0;
-  scenario.lidars = {LidarMount{"d455"}};
+  scenario.vehicles[0].lidars = {LidarMount{"d455"}};
   scenario.output.trajectory_rate = 333.0;
   HashSink sink;
-  const RunSummary s = run(scenario, hall(), sink);
+  const Ran s = run(scenario, hall(), sink);
   EXPECT_EQ(s.states, 334u);  // k / 333 from 0 to 1 s
   EXPECT_EQ(s.scans, 30u);    // the last one ends with the run
 }
@@ -288,7 +298,7 @@ TEST(Simulation, ASensorFasterThanThePhysicsLosesNoScan) {
   Scenario scenario = short_flight();
   scenario.duration = 0.5;
   scenario.physics_step = 0.005;
-  scenario.lidars = {LidarMount{folder / "fast.yaml"}};
+  scenario.vehicles[0].lidars = {LidarMount{folder / "fast.yaml"}};
   HashSink sink;
   EXPECT_EQ(run(scenario, hall(), sink).scans, 500u);
 }
@@ -306,14 +316,14 @@ TEST(Simulation, AFastSmallVehicleMeetsAThinWall) {
     Scenario scenario = short_flight();
     scenario.physics_step = 0.005;
     scenario.duration = 4.0;
-    scenario.lidars.clear();
-    scenario.vehicle.model = folder / "tiny.yaml";
-    scenario.vehicle.on_collision = "stop";
-    scenario.vehicle.start = {-5.0 + 0.01 * i, 0, 0};
-    scenario.mission = MissionSettings{};
-    scenario.mission.motion = {12.0, 20.0, 200.0};
-    scenario.mission.yaw = "fixed";
-    scenario.mission.waypoints = {{60, 0, 0}};
+    scenario.vehicles[0].lidars.clear();
+    scenario.vehicles[0].model = folder / "tiny.yaml";
+    scenario.vehicles[0].on_collision = "stop";
+    scenario.vehicles[0].start = {-5.0 + 0.01 * i, 0, 0};
+    scenario.vehicles[0].mission = MissionSettings{};
+    scenario.vehicles[0].mission.motion = {12.0, 20.0, 200.0};
+    scenario.vehicles[0].mission.yaw = "fixed";
+    scenario.vehicles[0].mission.waypoints = {{60, 0, 0}};
     HashSink sink;
     EXPECT_EQ(run(scenario, map, sink).end, RunEnd::kCollision) << i;
   }

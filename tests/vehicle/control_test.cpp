@@ -101,14 +101,15 @@ std::vector<double> simulated_step(const VehicleSettings& settings,
                                    const Vector3d& direction,
                                    double duration) {
   const Multirotor vehicle(settings);
-  const auto controller = make_controller(settings);
+  const auto controller = make_controller("cascade", settings);
+  ControllerMemory memory;
   VehicleState state = vehicle.hover_at({0, 0, 10}, 0.0);
   PositionCommand command;
   command.p_world = Vector3d(0, 0, 10) + direction;
   std::vector<double> y;
   for (int i = 0; i < static_cast<int>(duration * 1000); ++i) {
     y.push_back((state.body.p_world - Vector3d(0, 0, 10)).dot(direction));
-    vehicle.step(state, controller->update(state.body, command, 1e-3), 1e-3);
+    vehicle.step(state, controller->update(state.body, command, 1e-3, memory), 1e-3);
   }
   return y;
 }
@@ -155,7 +156,8 @@ INSTANTIATE_TEST_SUITE_P(Vehicles,
 /// RMS distance from a circle of 3 m radius in steady flight, with feed-forward.
 double circle_error(const VehicleSettings& settings, double radius, double speed) {
   const Multirotor vehicle(settings);
-  const auto controller = make_controller(settings);
+  const auto controller = make_controller("cascade", settings);
+  ControllerMemory memory;
   const double w = speed / radius;
   const auto on_circle = [&](double t) {
     PositionCommand c;
@@ -172,7 +174,7 @@ double circle_error(const VehicleSettings& settings, double radius, double speed
   int count = 0;
   for (int i = 0; i < 30000; ++i) {
     const double t = i * 1e-3;
-    vehicle.step(state, controller->update(state.body, on_circle(t), 1e-3), 1e-3);
+    vehicle.step(state, controller->update(state.body, on_circle(t), 1e-3, memory), 1e-3);
     if (t < 10.0) continue;  // the start's transient
     square += (state.body.p_world - on_circle(t + 1e-3).p_world).squaredNorm();
     ++count;
@@ -196,14 +198,15 @@ TEST(CascadedPid, TracksACircleBetterThanTheReleasedController) {
 TEST(CascadedPid, StaysWithinItsTiltLimitAndRecoversFromALargeStep) {
   const VehicleSettings settings = load_vehicle("quad_330");
   const Multirotor vehicle(settings);
-  const auto controller = make_controller(settings);
+  const auto controller = make_controller("cascade", settings);
+  ControllerMemory memory;
   VehicleState state = vehicle.hover_at({0, 0, 10}, 0.0);
   PositionCommand command;
   command.p_world = {30, -20, 14};
   command.yaw = 2.0;
   double worst_tilt = 0.0;
   for (int i = 0; i < 20000; ++i) {
-    vehicle.step(state, controller->update(state.body, command, 1e-3), 1e-3);
+    vehicle.step(state, controller->update(state.body, command, 1e-3, memory), 1e-3);
     const double up = (state.body.q_world_body * Vector3d::UnitZ()).z();
     worst_tilt = std::max(worst_tilt, std::acos(std::min(1.0, up)));
   }

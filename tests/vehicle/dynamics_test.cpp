@@ -195,23 +195,25 @@ TEST(Mixer, GivesUpYawBeforeTilt) {
 TEST(Imu, ReadsPlusGravityAtRestAndTheLeverArmWhileTurning) {
   ImuSettings settings;
   settings.position = {0.1, 0, 0};
-  Imu imu(settings, 1, 0);
+  const Imu imu(settings, 1, 0);
+  Imu::Biases biases;
   const RigidBodyState still;
-  const ImuSample rest = imu.sample(0, SimTime{}, still, {});
+  const ImuSample rest = imu.sample(0, SimTime{}, still, {}, biases);
   EXPECT_TRUE(rest.accel.isApprox(Vector3d(0, 0, kGravity), 1e-12));
   EXPECT_EQ(rest.gyro, Vector3d::Zero());
   // turning about z at 3 rad/s and speeding up by 2 rad/s^2: centripetal and tangential
   RigidBodyState turning;
   turning.omega_body = {0, 0, 3};
-  const ImuSample t = imu.sample(1, SimTime{}, turning, {{0, 0, 0}, {0, 0, 2}});
+  const ImuSample t = imu.sample(1, SimTime{}, turning, {{0, 0, 0}, {0, 0, 2}}, biases);
   EXPECT_NEAR(t.accel.x(), -0.9, 1e-12);
   EXPECT_NEAR(t.accel.y(), 0.2, 1e-12);
   EXPECT_EQ(t.gyro.z(), 3.0);
   // tilted: gravity turns into the body; in free fall nothing is felt
   RigidBodyState rolled;
   rolled.q_world_body = quaternion_from_rpy(kPi / 2, 0, 0);
-  EXPECT_NEAR(imu.sample(2, SimTime{}, rolled, {}).accel.y(), kGravity, 1e-12);
-  EXPECT_LT(imu.sample(3, SimTime{}, still, {{0, 0, -kGravity}, {0, 0, 0}}).accel.norm(), 1e-12);
+  EXPECT_NEAR(imu.sample(2, SimTime{}, rolled, {}, biases).accel.y(), kGravity, 1e-12);
+  EXPECT_LT(imu.sample(3, SimTime{}, still, {{0, 0, -kGravity}, {0, 0, 0}}, biases).accel.norm(),
+            1e-12);
 }
 
 TEST(Imu, NoiseAndBiasWalkHaveTheFilesDensities) {
@@ -224,10 +226,11 @@ TEST(Imu, NoiseAndBiasWalkHaveTheFilesDensities) {
   double gyro_square = 0.0;
   double bias_square = 0.0;
   for (int run = 0; run < kRuns; ++run) {
-    Imu imu(settings, static_cast<std::uint64_t>(run), 0);
+    const Imu imu(settings, static_cast<std::uint64_t>(run), 0);
+    Imu::Biases biases;
     ImuSample last{};
     for (int i = 0; i <= kSamples; ++i) {
-      last = imu.sample(i, SimTime{}, {}, {});
+      last = imu.sample(i, SimTime{}, {}, {}, biases);
       gyro_square += last.gyro.squaredNorm() / (3.0 * kRuns * (kSamples + 1));
     }
     bias_square += (last.accel - Vector3d(0, 0, kGravity)).squaredNorm() / (3.0 * kRuns);

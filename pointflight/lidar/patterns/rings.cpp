@@ -8,8 +8,8 @@
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/core/math.hpp"
 #include "pointflight/core/resources.hpp"
+#include "pointflight/io/csv_table.hpp"
 #include "pointflight/lidar/lidar_settings.hpp"
-#include "pointflight/lidar/patterns/csv_table.hpp"
 #include "pointflight/lidar/patterns/patterns.hpp"
 
 namespace pointflight {

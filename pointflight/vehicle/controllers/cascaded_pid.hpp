@@ -1,7 +1,6 @@
 #pragma once
 
-#include "pointflight/vehicle/controller.hpp"
-#include "pointflight/vehicle/mixer.hpp"
+#include "pointflight/vehicle/controllers/loops.hpp"
 
 namespace pointflight {
 
@@ -12,36 +11,21 @@ namespace pointflight {
 ///   torque = J (wn^2 e_R + 2 z wn e_w + ki integral(e_R)) + w x J w
 ///
 /// e_R is the rotation vector from the present to the demanded attitude (on SO(3), in the body);
-/// demanded rates come from the jerk, as in Mellinger and Kumar 2011, eqs. 7 and 8.
-class CascadedPid : public Controller {
+/// demanded rates come from the jerk.
+class CascadedPid : public LoopController {
  public:
-  explicit CascadedPid(const VehicleSettings& settings);
+  using LoopController::LoopController;
 
-  std::vector<double> update(const RigidBodyState& state,
-                             const PositionCommand& command,
-                             double dt) override;
-  void reset() override;
-
- private:
-  struct AttitudeDemand {
-    Quaterniond q_world_body;
-    Vector3d omega_body;
-    double thrust = 0.0;
-  };
-  [[nodiscard]] Vector3d demanded_acceleration(const RigidBodyState& state,
-                                               const PositionCommand& command,
-                                               double dt);
+ protected:
   [[nodiscard]] AttitudeDemand demanded_attitude(const RigidBodyState& state,
-                                                 const PositionCommand& command,
-                                                 const Vector3d& a_world) const;
+                                                 const Vector3d& a_world,
+                                                 const Vector3d& jerk_world,
+                                                 double yaw,
+                                                 double yaw_rate) const override;
   [[nodiscard]] Vector3d demanded_torque(const RigidBodyState& state,
                                          const AttitudeDemand& demand,
-                                         double dt);
-
-  VehicleSettings settings_;
-  Mixer mixer_;
-  Vector3d position_integral_ = Vector3d::Zero();  ///< In m/s^2: gain included.
-  Vector3d attitude_integral_ = Vector3d::Zero();  ///< In rad/s^2: gain included.
+                                         double dt,
+                                         ControllerMemory& memory) const override;
 };
 
 }  // namespace pointflight

@@ -16,11 +16,15 @@ class CsvTable {
 
   [[nodiscard]] std::size_t rows() const { return rows_; }
 
-  /// Index of the first column whose name starts with one of the given words (case ignored), or -1.
+  /// Index of the column of that name, else of the first whose name starts with it (lower case), or
+  /// -1.
   [[nodiscard]] int find(std::string_view prefix) const;
 
   /// As `find`, but throws InputError where there is no such column.
   [[nodiscard]] int require(std::string_view prefix) const;
+
+  /// "file:line" of a row, for messages.
+  [[nodiscard]] std::string place(std::size_t row) const;
 
   [[nodiscard]] double at(std::size_t row, int column) const {
     return values_[row * names_.size() + static_cast<std::size_t>(column)];
@@ -32,6 +36,7 @@ class CsvTable {
   std::string name_;
   std::vector<std::string> names_;
   std::vector<double> values_;
+  std::vector<std::size_t> lines_;
   std::size_t rows_ = 0;
 };
 

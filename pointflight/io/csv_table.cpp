@@ -1,4 +1,4 @@
-#include "pointflight/lidar/patterns/csv_table.hpp"
+#include "pointflight/io/csv_table.hpp"
 
 #include <fmt/format.h>
 
@@ -67,12 +67,20 @@ void CsvTable::parse(std::string_view text) {
       }
       values_.push_back(value);
     }
+    lines_.push_back(lines.number());
     ++rows_;
   }
   if (rows_ == 0) throw InputError(fmt::format("{}: no rows; names, then numbers", name_));
 }
 
+std::string CsvTable::place(std::size_t row) const {
+  return fmt::format("{}:{}", name_, lines_[row]);
+}
+
 int CsvTable::find(std::string_view prefix) const {
+  for (std::size_t i = 0; i < names_.size(); ++i) {
+    if (names_[i] == prefix) return static_cast<int>(i);
+  }
   for (std::size_t i = 0; i < names_.size(); ++i) {
     if (names_[i].compare(0, prefix.size(), prefix) == 0) return static_cast<int>(i);
   }

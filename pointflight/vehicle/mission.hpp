@@ -3,9 +3,8 @@
 #include <string>
 #include <vector>
 
-#include "pointflight/core/time.hpp"
 #include "pointflight/geometry/types.hpp"
-#include "pointflight/vehicle/controller.hpp"
+#include "pointflight/vehicle/trajectory.hpp"
 
 namespace pointflight {
 
@@ -50,14 +49,14 @@ struct MissionSettings {
 
 /// Flies straight legs between waypoints, smooth in time and at rest at each, turning towards the
 /// next before it leaves. A pure function of time.
-class Mission {
+class Mission : public Trajectory {
  public:
   Mission() = default;
   Mission(const Vector3d& start, double yaw, const MissionSettings& settings);
 
-  [[nodiscard]] PositionCommand at(SimTime time) const;
-  [[nodiscard]] double duration() const { return duration_; }  ///< s
-  [[nodiscard]] double length() const { return length_; }      ///< m
+  [[nodiscard]] PositionCommand at(double t) const override;
+  [[nodiscard]] double duration() const override { return duration_; }
+  [[nodiscard]] double length() const { return length_; }  ///< m
   [[nodiscard]] const Vector3d& goal() const { return goal_; }
 
  private:

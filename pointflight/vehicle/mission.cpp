@@ -1,4 +1,4 @@
-#include "pointflight/sim/mission.hpp"
+#include "pointflight/vehicle/mission.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -92,8 +92,7 @@ Mission::Mission(const Vector3d& start, double yaw, const MissionSettings& setti
   }
 }
 
-PositionCommand Mission::at(SimTime time) const {
-  const double t = to_seconds(time);
+PositionCommand Mission::at(double t) const {
   PositionCommand command;
   command.p_world = goal_;
   command.yaw = yaw_;

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "pointflight/core/settings.hpp"
+#include "pointflight/core/time.hpp"
+#include "pointflight/vehicle/airframe.hpp"
+#include "pointflight/vehicle/command.hpp"
+
+namespace pointflight {
+
+/// One line of a scenario's `commands`: what a vehicle is told, and when. Levels that must be
+/// repeated are, until the next one.
+struct CommandSettings {
+  double time = 0.0;           ///< s
+  std::string kind = "hover";  ///< `name_of`, with "polynomial" and "b_spline" for trajectories
+  Vector3d vector = Vector3d::Zero();  ///< Body rates in deg/s, acceleration, velocity or position.
+  Vector3d feed_forward = Vector3d::Zero();  ///< Velocity of a position command, m/s.
+  Vector3d rpy_deg = Vector3d::Zero();       ///< Of an attitude command.
+  double yaw_deg = 0.0;
+  double yaw_rate_deg = 0.0;
+  double thrust = 0.0;         ///< N; 0: the weight.
+  std::vector<double> rotors;  ///< rad/s
+  double height = 1.5;         ///< Of a take-off, m.
+  double speed = 1.0;          ///< Of a take-off or landing, m/s.
+  std::string file;            ///< CSV of a trajectory.
+  std::int64_t degree = 3;     ///< Of a B-spline.
+  double interval = 1.0;       ///< Between its knots, s.
+};
+
+void describe(SettingsVisitor& visitor, CommandSettings& settings);
+
+/// The command of a line. Throws InputError (files).
+Command command_of(const CommandSettings& settings,
+                   const VehicleSettings& vehicle,
+                   const MotionLimits& motion,
+                   const std::string& folder);
+
+}  // namespace pointflight

@@ -1,0 +1,83 @@
+#include "pointflight/sim/faults.hpp"
+
+#include <algorithm>
+#include <array>
+
+namespace pointflight {
+namespace {
+
+constexpr std::array<std::string_view, 5> kKinds = {
+    "rotor", "lidar", "imu", "odometry_delay", "scan_drop"};
+constexpr std::array<std::string_view, 6> kAxes = {
+    "gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z"};
+
+bool is_on(const FaultSettings& fault, SimTime time) {
+  const Duration t = time.time_since_epoch();
+  return t >= from_seconds(fault.from) && (fault.until <= 0.0 || t < from_seconds(fault.until));
+}
+
+bool is_of(const FaultSettings& fault, const char* kind, std::size_t index) {
+  return fault.kind == kind && fault.index == static_cast<std::int64_t>(index);
+}
+
+}  // namespace
+
+void describe(SettingsVisitor& v, FaultSettings& s) {
+  v.choice({"kind",
+            "",
+            "a rotor that loses speed, a dead lidar, a stuck IMU axis, late odometry, lost scans"},
+           s.kind,
+           kKinds);
+  v.value({"from", "s", "when it starts", 0, 1e6}, s.from);
+  v.value({"until", "s", "when it ends; 0: never", 0, 1e6}, s.until);
+  v.value({"index", "", "of the rotor or lidar", 0, 255}, s.index);
+  v.choice({"axis", "", "of the IMU that repeats its last value"}, s.axis, kAxes);
+  v.value({"value",
+           "",
+           "rotor: share of speed left; odometry_delay: seconds; scan_drop: share of scans lost",
+           0,
+           60},
+          s.value);
+}
+
+double Faults::rotor_share(std::size_t rotor, SimTime time) const {
+  double share = 1.0;
+  for (const FaultSettings& fault : settings_) {
+    if (is_of(fault, "rotor", rotor) && is_on(fault, time)) share = std::min(share, fault.value);
+  }
+  return share;
+}
+
+bool Faults::is_dead(std::size_t lidar, SimTime time) const {
+  return std::any_of(settings_.begin(), settings_.end(), [&](const FaultSettings& fault) {
+    return is_of(fault, "lidar", lidar) && is_on(fault, time);
+  });
+}
+
+bool Faults::is_stuck(std::size_t axis, SimTime time) const {
+  return std::any_of(settings_.begin(), settings_.end(), [&](const FaultSettings& fault) {
+    return fault.kind == "imu" && fault.axis == kAxes[axis] && is_on(fault, time);
+  });
+}
+
+Duration Faults::odometry_delay(SimTime time) const {
+  Duration delay{0};
+  for (const FaultSettings& fault : settings_) {
+    if (fault.kind == "odometry_delay" && is_on(fault, time)) {
+      delay = std::max(delay, from_seconds(fault.value));
+    }
+  }
+  return delay;
+}
+
+double Faults::dropped_share(std::size_t lidar, SimTime time) const {
+  double share = 0.0;
+  for (const FaultSettings& fault : settings_) {
+    if (is_of(fault, "scan_drop", lidar) && is_on(fault, time)) {
+      share = std::max(share, fault.value);
+    }
+  }
+  return share;
+}
+
+}  // namespace pointflight

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "pointflight/core/settings.hpp"
+#include "pointflight/core/time.hpp"
+
+namespace pointflight {
+
+/// One thing that goes wrong on a vehicle for a time.
+struct FaultSettings {
+  std::string kind = "rotor";   ///< or "lidar", "imu", "odometry_delay", "scan_drop"
+  double from = 0.0;            ///< s
+  double until = 0.0;           ///< s; 0: for good
+  std::int64_t index = 0;       ///< Rotor or lidar.
+  std::string axis = "gyro_x";  ///< Of an IMU that is stuck.
+  /// rotor: share of its commanded speed that is left; odometry_delay: s; scan_drop: share lost.
+  double value = 0.0;
+};
+
+void describe(SettingsVisitor& visitor, FaultSettings& settings);
+
+/// The faults of one vehicle as functions of time.
+class Faults {
+ public:
+  Faults() = default;
+  explicit Faults(std::vector<FaultSettings> settings) : settings_(std::move(settings)) {}
+
+  [[nodiscard]] bool any() const { return !settings_.empty(); }
+
+  /// Share of a rotor's commanded speed that is left, 0 to 1.
+  [[nodiscard]] double rotor_share(std::size_t rotor, SimTime time) const;
+  /// True while a lidar gives nothing.
+  [[nodiscard]] bool is_dead(std::size_t lidar, SimTime time) const;
+  /// True while an IMU axis (0..2 gyro, 3..5 accelerometer) repeats its last value.
+  [[nodiscard]] bool is_stuck(std::size_t axis, SimTime time) const;
+  /// How much later odometry arrives.
+  [[nodiscard]] Duration odometry_delay(SimTime time) const;
+  /// Share of a lidar's scans that is lost.
+  [[nodiscard]] double dropped_share(std::size_t lidar, SimTime time) const;
+
+ private:
+  std::vector<FaultSettings> settings_;
+};
+
+}  // namespace pointflight

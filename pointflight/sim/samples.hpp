@@ -1,0 +1,64 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "pointflight/lidar/lidar.hpp"
+#include "pointflight/vehicle/command.hpp"
+#include "pointflight/vehicle/imu.hpp"
+#include "pointflight/vehicle/state.hpp"
+#include "pointflight/world/contact.hpp"
+
+namespace pointflight {
+
+/// Truth at an instant.
+struct StateSample {
+  std::uint32_t vehicle = 0;
+  SimTime time;
+  VehicleState state;
+  PositionCommand command;         ///< What the autopilot asked for; parts may be the state's own.
+  std::optional<Contact> nearest;  ///< Nothing within `Simulation::kClearanceReach`.
+};
+
+/// What an odometry source on board reports: the truth, possibly late.
+struct OdometrySample {
+  std::uint32_t vehicle = 0;
+  SimTime time;       ///< Of the state.
+  SimTime delivered;  ///< When it arrives; later than `time` where a fault delays it.
+  RigidBodyState state;
+};
+
+/// A vehicle's hull met something, or left it again.
+struct CollisionEvent {
+  std::uint32_t vehicle = 0;
+  Label partner = kMapLabel;
+  SimTime time;
+  bool entered = true;
+  Vector3d vehicle_world = Vector3d::Zero();
+  Vector3d place_world = Vector3d::Zero();  ///< Where it met.
+  double penetration = 0.0;                 ///< At the end of the step, m.
+};
+
+/// Where obstacles are, for records.
+struct ObstacleSample {
+  SimTime time;
+  Label label = kMapLabel;
+  Pose T_world_body;
+  Vector3d half_extent = Vector3d::Zero();  ///< Of its box, m; zero for points.
+};
+
+/// Where the samples of a run go. Called from one thread; states, odometry and IMU in the order
+/// (time, kind, vehicle), scans when all their beams are known.
+class SampleSink {
+ public:
+  virtual ~SampleSink() = default;
+  virtual void on_state(const StateSample& /*sample*/) {}
+  virtual void on_odometry(const OdometrySample& /*sample*/) {}
+  virtual void on_imu(std::uint32_t /*vehicle*/, const ImuSample& /*sample*/) {}
+  /// `pose_at` gives T_world_sensor during the scan.
+  virtual void on_scan(const Scan& /*scan*/, const PoseAt& /*pose_at*/) {}
+  virtual void on_collision(const CollisionEvent& /*event*/) {}
+  virtual void on_obstacle(const ObstacleSample& /*sample*/) {}
+};
+
+}  // namespace pointflight

@@ -1,0 +1,300 @@
+#include "pointflight/sim/vehicle_agent.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "pointflight/core/constants.hpp"
+#include "pointflight/core/input_error.hpp"
+#include "pointflight/geometry/rotation.hpp"
+
+namespace pointflight {
+namespace {
+
+constexpr double kSettleTime = 1.0;          // s after the last that is to be done
+constexpr double kCommandTime = 5.0;         // s for a command without an end of its own
+constexpr double kTouchdown = 0.01;          // m above what carries a vehicle that lands
+constexpr double kTouchdownSpeed = 3.0;      // m/s
+constexpr double kGroundEffectReach = 10.0;  // propeller radii
+
+/// The vehicle's file with what the scenario changes of it.
+VehicleSettings settings_of(const Scenario& scenario,
+                            std::size_t number,
+                            const VehicleSetup& setup) {
+  VehicleSettings s = scenario.at(scenario.vehicle_key(number, "model"),
+                                  [&] { return load_vehicle(setup.model, scenario.folder()); });
+  ControllerSettings& c = s.controller;
+  if (setup.controller != "vehicle") c.kind = setup.controller;
+  const auto override_with = [](double value, double& setting) {
+    if (value > 0.0) setting = value;
+  };
+  override_with(setup.limits.speed_max, c.speed_max);
+  override_with(setup.limits.acceleration_max, c.acceleration_max);
+  override_with(setup.limits.climb_acceleration_max, c.climb_acceleration_max);
+  override_with(setup.limits.tilt_max_deg, c.tilt_max_deg);
+  override_with(setup.limits.body_rate_max, c.body_rate_max);
+  if (c.kind != "geometric" && c.tilt_max_deg > 85.0) {
+    throw InputError(
+        fmt::format("{}: a tilt of {} degrees; above 85 only `controller: geometric` flies",
+                    scenario.place(scenario.vehicle_key(number, "limits.tilt_max_deg")),
+                    c.tilt_max_deg));
+  }
+  if (setup.battery && s.battery.cells <= 0.0) {
+    throw InputError(fmt::format("{}: {} has no battery; write one into its file",
+                                 scenario.place(scenario.vehicle_key(number, "battery")),
+                                 s.path));
+  }
+  return s;
+}
+
+}  // namespace
+
+VehicleAgent::VehicleAgent(const Scenario& scenario,
+                           std::size_t number,
+                           const VehicleSetup& setup,
+                           const RendererByName& renderer)
+    : number_(static_cast<std::uint32_t>(number)),
+      setup_(setup),
+      seed_(static_cast<std::uint64_t>(setup.seed >= 0 ? setup.seed : scenario.seed)),
+      dynamics_(settings_of(scenario, number, setup)),
+      autopilot_(dynamics_.settings(), from_seconds(setup.command_timeout)),
+      imu_(dynamics_.settings().imu, seed_, number_),
+      battery_(dynamics_.settings()),
+      wind_(scenario.air.wind, seed_),
+      faults_(setup.faults),
+      hull_(dynamics_.settings().hull()),
+      shape_(hull_),
+      mission_(
+          std::make_shared<Mission>(setup.start, setup.start_yaw_deg * kDegree, setup.mission)),
+      state_schedule_(scenario.output.trajectory_rate),
+      imu_schedule_(dynamics_.settings().imu.rate),
+      odometry_schedule_(scenario.output.odometry_rate) {
+  for (std::size_t i = 0; i < setup_.lidars.size(); ++i) {
+    const LidarMount& mount = setup_.lidars[i];
+    const Vector3d rpy = mount.rotation_rpy_deg * kDegree;
+    const std::string key = scenario.vehicle_key(number, fmt::format("lidars[{}].model", i));
+    auto lidar = scenario.at(key, [&] {
+      const auto entity = number_ << 8 | static_cast<std::uint32_t>(i);
+      return std::make_unique<Lidar>(load_lidar(mount.model, scenario.folder()), entity);
+    });
+    const double rate = lidar->settings().rate;
+    lidars_.push_back({std::move(lidar),
+                       renderer(mount.renderer),
+                       {quaternion_from_rpy(rpy.x(), rpy.y(), rpy.z()), mount.position},
+                       Schedule(rate),
+                       mount.snapshot,
+                       mount.noise});
+  }
+  if (scenario.air.ground_effect && settings().rotor.radius > 0.0) {
+    ground_sensor_ = renderer("beam");
+  }
+  const auto check_index = [&](std::size_t fault, const char* what, std::size_t count) {
+    if (static_cast<std::size_t>(setup_.faults[fault].index) < count) return;
+    throw InputError(fmt::format(
+        "{}: {} {} of a vehicle with {}",
+        scenario.place(scenario.vehicle_key(number, fmt::format("faults[{}].index", fault))),
+        what,
+        setup_.faults[fault].index,
+        count));
+  };
+  for (std::size_t i = 0; i < setup_.faults.size(); ++i) {
+    const std::string& kind = setup_.faults[i].kind;
+    if (kind == "rotor") check_index(i, "rotor", settings().rotors.size());
+    if (kind == "lidar" || kind == "scan_drop") check_index(i, "lidar", lidars_.size());
+  }
+  read_commands(scenario);
+}
+
+void VehicleAgent::read_commands(const Scenario& scenario) {
+  if (!setup_.mission.waypoints.empty()) {
+    commands_.push_back({SimTime{}, TrajectoryCommand{mission_}});
+    busy_time_ = mission_->duration() + kSettleTime;
+  }
+  for (std::size_t i = 0; i < setup_.commands.size(); ++i) {
+    const CommandSettings& s = setup_.commands[i];
+    const auto key = [&](const char* name) {
+      return scenario.vehicle_key(number_, fmt::format("commands[{}].{}", i, name));
+    };
+    const Command command = scenario.at(key(s.file.empty() ? "kind" : "file"), [&] {
+      Command made = command_of(s, settings(), setup_.mission.motion, scenario.folder());
+      if (const auto reason = autopilot_.objection(made)) throw InputError(*reason);
+      return made;
+    });
+    const SimTime time{from_seconds(s.time)};
+    if (!commands_.empty() && time < commands_.back().time) {
+      throw InputError(fmt::format("{}: {} s comes before the command above it; sort them by time",
+                                   scenario.place(key("time")),
+                                   s.time));
+    }
+    commands_.push_back({time, command});
+    double lasts = kCommandTime;
+    if (const auto* t = std::get_if<TrajectoryCommand>(&command)) {
+      lasts = t->trajectory->duration() + kSettleTime;
+    }
+    busy_time_ = std::max(busy_time_, s.time + lasts);
+  }
+}
+
+VehicleStatus VehicleAgent::start() const {
+  VehicleStatus status;
+  status.state = dynamics_.hover_at(setup_.start, setup_.start_yaw_deg * kDegree);
+  status.landed = setup_.landed;
+  if (setup_.landed) {
+    for (RotorState& rotor : status.state.rotors) rotor = {};
+  }
+  status.autopilot = autopilot_.start(status.state.body, setup_.landed);
+  status.rotor_commands.assign(status.state.rotors.size(),
+                               setup_.landed ? 0.0 : settings().hover_speed());
+  status.next_scan.assign(lidars_.size(), 0);
+  return status;
+}
+
+double VehicleAgent::ground_below(const VehicleStatus& status) const {
+  const double reach = kGroundEffectReach * settings().rotor.radius;
+  const auto& nearest = status.proximity.nearest;
+  if (!ground_sensor_ || !nearest || nearest->distance > reach) {
+    return -std::numeric_limits<double>::infinity();
+  }
+  Ray down;
+  down.origin_world = status.state.body.p_world;
+  down.direction_world = -Vector3f::UnitZ();
+  down.range_max = static_cast<float>(reach + bounding_radius(hull_));
+  const Hit hit = ground_sensor_->trace(down);
+  return hit.is_return() ? down.origin_world.z() - static_cast<double>(hit.range)
+                         : -std::numeric_limits<double>::infinity();
+}
+
+void VehicleAgent::control(VehicleStatus& status,
+                           const SurfelMap& map,
+                           SimTime now,
+                           Duration step,
+                           std::uint64_t step_number) const {
+  const RigidBodyState& body = status.state.body;
+  const double dt = to_seconds(step);
+  // touchdown: something below, near, and it is meant to land
+  const auto& nearest = status.proximity.nearest;
+  if (!status.landed && status.autopilot.armed && nearest && nearest->label == kMapLabel &&
+      nearest->distance < kTouchdown &&
+      std::holds_alternative<LandCommand>(status.autopilot.command) &&
+      body.v_world.norm() < kTouchdownSpeed) {
+    status.landed = true;
+  }
+  while (status.next_command < commands_.size() && commands_[status.next_command].time <= now) {
+    autopilot_.give(status.autopilot, commands_[status.next_command++].command, now, body);
+    status.scripted = true;
+  }
+  // a level that must be repeated is, by the scenario
+  if (status.scripted && status.autopilot.command.index() < std::variant_size_v<Setpoint>) {
+    status.autopilot.since = now;
+  }
+  status.rotor_commands = autopilot_.rotor_speeds(status.autopilot, body, status.landed, now, dt);
+  for (std::size_t i = 0; i < status.rotor_commands.size() && faults_.any(); ++i) {
+    status.rotor_commands[i] *= faults_.rotor_share(i, now);
+  }
+  if (status.crashed) std::fill(status.rotor_commands.begin(), status.rotor_commands.end(), 0.0);
+
+  const double error = (body.p_world - status.autopilot.reference.p_world).norm();
+  status.squared_error_sum += error * error;
+  VehicleSummary& summary = status.summary;
+  summary.tracking_error_max = std::max(summary.tracking_error_max, error);
+  ++status.steps;
+  summary.tracking_error_rms =
+      std::sqrt(status.squared_error_sum / static_cast<double>(status.steps));
+  summary.speed_max = std::max(summary.speed_max, body.v_world.norm());
+
+  status.conditions.ground_z = ground_below(status);
+  if (!wind_.is_calm()) {
+    const double height = body.p_world.z() - map.bounds_world().min.z();
+    status.conditions.wind_world =
+        wind_.over_step(status.gusts, number_, step_number, dt, body.v_world, height);
+  }
+  if (setup_.battery) {
+    status.conditions.speed_share = battery_.step(status.battery, status.state, dt);
+  }
+}
+
+VehicleState VehicleAgent::state_after(const VehicleStatus& status, double dt) const {
+  VehicleState state = status.state;
+  if (status.at_rest || dt <= 0.0) return state;
+  dynamics_.step(state, status.rotor_commands, dt, status.conditions);
+  if (status.landed && state.body.v_world.z() <= 0.0) {
+    state.body = status.state.body;  // the ground holds it
+    state.body.v_world.setZero();
+    state.body.omega_body.setZero();
+  }
+  return state;
+}
+
+bool VehicleAgent::integrate(VehicleStatus& status, double dt) const {
+  const Vector3d before = status.state.body.p_world;
+  status.state = state_after(status, dt);
+  const RigidBodyState& body = status.state.body;
+  if (status.landed && body.v_world.z() > 0.0) status.landed = false;
+  status.summary.distance_flown += (body.p_world - before).norm();
+  return body.p_world.allFinite() && body.q_world_body.coeffs().allFinite();
+}
+
+void VehicleAgent::crash(VehicleStatus& status) const {
+  status.crashed = true;
+  status.autopilot.armed = false;
+}
+
+ImuSample VehicleAgent::imu_sample(VehicleStatus& status,
+                                   SimTime time,
+                                   const VehicleState& state) const {
+  BodyAcceleration acceleration;
+  if (!status.landed && !status.at_rest) {
+    acceleration = dynamics_.acceleration(state, status.rotor_commands, status.conditions);
+  }
+  ImuSample sample =
+      imu_.sample(status.next_imu, time, state.body, acceleration, status.imu_biases);
+  if (status.last_imu && faults_.any()) {
+    for (std::size_t axis = 0; axis < 6; ++axis) {
+      if (!faults_.is_stuck(axis, time)) continue;
+      const int i = static_cast<int>(axis % 3);
+      if (axis < 3) {
+        sample.gyro[i] = status.last_imu->gyro[i];
+      } else {
+        sample.accel[i] = status.last_imu->accel[i];
+      }
+    }
+  }
+  status.last_imu = sample;
+  return sample;
+}
+
+void VehicleAgent::sample(VehicleStatus& status,
+                          SimTime now,
+                          SimTime end,
+                          StepSamples& samples) const {
+  for (;;) {
+    const SimTime state_time = state_schedule_.at(status.next_state);
+    const SimTime odometry_time = odometry_schedule_.at(status.next_odometry);
+    const SimTime imu_time = imu_schedule_.at(status.next_imu);
+    const SimTime next = std::min({state_time, odometry_time, imu_time});
+    if (next >= end) break;
+    const VehicleState state = state_after(status, to_seconds(next - now));
+    if (state_time == next) {
+      samples.states.push_back(
+          {number_, next, state, status.autopilot.reference, status.proximity.nearest});
+      ++status.next_state;
+      ++status.summary.states;
+    }
+    if (odometry_time == next) {
+      status.late.push_back({number_, next, next + faults_.odometry_delay(next), state.body});
+      ++status.next_odometry;
+    }
+    if (imu_time == next) {
+      samples.imu.push_back(imu_sample(status, next, state));
+      ++status.next_imu;
+      ++status.summary.imu_samples;
+    }
+  }
+  const auto arrives = [&](const OdometrySample& o) { return o.delivered < end; };
+  const auto waits = std::stable_partition(status.late.begin(), status.late.end(), arrives);
+  samples.odometry.assign(status.late.begin(), waits);
+  status.late.erase(status.late.begin(), waits);
+}
+
+}  // namespace pointflight

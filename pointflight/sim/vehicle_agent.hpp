@@ -1,0 +1,164 @@
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "pointflight/sim/proximity.hpp"
+#include "pointflight/sim/samples.hpp"
+#include "pointflight/sim/scenario.hpp"
+#include "pointflight/sim/state_history.hpp"
+#include "pointflight/vehicle/autopilot.hpp"
+#include "pointflight/vehicle/battery.hpp"
+#include "pointflight/vehicle/multirotor.hpp"
+#include "pointflight/world/wind.hpp"
+
+namespace pointflight {
+
+/// What happened to a vehicle in a run.
+struct VehicleSummary {
+  double distance_flown = 0.0;      ///< m
+  double speed_max = 0.0;           ///< m/s
+  double tracking_error_rms = 0.0;  ///< Of the position against its command, m.
+  double tracking_error_max = 0.0;
+  std::uint64_t states = 0;
+  std::uint64_t imu_samples = 0;
+  std::uint64_t scans = 0;
+  std::uint64_t beams = 0;
+  std::uint64_t points = 0;
+  std::uint64_t collisions = 0;
+  std::optional<double> closest_approach;  ///< Of the hull to anything, m; negative inside.
+  Vector3d closest_place_world = Vector3d::Zero();
+  Label closest_label = kMapLabel;
+};
+
+/// All of a vehicle that changes: a value, so that a run can be saved and branched.
+struct VehicleStatus {
+  VehicleState state;
+  AutopilotState autopilot;
+  Imu::Biases imu_biases;
+  std::optional<ImuSample> last_imu;
+  GustState gusts;
+  BatteryState battery;
+  FlightConditions conditions;
+  std::vector<double> rotor_commands;
+  StateHistory history;
+  ProximityState proximity;
+  bool landed = false;           ///< The ground carries it.
+  bool crashed = false;          ///< Rotors off for good.
+  bool at_rest = false;          ///< A wreck on the ground.
+  std::size_t next_command = 0;  ///< Of the scenario's.
+  bool scripted = false;         ///< What it does is the scenario's last command.
+  std::int64_t next_state = 0;
+  std::int64_t next_imu = 0;
+  std::int64_t next_odometry = 0;
+  std::vector<OdometrySample> late;     ///< Measured, not yet delivered.
+  std::vector<std::int64_t> next_scan;  ///< Of each lidar.
+  double squared_error_sum = 0.0;
+  std::uint64_t steps = 0;
+  VehicleSummary summary;
+};
+
+/// What one vehicle delivers within a step.
+struct StepSamples {
+  std::vector<StateSample> states;
+  std::vector<ImuSample> imu;
+  std::vector<OdometrySample> odometry;
+  std::vector<CollisionEvent> collisions;
+};
+
+/// A LiDAR on a vehicle.
+struct MountedLidar {
+  std::unique_ptr<Lidar> lidar;
+  std::shared_ptr<const Renderer> renderer;
+  Pose T_body_sensor;
+  Schedule schedule;
+  bool snapshot;
+  bool noise;
+};
+
+/// Gives renderers by name; vehicles share them.
+using RendererByName = std::function<std::shared_ptr<const Renderer>(const std::string& name)>;
+
+/// One vehicle of a run: everything that does not change, and how its status advances.
+class VehicleAgent {
+ public:
+  /// `number` in the fleet. Throws InputError (unknown models, commands that it cannot take).
+  VehicleAgent(const Scenario& scenario,
+               std::size_t number,
+               const VehicleSetup& setup,
+               const RendererByName& renderer);
+
+  [[nodiscard]] VehicleStatus start() const;
+
+  /// Takes the scenario's commands that are due, then control: rotor commands, wind, ground,
+  /// battery for the step that starts now.
+  void control(VehicleStatus& status,
+               const SurfelMap& map,
+               SimTime now,
+               Duration step,
+               std::uint64_t step_number) const;
+
+  /// Samples due in [now, end), end included where `last`, appended in time's order.
+  void sample(VehicleStatus& status, SimTime now, SimTime end, StepSamples& samples) const;
+
+  /// The state a part of the step later.
+  [[nodiscard]] VehicleState state_after(const VehicleStatus& status, double dt) const;
+
+  /// Advances by a step; false where the dynamics diverged.
+  bool integrate(VehicleStatus& status, double dt) const;
+
+  /// Its hull met something: what the scenario says happens.
+  void crash(VehicleStatus& status) const;
+
+  [[nodiscard]] Label label() const { return kFirstVehicle + number_; }
+  [[nodiscard]] std::uint32_t number() const { return number_; }
+  [[nodiscard]] const VehicleSetup& setup() const { return setup_; }
+  [[nodiscard]] const VehicleSettings& settings() const { return dynamics_.settings(); }
+  [[nodiscard]] const Autopilot& autopilot() const { return autopilot_; }
+  [[nodiscard]] const Mission& mission() const { return *mission_; }
+  [[nodiscard]] const Solid& hull() const { return hull_; }
+  [[nodiscard]] const BodyShape& shape() const { return shape_; }
+  [[nodiscard]] const std::vector<MountedLidar>& lidars() const { return lidars_; }
+  [[nodiscard]] const Faults& faults() const { return faults_; }
+  [[nodiscard]] std::uint64_t seed() const { return seed_; }
+
+  /// How long its mission and commands take, s; 0: nothing to do.
+  [[nodiscard]] double busy_time() const { return busy_time_; }
+
+ private:
+  struct TimedCommand {
+    SimTime time;
+    Command command;
+  };
+  void read_commands(const Scenario& scenario);
+  [[nodiscard]] double ground_below(const VehicleStatus& status) const;
+  [[nodiscard]] ImuSample imu_sample(VehicleStatus& status,
+                                     SimTime time,
+                                     const VehicleState& state) const;
+
+  std::uint32_t number_;
+  VehicleSetup setup_;
+  std::uint64_t seed_;
+  Multirotor dynamics_;
+  Autopilot autopilot_;
+  Imu imu_;
+  Battery battery_;
+  Wind wind_;
+  Faults faults_;
+  Solid hull_;
+  BodyShape shape_;
+  std::shared_ptr<const Mission> mission_;
+  std::vector<TimedCommand> commands_;
+  std::vector<MountedLidar> lidars_;
+  std::shared_ptr<const Renderer> ground_sensor_;  ///< Looks down for ground effect, or none.
+  Schedule state_schedule_;
+  Schedule imu_schedule_;
+  Schedule odometry_schedule_;
+  double busy_time_ = 0.0;
+};
+
+}  // namespace pointflight

@@ -1,0 +1,31 @@
+#include "pointflight/vehicle/battery.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace pointflight {
+namespace {
+
+constexpr double kFullCell = 4.2;   // V
+constexpr double kEmptyCell = 3.5;  // V
+constexpr double kHour = 3600.0;    // s
+
+}  // namespace
+
+double Battery::step(BatteryState& state, const VehicleState& vehicle, double dt) const {
+  const BatterySettings& b = settings_.battery;
+  double power = 0.0;
+  for (const RotorState& rotor : vehicle.rotors) {
+    power += settings_.rotor.torque_coefficient * rotor.speed * rotor.speed * rotor.speed;
+  }
+  power /= b.efficiency;
+  const double left = std::max(0.0, 1.0 - state.used / b.capacity);
+  const double open = b.cells * (kEmptyCell + left * (kFullCell - kEmptyCell));
+  // V = V_open - R P / V; where it cannot give the power, what it can give at most
+  state.voltage = 0.5 * (open + std::sqrt(std::max(0.0, open * open - 4.0 * b.resistance * power)));
+  state.current = power / state.voltage;
+  state.used += state.current * dt / kHour;
+  return std::min(1.0, state.voltage / (b.cells * kFullCell));
+}
+
+}  // namespace pointflight

@@ -1,0 +1,29 @@
+#pragma once
+
+#include "pointflight/vehicle/airframe.hpp"
+#include "pointflight/vehicle/state.hpp"
+
+namespace pointflight {
+
+/// How far a battery is.
+struct BatteryState {
+  double used = 0.0;     ///< Ah
+  double voltage = 0.0;  ///< Under the present current, V.
+  double current = 0.0;  ///< A
+};
+
+/// Charge and voltage of a LiPo: open circuit 3.5 to 4.2 V a cell, in proportion to the charge
+/// left; the current is the rotors' shaft power (sum of k_m w^3) by efficiency and voltage.
+class Battery {
+ public:
+  explicit Battery(const VehicleSettings& settings) : settings_(settings) {}
+
+  /// Advances by `dt` seconds at the rotors' speeds. Returns the share of the rotors' greatest
+  /// speed that is left: they turn in proportion to the voltage, all of it at 4.2 V a cell.
+  double step(BatteryState& state, const VehicleState& vehicle, double dt) const;
+
+ private:
+  VehicleSettings settings_;
+};
+
+}  // namespace pointflight

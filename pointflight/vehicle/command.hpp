@@ -1,0 +1,93 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "pointflight/geometry/types.hpp"
+#include "pointflight/vehicle/mission.hpp"
+#include "pointflight/vehicle/trajectory.hpp"
+
+namespace pointflight {
+
+/// Speeds of all rotors, rad/s, in the order of the vehicle file.
+struct RotorSpeedCommand {
+  std::vector<double> speeds;
+};
+/// Body rates (rad/s) and total thrust along body z (N).
+struct BodyRateCommand {
+  Vector3d omega_body = Vector3d::Zero();
+  double thrust = 0.0;
+};
+/// Attitude and total thrust along body z (N); rates are feed-forward.
+struct AttitudeCommand {
+  Quaterniond q_world_body = Quaterniond::Identity();
+  double thrust = 0.0;
+  Vector3d omega_body = Vector3d::Zero();
+};
+/// Acceleration without gravity (zero hovers), m/s^2, and heading.
+struct AccelerationCommand {
+  Vector3d a_world = Vector3d::Zero();
+  double yaw = 0.0;
+  double yaw_rate = 0.0;
+};
+/// Velocity, m/s, and heading.
+struct VelocityCommand {
+  Vector3d v_world = Vector3d::Zero();
+  double yaw = 0.0;
+  double yaw_rate = 0.0;
+};
+
+/// What a controller is asked for over a control period, the innermost first.
+using Setpoint = std::variant<RotorSpeedCommand,
+                              BodyRateCommand,
+                              AttitudeCommand,
+                              AccelerationCommand,
+                              VelocityCommand,
+                              PositionCommand>;
+
+/// Follow a trajectory, from its start on.
+struct TrajectoryCommand {
+  std::shared_ptr<const Trajectory> trajectory;
+};
+/// Fly through waypoints from where the vehicle is, straight and at rest at each.
+struct WaypointCommand {
+  MissionSettings mission;
+};
+/// Rise by `height` (m) from the present place; arms.
+struct TakeOffCommand {
+  double height = 1.5;
+  double speed = 1.0;  ///< m/s
+};
+/// Come down until something carries the vehicle, then stop the rotors.
+struct LandCommand {
+  double speed = 0.5;  ///< m/s
+};
+/// Brake and stay.
+struct HoverCommand {};
+/// Rotors idle on the ground; in the air: hover.
+struct ArmCommand {};
+/// Rotors off, wherever it is.
+struct DisarmCommand {};
+
+/// All that a vehicle can be told. The first six must be repeated (`Autopilot`'s watchdog); the
+/// others hold until the next command.
+using Command = std::variant<RotorSpeedCommand,
+                             BodyRateCommand,
+                             AttitudeCommand,
+                             AccelerationCommand,
+                             VelocityCommand,
+                             PositionCommand,
+                             TrajectoryCommand,
+                             WaypointCommand,
+                             TakeOffCommand,
+                             LandCommand,
+                             HoverCommand,
+                             ArmCommand,
+                             DisarmCommand>;
+
+/// "velocity", "take_off", ...
+const char* name_of(const Command& command);
+
+}  // namespace pointflight

@@ -1,0 +1,190 @@
+#include "pointflight/vehicle/controllers/loops.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "pointflight/core/constants.hpp"
+#include "pointflight/core/math.hpp"
+
+namespace pointflight {
+namespace {
+
+constexpr double kIntegralZone = 1.5;  // m: farther away an integral only winds up
+
+Vector3d limited(const Vector3d& v, double length) {
+  const double norm = v.norm();
+  return norm > length ? Vector3d(v * (length / norm)) : v;
+}
+
+/// One number for each axis from the horizontal and the vertical loop.
+Vector3d by_axis(const ControllerSettings& c, double LoopDesign::*member) {
+  return {c.horizontal.*member, c.horizontal.*member, c.vertical.*member};
+}
+
+}  // namespace
+
+Matrix3d attitude_from(const Vector3d& b3, double yaw, const Matrix3d& R_now) {
+  const auto heading = math::sincos(yaw);
+  Vector3d b2 = b3.cross(Vector3d(heading.cos, heading.sin, 0.0));
+  if (b2.squaredNorm() < 1e-6) b2 = R_now.col(1) - b3.dot(R_now.col(1)) * b3;
+  b2.normalize();
+  Matrix3d rotation;
+  rotation << b2.cross(b3), b2, b3;
+  return rotation;
+}
+
+LoopController::LoopController(const VehicleSettings& settings)
+    : settings_(settings), mixer_(settings) {}
+
+std::vector<double> LoopController::update(const RigidBodyState& state,
+                                           const Setpoint& setpoint,
+                                           double dt,
+                                           ControllerMemory& memory) const {
+  struct Visitor {
+    const LoopController& self;
+    const RigidBodyState& state;
+    double dt;
+    ControllerMemory& memory;
+
+    [[nodiscard]] std::vector<double> accelerate(const Vector3d& a,
+                                                 const Vector3d& jerk,
+                                                 double yaw,
+                                                 double yaw_rate) const {
+      const AttitudeDemand demand = self.demanded_attitude(state, a, jerk, yaw, yaw_rate);
+      return self.mixer_.speeds({demand.thrust, self.demanded_torque(state, demand, dt, memory)});
+    }
+    std::vector<double> operator()(const RotorSpeedCommand& c) const { return c.speeds; }
+    std::vector<double> operator()(const BodyRateCommand& c) const {
+      return self.mixer_.speeds({c.thrust, self.rate_torque(state, c.omega_body)});
+    }
+    std::vector<double> operator()(const AttitudeCommand& c) const {
+      const AttitudeDemand demand{c.q_world_body.toRotationMatrix(), c.omega_body, c.thrust};
+      return self.mixer_.speeds({demand.thrust, self.demanded_torque(state, demand, dt, memory)});
+    }
+    std::vector<double> operator()(const AccelerationCommand& c) const {
+      return accelerate(self.limited_acceleration(c.a_world), Vector3d::Zero(), c.yaw, c.yaw_rate);
+    }
+    std::vector<double> operator()(const VelocityCommand& c) const {
+      const Vector3d a = self.velocity_loop(state, c.v_world, dt, memory);
+      return accelerate(a, Vector3d::Zero(), c.yaw, c.yaw_rate);
+    }
+    std::vector<double> operator()(const PositionCommand& c) const {
+      const Vector3d a = self.position_loop(state, c, dt, memory);
+      return accelerate(a, c.jerk_world, c.yaw, c.yaw_rate);
+    }
+  };
+  if (memory.level != setpoint.index()) {
+    // no jump when the level changes in flight: the velocity loop starts from zero acceleration,
+    // the position loop from what its integral knew
+    memory.velocity_integral = by_axis(settings_.controller, &LoopDesign::damping)
+                                   .cwiseProduct(velocity_frequency(settings_.controller))
+                                   .cwiseProduct(2.0 * state.v_world);
+    memory.level = setpoint.index();
+  }
+  return std::visit(Visitor{*this, state, dt, memory}, setpoint);
+}
+
+Vector3d LoopController::limited_acceleration(const Vector3d& a) const {
+  // sideways, up, and down to a fifth of gravity so that the rotors keep authority
+  const ControllerSettings& c = settings_.controller;
+  const Vector3d sideways = limited(Vector3d(a.x(), a.y(), 0.0), c.acceleration_max);
+  return {sideways.x(), sideways.y(), std::clamp(a.z(), -0.8 * kGravity, c.climb_acceleration_max)};
+}
+
+/// a = a_ff + 2 z wn (v_ref - v) + integral with v_ref = v_ff + wn / (2 z) e_p, no faster than the
+/// limit: the second-order loop a = a_ff + wn^2 e_p + 2 z wn e_v as long as it is not cut.
+Vector3d LoopController::position_loop(const RigidBodyState& state,
+                                       const PositionCommand& command,
+                                       double dt,
+                                       ControllerMemory& memory) const {
+  const ControllerSettings& c = settings_.controller;
+  const Vector3d wn = by_axis(c, &LoopDesign::natural_frequency);
+  const Vector3d z = by_axis(c, &LoopDesign::damping);
+  const Vector3d ki =
+      by_axis(c, &LoopDesign::integral).cwiseProduct(wn.cwiseProduct(wn).cwiseProduct(wn));
+  const Vector3d e_p = limited(command.p_world - state.p_world, c.error_max);
+  const Vector3d v_ref =
+      limited(command.v_world + 0.5 * wn.cwiseProduct(e_p).cwiseQuotient(z), c.speed_max);
+  const Vector3d a = command.a_world +
+                     2.0 * z.cwiseProduct(wn).cwiseProduct(v_ref - state.v_world) +
+                     memory.position_integral;
+  const Vector3d allowed = limited_acceleration(a);
+  // anti-windup: integrate where the demand is not cut, and never beyond its own limit
+  for (int axis = 0; axis < 3; ++axis) {
+    const bool cut = std::abs(a[axis] - allowed[axis]) > 1e-9;
+    if (cut || std::abs(e_p[axis]) > kIntegralZone) continue;
+    memory.position_integral[axis] =
+        std::clamp(memory.position_integral[axis] + ki[axis] * e_p[axis] * dt,
+                   -c.integral_max,
+                   c.integral_max);
+  }
+  return allowed;
+}
+
+/// a = wn^2 integral(v_cmd - v) - 2 z wn v: v follows v_cmd as a second-order system without a
+/// zero, and holds it in wind.
+Vector3d LoopController::velocity_loop(const RigidBodyState& state,
+                                       const Vector3d& v_world,
+                                       double dt,
+                                       ControllerMemory& memory) const {
+  const ControllerSettings& c = settings_.controller;
+  const Vector3d wn = velocity_frequency(c);
+  const Vector3d z = by_axis(c, &LoopDesign::damping);
+  const Vector3d e_v = limited(v_world, c.speed_max) - state.v_world;
+  Vector3d& integral = memory.velocity_integral;
+  const Vector3d next = integral + dt * wn.cwiseProduct(wn).cwiseProduct(e_v);
+  const Vector3d damping = 2.0 * z.cwiseProduct(wn).cwiseProduct(state.v_world);
+  const Vector3d allowed = limited_acceleration(next - damping);
+  // anti-windup: the integral is what the allowed acceleration needs
+  integral = allowed + damping;
+  return allowed;
+}
+
+Vector3d velocity_frequency(const ControllerSettings& c) {
+  return kVelocityToPosition * by_axis(c, &LoopDesign::natural_frequency);
+}
+
+Vector3d LoopController::attitude_frequency() const {
+  const ControllerSettings& c = settings_.controller;
+  return {c.roll_pitch.natural_frequency, c.roll_pitch.natural_frequency, c.yaw.natural_frequency};
+}
+
+Vector3d LoopController::attitude_damping() const {
+  const ControllerSettings& c = settings_.controller;
+  return {c.roll_pitch.damping, c.roll_pitch.damping, c.yaw.damping};
+}
+
+Vector3d LoopController::tilt_limited(const Vector3d& f) const {
+  const double tilt_max = settings_.controller.tilt_max_deg;
+  if (tilt_max >= 90.0) return f;
+  const double up = std::max(f.z(), 0.05 * kGravity);
+  const double sideways = std::hypot(f.x(), f.y());
+  const double sideways_max = up * math::tan(tilt_max * kDegree);
+  const double scale = sideways > sideways_max ? sideways_max / sideways : 1.0;
+  return {scale * f.x(), scale * f.y(), up};
+}
+
+Vector3d LoopController::rates_of(const Matrix3d& R,
+                                  double specific_thrust,
+                                  const Vector3d& jerk,
+                                  double yaw_rate) const {
+  const double most = settings_.controller.body_rate_max;
+  // h = (jerk - (b3 . jerk) b3) / |f|, w = (-h . b2, h . b1, yaw rate on b3)
+  const Vector3d b3 = R.col(2);
+  const Vector3d h = (jerk - b3.dot(jerk) * b3) / std::max(specific_thrust, 1e-3);
+  const Vector3d omega(-h.dot(R.col(1)), h.dot(R.col(0)), yaw_rate * b3.z());
+  return omega.cwiseMax(-most).cwiseMin(most);
+}
+
+/// First order: the rate follows with the damping term of the attitude loop.
+Vector3d LoopController::rate_torque(const RigidBodyState& state, const Vector3d& omega) const {
+  const double most = settings_.controller.body_rate_max;
+  const Vector3d wanted = omega.cwiseMax(-most).cwiseMin(most);
+  const Vector3d alpha =
+      2.0 *
+      attitude_damping().cwiseProduct(attitude_frequency()).cwiseProduct(wanted - state.omega_body);
+  const Vector3d spin = settings_.inertia_diagonal.cwiseProduct(state.omega_body);
+  return settings_.inertia_diagonal.cwiseProduct(alpha) + state.omega_body.cross(spin);
+}
+
+}  // namespace pointflight

@@ -1,0 +1,81 @@
+#pragma once
+
+#include "pointflight/vehicle/controller.hpp"
+#include "pointflight/vehicle/mixer.hpp"
+
+namespace pointflight {
+
+/// Attitude and thrust that an outer loop asks for.
+struct AttitudeDemand {
+  Matrix3d R_world_body;
+  Vector3d omega_body = Vector3d::Zero();
+  double thrust = 0.0;  ///< N along the present body z.
+};
+
+/// What all controllers share: everything but how an acceleration becomes an attitude and how an
+/// attitude error becomes a torque.
+class LoopController : public Controller {
+ public:
+  explicit LoopController(const VehicleSettings& settings);
+
+  [[nodiscard]] std::vector<double> update(const RigidBodyState& state,
+                                           const Setpoint& setpoint,
+                                           double dt,
+                                           ControllerMemory& memory) const override;
+
+ protected:
+  /// What an acceleration (without gravity) is flown with.
+  [[nodiscard]] virtual AttitudeDemand demanded_attitude(const RigidBodyState& state,
+                                                         const Vector3d& a_world,
+                                                         const Vector3d& jerk_world,
+                                                         double yaw,
+                                                         double yaw_rate) const = 0;
+
+  /// Torque (N m, body) towards an attitude.
+  [[nodiscard]] virtual Vector3d demanded_torque(const RigidBodyState& state,
+                                                 const AttitudeDemand& demand,
+                                                 double dt,
+                                                 ControllerMemory& memory) const = 0;
+
+  [[nodiscard]] const VehicleSettings& settings() const { return settings_; }
+
+  /// Natural frequency (rad/s) of the attitude loop about each body axis, and its damping.
+  [[nodiscard]] Vector3d attitude_frequency() const;
+  [[nodiscard]] Vector3d attitude_damping() const;
+
+  /// Force per mass with its tilt cut to the limit: the vertical part is kept.
+  [[nodiscard]] Vector3d tilt_limited(const Vector3d& specific_force_world) const;
+
+  /// Rates that turn body z with the jerk, and yaw (Mellinger, Kumar 2011, eqs. 7 and 8), limited.
+  [[nodiscard]] Vector3d rates_of(const Matrix3d& R_world_body,
+                                  double specific_thrust,
+                                  const Vector3d& jerk_world,
+                                  double yaw_rate) const;
+
+ private:
+  [[nodiscard]] Vector3d position_loop(const RigidBodyState& state,
+                                       const PositionCommand& command,
+                                       double dt,
+                                       ControllerMemory& memory) const;
+  [[nodiscard]] Vector3d velocity_loop(const RigidBodyState& state,
+                                       const Vector3d& v_world,
+                                       double dt,
+                                       ControllerMemory& memory) const;
+  [[nodiscard]] Vector3d limited_acceleration(const Vector3d& a_world) const;
+  [[nodiscard]] Vector3d rate_torque(const RigidBodyState& state, const Vector3d& omega) const;
+
+  VehicleSettings settings_;
+  Mixer mixer_;
+};
+
+/// The velocity loop is faster than the position loop by this.
+inline constexpr double kVelocityToPosition = 1.5;
+
+/// Natural frequency of the velocity loop along each axis, rad/s.
+Vector3d velocity_frequency(const ControllerSettings& settings);
+
+/// Attitude whose z axis is `b3` and whose x axis points to heading `yaw`; where b3 lies along the
+/// heading, the nearest that `R_now` allows.
+Matrix3d attitude_from(const Vector3d& b3, double yaw, const Matrix3d& R_now);
+
+}  // namespace pointflight

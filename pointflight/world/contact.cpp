@@ -1,0 +1,84 @@
+#include "pointflight/world/contact.hpp"
+
+#include <cmath>
+
+#include "pointflight/core/constants.hpp"
+#include "pointflight/geometry/rotation.hpp"
+#include "pointflight/map/near_surfels.hpp"
+
+namespace pointflight {
+namespace {
+
+/// A ball that holds a surfel's box.
+double box_radius(const SurfelBox& box) {
+  return box.half.norm();
+}
+
+}  // namespace
+
+std::optional<Contact> contact_with_map(const SurfelMap& map,
+                                        const Solid& hull,
+                                        const Pose& T_world_hull,
+                                        double reach) {
+  if (const auto* ball = std::get_if<Ball>(&hull)) {
+    const auto nearest = map.nearest(T_world_hull.translation, ball->radius + reach);
+    if (!nearest) return std::nullopt;
+    return Contact{nearest->distance - ball->radius, nearest->center_world, kMapLabel};
+  }
+  // whatever is within d of the hull is within d + its radius of its centre
+  const double radius = bounding_radius(hull);
+  const Pose T_hull_world = T_world_hull.inverse();
+  std::optional<Contact> best;
+  double least = reach;
+  const auto visit = [&](const SurfelBox& box) {
+    // cheap first: the hull's distance to the box' centre
+    const double to_center = signed_distance(hull, T_hull_world * box.T_world_box.translation);
+    if (to_center - box_radius(box) <= least) {
+      const Separation s = separation(hull, T_world_hull, Solid{Cuboid{box.half}}, box.T_world_box);
+      if (s.distance <= least) {
+        least = s.distance;
+        best = Contact{s.distance, s.place, kMapLabel};
+      }
+    }
+    // leaves beyond a touching hull can still be deeper in it
+    return radius + std::max(0.0, least);
+  };
+  visit_near(map, T_world_hull.translation, radius + reach, visit);
+  return best;
+}
+
+std::optional<Contact> contact_with_body(const BodyShape& shape,
+                                         const Pose& T_world_body,
+                                         Label label,
+                                         const Solid& hull,
+                                         const Pose& T_world_hull,
+                                         double reach) {
+  const double centers = (T_world_body.translation - T_world_hull.translation).norm();
+  if (centers - bounding_radius(shape) - bounding_radius(hull) > reach) return std::nullopt;
+  std::optional<Contact> contact;
+  if (const auto* solid = std::get_if<Solid>(&shape)) {
+    const Separation s = separation(hull, T_world_hull, *solid, T_world_body);
+    if (s.distance > reach) return std::nullopt;
+    contact = Contact{s.distance, s.place, label};
+  } else {
+    const auto& points = std::get<std::shared_ptr<const SurfelMap>>(shape);
+    contact = contact_with_map(*points, hull, T_world_body.inverse() * T_world_hull, reach);
+    if (!contact) return std::nullopt;
+    contact->place_world = T_world_body * contact->place_world;
+    contact->label = label;
+  }
+  return contact;
+}
+
+double motion_bound(const Pose& from, const Pose& to, double radius) {
+  // an angle is at most pi times the sine of its half, up to half a turn
+  const double turn = kPi * (from.rotation.conjugate() * to.rotation).vec().norm();
+  return (to.translation - from.translation).norm() + turn * radius;
+}
+
+Pose between(const Pose& from, const Pose& to, double share) {
+  return {interpolate(from.rotation, to.rotation, share),
+          (1.0 - share) * from.translation + share * to.translation};
+}
+
+}  // namespace pointflight

@@ -1,0 +1,137 @@
+#include "pointflight/world/obstacle_motion.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "pointflight/core/constants.hpp"
+#include "pointflight/core/input_error.hpp"
+#include "pointflight/core/mapped_file.hpp"
+#include "pointflight/core/math.hpp"
+#include "pointflight/geometry/rotation.hpp"
+#include "pointflight/io/byte_cursor.hpp"
+#include "pointflight/io/csv_table.hpp"
+
+namespace pointflight {
+
+WaypointLoop::WaypointLoop(const std::vector<Vector3d>& waypoints, double speed) : speed_(speed) {
+  Quaterniond heading = Quaterniond::Identity();
+  for (std::size_t i = 0; i < waypoints.size(); ++i) {
+    const Vector3d way = waypoints[(i + 1) % waypoints.size()] - waypoints[i];
+    const double length = way.norm();
+    if (length < 1e-9) continue;
+    if (std::hypot(way.x(), way.y()) > 1e-9) {
+      heading = quaternion_from_rpy(0.0, 0.0, math::atan2(way.y(), way.x()));
+    }
+    legs_.push_back({round_, waypoints[i], way / length, heading});
+    round_ += from_seconds(length / speed);
+  }
+  if (legs_.empty()) {
+    legs_.push_back({Duration{0}, waypoints.front(), Vector3d::Zero(), heading});
+    speed_ = 0.0;
+    round_ = Duration{1};
+  }
+  round_ = std::max(round_, Duration{1});
+}
+
+Pose WaypointLoop::at(SimTime time) const {
+  const Duration since = time.time_since_epoch();
+  const Duration within = (since % round_ + round_) % round_;
+  const auto after = std::upper_bound(
+      legs_.begin(), legs_.end(), within, [](Duration t, const Leg& leg) { return t < leg.start; });
+  const Leg& leg = *(after - 1);
+  return {leg.heading, leg.from + to_seconds(within - leg.start) * speed_ * leg.direction};
+}
+
+std::unique_ptr<Keyframes> Keyframes::read(const std::string& path, bool repeat) {
+  const MappedFile file(path);
+  return parse(as_text(file.bytes()), path, repeat);
+}
+
+std::unique_ptr<Keyframes> Keyframes::parse(std::string_view text,
+                                            const std::string& name,
+                                            bool repeat) {
+  const CsvTable table(text, name);
+  const int time = table.require("time");
+  const int place[3] = {table.require("x"), table.require("y"), table.require("z")};
+  const int quaternion[4] = {
+      table.find("qw"), table.find("qx"), table.find("qy"), table.find("qz")};
+  const int rpy[3] = {table.find("roll_deg"), table.find("pitch_deg"), table.find("yaw_deg")};
+  auto keyframes = std::make_unique<Keyframes>();
+  keyframes->repeat_ = repeat;
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    const auto number = [&](int column, double limit) {
+      const double value = table.at(row, column);
+      if (!(std::abs(value) <= limit)) {
+        throw InputError(
+            fmt::format("{}: a number is missing or beyond {}", table.place(row), limit));
+      }
+      return value;
+    };
+    Frame frame;
+    frame.time = SimTime(from_seconds(number(time, 1e9)));
+    for (int axis = 0; axis < 3; ++axis) frame.pose.translation[axis] = number(place[axis], 1e7);
+    if (quaternion[0] >= 0 && quaternion[1] >= 0 && quaternion[2] >= 0 && quaternion[3] >= 0) {
+      Quaterniond& q = frame.pose.rotation;
+      q = Quaterniond(number(quaternion[0], 1e3),
+                      number(quaternion[1], 1e3),
+                      number(quaternion[2], 1e3),
+                      number(quaternion[3], 1e3));
+      if (!(q.norm() > 1e-6)) {
+        throw InputError(fmt::format("{}: the quaternion is zero", table.place(row)));
+      }
+      q.normalize();
+    } else {
+      const auto angle = [&](int column) {
+        return column < 0 ? 0.0 : kDegree * number(column, 1e6);
+      };
+      frame.pose.rotation = quaternion_from_rpy(angle(rpy[0]), angle(rpy[1]), angle(rpy[2]));
+    }
+    if (!keyframes->frames_.empty()) {
+      const Frame& before = keyframes->frames_.back();
+      if (frame.time <= before.time) {
+        throw InputError(
+            fmt::format("{}: time {} s does not come after {} s of the row before; sort "
+                        "the rows",
+                        table.place(row),
+                        to_seconds(frame.time),
+                        to_seconds(before.time)));
+      }
+      const double speed = (frame.pose.translation - before.pose.translation).norm() /
+                           to_seconds(frame.time - before.time);
+      keyframes->speed_max_ = std::max(keyframes->speed_max_, speed);
+    }
+    keyframes->frames_.push_back(frame);
+  }
+  const Vector3d& first = keyframes->frames_.front().pose.translation;
+  if (repeat && (keyframes->frames_.back().pose.translation - first).norm() > 1e-6) {
+    throw InputError(
+        fmt::format("{}: repeats, but does not end where it starts: it would jump; add "
+                    "a last row at ({}, {}, {})",
+                    table.place(table.rows() - 1),
+                    first.x(),
+                    first.y(),
+                    first.z()));
+  }
+  return keyframes;
+}
+
+Pose Keyframes::at(SimTime time) const {
+  const SimTime first = frames_.front().time;
+  const SimTime last = frames_.back().time;
+  if (repeat_ && time > last && last > first) time = first + (time - first) % (last - first);
+  if (time <= first) return frames_.front().pose;
+  if (time >= last) return frames_.back().pose;
+  const auto after =
+      std::upper_bound(frames_.begin(), frames_.end(), time, [](SimTime t, const Frame& frame) {
+        return t < frame.time;
+      });
+  const Frame& a = *(after - 1);
+  const Frame& b = *after;
+  const double share = to_seconds(time - a.time) / to_seconds(b.time - a.time);
+  return {interpolate(a.pose.rotation, b.pose.rotation, share),
+          (1.0 - share) * a.pose.translation + share * b.pose.translation};
+}
+
+}  // namespace pointflight

@@ -1,0 +1,172 @@
+#include "pointflight/world/obstacles.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+
+#include "pointflight/core/constants.hpp"
+#include "pointflight/core/input_error.hpp"
+#include "pointflight/core/resources.hpp"
+#include "pointflight/geometry/rotation.hpp"
+#include "pointflight/map/map_builder.hpp"
+#include "pointflight/world/random_flight.hpp"
+
+namespace pointflight {
+namespace {
+
+constexpr std::array<std::string_view, 4> kShapes = {"sphere", "box", "cylinder", "cloud"};
+constexpr std::array<std::string_view, 4> kMotions = {"random", "still", "loop", "keyframes"};
+constexpr std::array<std::string_view, 2> kDirections = {"any", "horizontal"};
+constexpr std::array<std::string_view, 2> kBorders = {"replace", "bounce"};
+constexpr double kFar = 1e7;          // m
+constexpr std::size_t kMost = 50000;  // labels have 16 bits in a scan's file
+
+/// Stands still.
+class Still : public ObstacleMotion {
+ public:
+  explicit Still(const Pose& pose) : pose_(pose) {}
+  [[nodiscard]] Pose at(SimTime /*time*/) const override { return pose_; }
+  [[nodiscard]] double speed_max() const override { return 0.0; }
+
+ private:
+  Pose pose_;
+};
+
+/// One shape on one motion.
+class MovingObstacle : public Obstacle {
+ public:
+  MovingObstacle(Body body, std::unique_ptr<ObstacleMotion> motion)
+      : body_(std::move(body)), motion_(std::move(motion)) {
+    body_.speed_max = motion_->speed_max();
+    body_.T_world_body = [this](SimTime t) { return motion_->at(t); };
+  }
+  void collect(SimTime /*from*/, SimTime /*until*/, std::vector<Body>& bodies) const override {
+    bodies.push_back(body_);
+  }
+
+ private:
+  Body body_;
+  std::unique_ptr<ObstacleMotion> motion_;
+};
+
+std::shared_ptr<const SurfelMap> load_cloud(const std::string& path,
+                                            double resolution,
+                                            const Executor& executor) {
+  if (path.ends_with(".pfmap")) return SurfelMap::open(path);
+  ImportOptions options;
+  options.resolution = resolution;
+  const ImportedMap map = import_clouds({path}, options, executor);
+  return SurfelMap::from_bytes(map_bytes(map.tree, map.description), path);
+}
+
+BodyShape solid_of(const ObstacleSettings& s) {
+  if (s.shape == "box") return Solid{Cuboid{0.5 * s.size}};
+  if (s.shape == "cylinder") return Solid{Cylinder{s.radius, 0.5 * s.height}};
+  return Solid{Ball{s.radius}};
+}
+
+std::unique_ptr<ObstacleMotion> make_motion(const ObstacleSettings& s, const std::string& folder) {
+  if (s.motion == "loop") return std::make_unique<WaypointLoop>(s.waypoints, s.speed);
+  if (s.motion == "keyframes") return Keyframes::read(resolve_path(s.keyframes, folder), s.repeat);
+  return std::make_unique<Still>(
+      Pose{quaternion_from_rpy(0.0, 0.0, s.yaw_deg * kDegree), s.position});
+}
+
+/// What only makes sense together.
+void check(const ObstacleSettings& s, const std::function<std::string(const char*)>& place) {
+  const auto fail = [&](const char* key, const char* what) {
+    throw InputError(fmt::format("{}: {}", place(key), what));
+  };
+  if (s.shape == "cloud" && s.file.empty()) fail("file", "shape 'cloud' needs a cloud or mesh");
+  if (s.shape != "cloud" && !s.file.empty()) fail("file", "only shape 'cloud' has a file");
+  if (s.motion == "loop" && s.waypoints.empty()) fail("waypoints", "motion 'loop' needs some");
+  if (s.motion == "keyframes" && s.keyframes.empty()) fail("keyframes", "the CSV is missing");
+  if (s.motion != "random" && s.count != 1) {
+    fail("count", "only obstacles that move at random come in numbers; write one entry each");
+  }
+  if ((s.bounds_max - s.bounds_min).minCoeff() < 0.0) fail("bounds_max", "is below bounds_min");
+}
+
+}  // namespace
+
+void describe(SettingsVisitor& v, ObstacleSettings& s) {
+  v.value({"count", "", "so many alike (motion: random)", 1, 50000}, s.count);
+  v.choice({"shape", "", "exact shapes, or the points of a cloud or mesh"}, s.shape, kShapes);
+  v.value({"radius", "m", "of spheres and cylinders", 0.001, 1000}, s.radius);
+  v.value({"radius_max", "m", "above radius: each is drawn between the two", 0, 1000},
+          s.radius_max);
+  v.value({"height", "m", "of cylinders", 0.001, 1000}, s.height);
+  v.value({"size", "m", "of boxes", 0.001, 1000}, s.size);
+  v.value({"file", "", "cloud, mesh or .pfmap of shape 'cloud', around its own origin"}, s.file);
+  v.value({"resolution", "m", "at which it is imported", 0.001, 10}, s.resolution);
+  v.value({"intensity", "", "of returns from exact shapes", 0, 1e6}, s.intensity);
+  v.choice({"motion", "", "how it moves: a function of seed and time"}, s.motion, kMotions);
+  v.value({"speed", "m/s", "of random and loop", 0, 100}, s.speed);
+  v.value({"speed_max", "m/s", "above speed: each is drawn between the two", 0, 100}, s.speed_max);
+  v.choice({"directions", "", "of random motion"}, s.directions, kDirections);
+  v.choice({"at_border",
+            "",
+            "what happens at the bounds: another one at a random free place, or it turns back"},
+           s.at_border,
+           kBorders);
+  v.value({"bounds_min", "m", "of random motion; both 0: the map's", -kFar, kFar}, s.bounds_min);
+  v.value({"bounds_max", "m", "of random motion", -kFar, kFar}, s.bounds_max);
+  v.value({"position", "m", "where a still one stands", -kFar, kFar}, s.position);
+  v.value({"yaw_deg", "deg", "of a still one", -360, 360}, s.yaw_deg);
+  v.value({"waypoints", "m", "of a loop, which closes by itself", -kFar, kFar}, s.waypoints);
+  v.value({"keyframes", "", "CSV: time,x,y,z and roll_deg,pitch_deg,yaw_deg or qw,qx,qy,qz"},
+          s.keyframes);
+  v.value({"repeat", "", "keyframes start again after the last"}, s.repeat);
+}
+
+Obstacles::Obstacles(const std::vector<ObstacleSettings>& settings,
+                     const ObstacleWorld& world,
+                     const Executor& executor) {
+  for (std::size_t entry = 0; entry < settings.size(); ++entry) {
+    const ObstacleSettings& s = settings[entry];
+    const auto place = [&](const char* key) { return world.place(entry, key); };
+    check(s, place);
+    std::shared_ptr<const SurfelMap> cloud;
+    if (s.shape == "cloud") {
+      try {
+        cloud = load_cloud(resolve_path(s.file, world.folder), s.resolution, executor);
+      } catch (const InputError& error) {
+        throw InputError(fmt::format("{}: {}", place("file"), error.what()));
+      }
+    }
+    Aabb bounds;
+    bounds.min = s.bounds_min;
+    bounds.max = s.bounds_max;
+    if (s.bounds_min.isZero(0.0) && s.bounds_max.isZero(0.0)) bounds = world.map->bounds_world();
+    for (std::int64_t i = 0; i < s.count; ++i) {
+      const auto number = static_cast<std::uint32_t>(obstacles_.size());
+      if (obstacles_.size() >= kMost) {
+        throw InputError(fmt::format("{}: more than {} obstacles", place("count"), kMost));
+      }
+      if (s.motion == "random") {
+        obstacles_.push_back(
+            std::make_unique<RandomFlight>(s, cloud, bounds, world, number, place("motion")));
+        continue;
+      }
+      Body body;
+      body.label = kFirstObstacle + number;
+      body.shape = cloud ? BodyShape{cloud} : solid_of(s);
+      body.intensity = static_cast<float>(s.intensity);
+      obstacles_.push_back(
+          std::make_unique<MovingObstacle>(std::move(body), make_motion(s, world.folder)));
+    }
+  }
+}
+
+std::vector<Body> Obstacles::bodies(SimTime from, SimTime until) const {
+  std::vector<Body> bodies;
+  bodies.reserve(obstacles_.size());
+  const std::lock_guard lock(*extending_);  // the motion is worked out as far as needed
+  for (const auto& obstacle : obstacles_) {
+    obstacle->extend(until);
+    obstacle->collect(from, until, bodies);
+  }
+  return bodies;
+}
+
+}  // namespace pointflight

@@ -1,0 +1,95 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "pointflight/core/parallel.hpp"
+#include "pointflight/core/settings.hpp"
+#include "pointflight/map/scene.hpp"
+#include "pointflight/world/obstacle_motion.hpp"
+
+namespace pointflight {
+
+/// One entry of a scenario's `obstacles`: one or more bodies alike.
+struct ObstacleSettings {
+  std::int64_t count = 1;
+  std::string shape = "sphere";             ///< or "box", "cylinder", "cloud"
+  double radius = 0.3;                      ///< Of spheres and cylinders, m.
+  double radius_max = 0.0;                  ///< Above `radius`: drawn between the two.
+  double height = 1.7;                      ///< Of cylinders, m.
+  Vector3d size = Vector3d(0.5, 0.5, 0.5);  ///< Of boxes, m.
+  std::string file;          ///< Of a cloud, mesh or .pfmap, in the body's own frame.
+  double resolution = 0.03;  ///< Of its import, m.
+  double intensity = 100.0;  ///< Of the returns of exact shapes.
+
+  std::string motion = "random";           ///< or "still", "loop", "keyframes"
+  double speed = 1.0;                      ///< m/s
+  double speed_max = 0.0;                  ///< Above `speed`: drawn between the two.
+  std::string directions = "any";          ///< or "horizontal"
+  std::string at_border = "replace";       ///< or "bounce"
+  Vector3d bounds_min = Vector3d::Zero();  ///< Both zero: the map's bounds.
+  Vector3d bounds_max = Vector3d::Zero();
+  Vector3d position = Vector3d::Zero();  ///< Where a still one stands.
+  double yaw_deg = 0.0;
+  std::vector<Vector3d> waypoints;  ///< Of a loop.
+  std::string keyframes;            ///< CSV: `Keyframes`.
+  bool repeat = true;               ///< Keyframes start again after the last.
+};
+
+/// The keys of an entry.
+void describe(SettingsVisitor& visitor, ObstacleSettings& settings);
+
+/// A place that must be free of obstacles at the start.
+struct KeepFree {
+  Vector3d center_world;
+  double radius;
+};
+
+/// What obstacles are made from.
+struct ObstacleWorld {
+  std::shared_ptr<const SurfelMap> map;
+  std::uint64_t seed = 1;
+  std::vector<KeepFree> keep_free;
+  std::string folder;  ///< Relative paths are taken from here.
+  /// Where a key of entry i stands ("scenario.yaml:12: obstacles[0].radius"), for messages.
+  std::function<std::string(std::size_t entry, const char* key)> place;
+};
+
+/// One moving thing. Its number within the run is its entity in the random streams.
+class Obstacle {
+ public:
+  virtual ~Obstacle() = default;
+
+  /// Appends what there is of it from one instant to another: usually one body; two where it is
+  /// replaced in between. Callable from several threads up to the instant of `extend`.
+  virtual void collect(SimTime from, SimTime until, std::vector<Body>& bodies) const = 0;
+
+  /// Works out its motion up to an instant.
+  virtual void extend(SimTime /*until*/) {}
+};
+
+/// All obstacles of a run, in the order of their labels.
+class Obstacles {
+ public:
+  Obstacles() = default;
+  /// Reads files, imports clouds, looks for free places. Throws InputError.
+  Obstacles(const std::vector<ObstacleSettings>& settings,
+            const ObstacleWorld& world,
+            const Executor& executor);
+
+  [[nodiscard]] std::size_t size() const { return obstacles_.size(); }
+
+  /// Bodies between two instants. Callable from several threads.
+  [[nodiscard]] std::vector<Body> bodies(SimTime from, SimTime until) const;
+
+ private:
+  std::vector<std::unique_ptr<Obstacle>> obstacles_;
+  std::unique_ptr<std::mutex> extending_ = std::make_unique<std::mutex>();
+};
+
+}  // namespace pointflight

@@ -1,0 +1,174 @@
+#include "pointflight/world/random_flight.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "pointflight/core/constants.hpp"
+#include "pointflight/core/input_error.hpp"
+#include "pointflight/core/math.hpp"
+
+namespace pointflight {
+namespace {
+
+// draws of one life: a number each
+constexpr std::uint64_t kSizeDraw = 0;
+constexpr std::uint64_t kDirectionDraw = 1;
+constexpr std::uint64_t kSpeedDraw = 2;
+constexpr std::uint64_t kPlaceDraws = 16;  // two a try
+constexpr std::uint64_t kTries = 1000;
+constexpr std::uint64_t kDrawsALife = 1u << 12;
+static_assert(kPlaceDraws + 2 * kTries < kDrawsALife);
+
+double drawn(double low, double high, double share) {
+  return high > low ? low + share * (high - low) : low;
+}
+
+/// A number in [low, high] that runs back and forth between the two.
+double folded(double x, double low, double high) {
+  const double width = high - low;
+  if (width <= 0.0) return low;
+  const double turns = (x - low) / (2.0 * width);
+  const double within = 2.0 * width * (turns - std::floor(turns));
+  return low + (within <= width ? within : 2.0 * width - within);
+}
+
+}  // namespace
+
+RandomFlight::RandomFlight(const ObstacleSettings& settings,
+                           std::shared_ptr<const SurfelMap> cloud,
+                           const Aabb& bounds,
+                           const ObstacleWorld& world,
+                           std::uint32_t number,
+                           const std::string& place)
+    : settings_(settings),
+      cloud_(std::move(cloud)),
+      bounds_(bounds),
+      map_(world.map),
+      keep_free_(world.keep_free),
+      random_(world.seed, StreamId::kObstacles, number),
+      label_(kFirstObstacle + number),
+      place_(place) {
+  lives_.push_back(life(0, SimTime{}, true));
+}
+
+Vector3d RandomFlight::folded(const Vector3d& p) const {
+  return {pointflight::folded(p.x(), bounds_.min.x(), bounds_.max.x()),
+          pointflight::folded(p.y(), bounds_.min.y(), bounds_.max.y()),
+          pointflight::folded(p.z(), bounds_.min.z(), bounds_.max.z())};
+}
+
+Vector3d RandomFlight::free_place(std::uint64_t n, double radius, bool strict) const {
+  Vector3d best = bounds_.min;
+  double best_room = -1.0;
+  for (std::uint64_t attempt = 0; attempt < kTries; ++attempt) {
+    const std::uint64_t index = n * kDrawsALife + kPlaceDraws + 2 * attempt;
+    const auto [u, v] = random_.uniform2(index);
+    const double w = random_.uniform(index + 1);
+    const Vector3d p = bounds_.min + Vector3d(u, v, w).cwiseProduct(bounds_.size());
+    const auto nearest = map_->nearest(p, radius);
+    const bool kept_free =
+        n == 0 && std::any_of(keep_free_.begin(), keep_free_.end(), [&](const KeepFree& keep) {
+          return (p - keep.center_world).norm() < keep.radius + radius;
+        });
+    if (!nearest && !kept_free) return p;
+    // later lives take the roomiest: a run does not end because a map is full
+    if (nearest && nearest->distance > best_room) {
+      best_room = nearest->distance;
+      best = p;
+    }
+  }
+  if (strict) {
+    throw InputError(fmt::format(
+        "{}: no free place for an obstacle that reaches {:.2f} m to all sides was found "
+        "within ({:.1f}, {:.1f}, {:.1f}) to ({:.1f}, {:.1f}, {:.1f}) in {} tries; make it "
+        "smaller, or give bounds_min and bounds_max",
+        place_,
+        radius,
+        bounds_.min.x(),
+        bounds_.min.y(),
+        bounds_.min.z(),
+        bounds_.max.x(),
+        bounds_.max.y(),
+        bounds_.max.z(),
+        kTries));
+  }
+  return best;
+}
+
+RandomFlight::Life RandomFlight::life(std::uint64_t n, SimTime from, bool strict) const {
+  const std::uint64_t base = n * kDrawsALife;
+  Life life;
+  life.from = n == 0 ? SimTime::min() : from;
+  const double radius =
+      drawn(settings_.radius, settings_.radius_max, random_.uniform(base + kSizeDraw));
+  if (cloud_) {
+    life.shape = cloud_;
+  } else if (settings_.shape == "box") {
+    life.shape = Solid{Cuboid{0.5 * settings_.size}};
+  } else if (settings_.shape == "cylinder") {
+    life.shape = Solid{Cylinder{radius, 0.5 * settings_.height}};
+  } else {
+    life.shape = Solid{Ball{radius}};
+  }
+  life.start = free_place(n, bounding_radius(life.shape), strict);
+
+  const auto [u, v] = random_.uniform2(base + kDirectionDraw);
+  const double z = settings_.directions == "horizontal" ? 0.0 : 2.0 * u - 1.0;
+  const double side = std::sqrt(1.0 - z * z);
+  const auto angle = math::sincos(2.0 * kPi * v);
+  const double speed =
+      drawn(settings_.speed, settings_.speed_max, random_.uniform(base + kSpeedDraw));
+  life.velocity = speed * Vector3d(side * angle.cos, side * angle.sin, z);
+
+  life.until = SimTime::max();
+  if (settings_.at_border == "bounce") return life;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double rate = life.velocity[axis];
+    if (rate == 0.0) continue;
+    const double border = rate > 0.0 ? bounds_.max[axis] : bounds_.min[axis];
+    const double seconds = (border - life.start[axis]) / rate;
+    if (seconds < 1e9) {
+      life.until = std::min(life.until, from + std::max(from_seconds(seconds), Duration{1}));
+    }
+  }
+  return life;
+}
+
+void RandomFlight::extend(SimTime until) {
+  while (lives_.back().until <= until) {
+    lives_.push_back(life(lives_.size(), lives_.back().until, false));
+  }
+}
+
+void RandomFlight::collect(SimTime from, SimTime until, std::vector<Body>& bodies) const {
+  const auto first =
+      std::upper_bound(lives_.begin(), lives_.end(), from, [](SimTime t, const Life& life) {
+        return t < life.until;
+      });
+  for (auto life = first; life != lives_.end() && life->from <= until; ++life) {
+    Body body;
+    body.label = label_;
+    body.shape = life->shape;
+    body.intensity = static_cast<float>(settings_.intensity);
+    body.speed_max = life->velocity.norm();
+    body.from = life->from;
+    body.until = life->until;
+    const SimTime born = life->from == SimTime::min() ? SimTime{} : life->from;
+    const Vector3d start = life->start;
+    const Vector3d velocity = life->velocity;
+    if (settings_.at_border == "bounce") {
+      body.T_world_body = [this, born, start, velocity](SimTime t) {
+        return Pose{Quaterniond::Identity(), folded(start + to_seconds(t - born) * velocity)};
+      };
+    } else {
+      body.T_world_body = [born, start, velocity](SimTime t) {
+        return Pose{Quaterniond::Identity(), start + to_seconds(t - born) * velocity};
+      };
+    }
+    bodies.push_back(std::move(body));
+  }
+}
+
+}  // namespace pointflight
