@@ -30,6 +30,8 @@ int run(int argc, char** argv) {
   add_fly_command(app, exit_code);
   add_scan_command(app, exit_code);
   add_lidar_command(app, exit_code);
+  add_vehicle_command(app, exit_code);
+  add_picture_command(app, exit_code);
   add_compare_command(app, exit_code);
   add_fidelity_command(app, exit_code);
   try {

@@ -7,6 +7,7 @@
 #include "pointflight/lidar/lidar.hpp"
 #include "pointflight/map/surfel_map.hpp"
 #include "pointflight/sim/simulation.hpp"
+#include "pointflight/vehicle/step_response.hpp"
 
 namespace pointflight::apps {
 
@@ -54,5 +55,10 @@ void describe_run(const Simulation& simulation, RunPicture& picture);
 
 /// Top and side view of map, flown paths, obstacles, waypoints and what the LiDARs saw.
 void draw_overview(const SurfelMap& map, const RunPicture& run, const std::string& path);
+
+/// A vehicle's step responses beside what its loops were designed for.
+void draw_step_responses(const VehicleSettings& vehicle,
+                         const std::vector<StepResponse>& responses,
+                         const std::string& path);
 
 }  // namespace pointflight::apps

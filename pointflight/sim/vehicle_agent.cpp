@@ -245,7 +245,7 @@ ImuSample VehicleAgent::imu_sample(VehicleStatus& status,
                                    const VehicleState& state) const {
   BodyAcceleration acceleration;
   if (!status.landed && !status.at_rest) {
-    acceleration = dynamics_.acceleration(state, status.rotor_commands, status.conditions);
+    acceleration = dynamics_.acceleration(state, status.conditions);
   }
   ImuSample sample =
       imu_.sample(status.next_imu, time, state.body, acceleration, status.imu_biases);

@@ -17,6 +17,7 @@ struct ControllerMemory {
   Vector3d position_integral = Vector3d::Zero();  ///< In m/s^2: gain included.
   Vector3d attitude_integral = Vector3d::Zero();  ///< In rad/s^2: gain included.
   Vector3d velocity_integral = Vector3d::Zero();  ///< In m/s^2: gain included.
+  double yaw_torque = 0.0;                        ///< Filtered, N m.
   std::size_t level = std::variant_npos;          ///< Of the last setpoint.
 };
 

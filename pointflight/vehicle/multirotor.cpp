@@ -5,17 +5,17 @@
 #include <cmath>
 
 #include "pointflight/core/constants.hpp"
+#include "pointflight/core/math.hpp"
 #include "pointflight/geometry/rotation.hpp"
 
 namespace pointflight {
 
-/// Time derivative of a VehicleState.
+/// Time derivative of a RigidBodyState.
 struct Multirotor::Rate {
   Vector3d v_world;
   Vector3d a_world;
   Eigen::Vector4d q_dot;  ///< x, y, z, w as Eigen stores coefficients.
-  Vector3d alpha_body;
-  std::vector<RotorState> rotors;  ///< speed: its rate; acceleration: its rate.
+  Vector3d torque_body;   ///< What changes the momentum of body and rotors, with w x (J w + h).
 };
 
 Multirotor::Multirotor(const VehicleSettings& settings) : settings_(settings) {}
@@ -41,14 +41,54 @@ double Multirotor::ground_effect(double height) const {
   return 1.0 / (1.0 - share * share);
 }
 
-Multirotor::Rate Multirotor::rate(const VehicleState& state,
-                                  std::span<const double> commands,
+/// x'' = -wn^2 x - 2 z wn x' for x = speed - command, in closed form: exact at any `dt`.
+void Multirotor::advance(std::span<RotorState> rotors,
+                         std::span<const double> commands,
+                         double dt,
+                         double speed_share) const {
+  const double wn = settings_.rotor.natural_frequency;
+  const double z = settings_.rotor.damping;
+  if (wn <= 0.0) return;
+  const double decay = math::exp(-z * wn * dt);
+  // x(t) = decay (x0 c + (x0' + z wn x0) s), c and s by the kind of damping
+  double c = 1.0;
+  double s = dt;
+  const double under = 1.0 - z * z;
+  if (under > 1e-8) {
+    const double wd = wn * std::sqrt(under);
+    const auto angle = math::sincos(wd * dt);
+    c = angle.cos;
+    s = angle.sin / wd;
+  } else if (under < -1e-8) {
+    const double wd = wn * std::sqrt(-under);
+    const double grow = math::exp(wd * dt);
+    c = 0.5 * (grow + 1.0 / grow);
+    s = 0.5 * (grow - 1.0 / grow) / wd;
+  }
+  for (std::size_t i = 0; i < rotors.size(); ++i) {
+    const double command = clamped(commands[i], speed_share);
+    const double x = rotors[i].speed - command;
+    const double v = rotors[i].acceleration;
+    rotors[i].speed = command + decay * (x * c + (v + z * wn * x) * s);
+    rotors[i].acceleration = decay * (v * c - (z * wn * v + wn * wn * x) * s);
+  }
+}
+
+/// Of the rotors about body z, kg m^2/s (with the accelerations: its rate).
+double Multirotor::rotor_momentum(std::span<const RotorState> rotors,
+                                  double RotorState::*member) const {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < rotors.size(); ++i) {
+    sum -= settings_.rotors[i].yaw_sign * settings_.rotor.inertia * rotors[i].*member;
+  }
+  return sum;
+}
+
+Multirotor::Rate Multirotor::rate(const RigidBodyState& body,
+                                  std::span<const RotorState> rotors,
                                   const FlightConditions& conditions) const {
   const RotorModel& rotor = settings_.rotor;
-  const RigidBodyState& body = state.body;
-  const bool ideal = rotor.natural_frequency <= 0.0;
   Rate rate;
-  rate.rotors.resize(state.rotors.size());
 
   const Quaterniond q_body_world = body.q_world_body.conjugate();
   const Vector3d v_body = q_body_world * (body.v_world - conditions.wind_world);
@@ -56,28 +96,18 @@ Multirotor::Rate Multirotor::rate(const VehicleState& state,
   const double height = body.p_world.z() - conditions.ground_z;
   Vector3d force = Vector3d::Zero();
   Vector3d torque = Vector3d::Zero();
-  for (std::size_t i = 0; i < state.rotors.size(); ++i) {
+  for (std::size_t i = 0; i < rotors.size(); ++i) {
     const RotorPlacement& place = settings_.rotors[i];
-    const double w = state.rotors[i].speed;
-    const double dw = state.rotors[i].acceleration;
+    const double w = rotors[i].speed;
     // thrust, and drag of the blades against the air that the rotor moves through sideways
     const Vector3d v_rotor = v_body + body.omega_body.cross(place.position);
-    const Vector3d f(
-        -rotor.drag_coefficient * w * v_rotor.x(),
-        -rotor.drag_coefficient * w * v_rotor.y(),
-        rotor.thrust_coefficient * w * w * ground_effect(height + up_body.dot(place.position)));
+    const Vector3d f(-rotor.drag_coefficient * w * v_rotor.x(),
+                     -rotor.drag_coefficient * w * v_rotor.y(),
+                     rotor.thrust_coefficient * w * w *
+                         ground_effect(height + up_body.dot(place.position)));
     force += f;
     torque += place.position.cross(f);
-    torque.z() += place.yaw_sign * (rotor.torque_coefficient * w * w + rotor.inertia * dw);
-    // the rotor's spin is -s J_r w e3: turning the body turns it too
-    torque -= body.omega_body.cross(Vector3d(0, 0, -place.yaw_sign * rotor.inertia * w));
-
-    if (!ideal) {
-      const double wn = rotor.natural_frequency;
-      rate.rotors[i].speed = dw;
-      rate.rotors[i].acceleration = wn * wn * (clamped(commands[i], conditions.speed_share) - w) -
-                                    2.0 * rotor.damping * wn * dw;
-    }
+    torque.z() += place.yaw_sign * rotor.torque_coefficient * w * w;
   }
   // quadratic drag of the body along its axes
   force -=
@@ -85,9 +115,9 @@ Multirotor::Rate Multirotor::rate(const VehicleState& state,
 
   rate.v_world = body.v_world;
   rate.a_world = body.q_world_body * force / settings_.mass - Vector3d(0, 0, kGravity);
-  const Vector3d spin = settings_.inertia_diagonal.cwiseProduct(body.omega_body);
-  rate.alpha_body =
-      (torque - body.omega_body.cross(spin)).cwiseQuotient(settings_.inertia_diagonal);
+  const Vector3d momentum = settings_.inertia_diagonal.cwiseProduct(body.omega_body) +
+                            Vector3d(0, 0, rotor_momentum(rotors, &RotorState::speed));
+  rate.torque_body = torque - body.omega_body.cross(momentum);
   const Quaterniond omega(0.0, body.omega_body.x(), body.omega_body.y(), body.omega_body.z());
   rate.q_dot = 0.5 * (body.q_world_body * omega).coeffs();
   return rate;
@@ -98,52 +128,67 @@ void Multirotor::step(VehicleState& state,
                       double dt,
                       const FlightConditions& conditions) const {
   assert(commands.size() == state.rotors.size());
+  // in two halves: a vehicle that tumbles at 7 rad/s then stays within 1e-9 m of the exact motion
+  // over 10 s of 1 ms steps, not only within 1e-8
+  for (int half = 0; half < 2; ++half) runge_kutta(state, commands, 0.5 * dt, conditions);
+}
+
+void Multirotor::runge_kutta(VehicleState& state,
+                             std::span<const double> commands,
+                             double dt,
+                             const FlightConditions& conditions) const {
+  const double share = conditions.speed_share;
   if (settings_.rotor.natural_frequency <= 0.0) {
     for (std::size_t i = 0; i < commands.size(); ++i) {
-      state.rotors[i] = {clamped(commands[i], conditions.speed_share), 0.0};
+      state.rotors[i] = {clamped(commands[i], share), 0.0};
     }
   }
-  const auto advanced = [&](const Rate& r, double h) {
-    VehicleState s = state;
-    s.body.p_world += h * r.v_world;
-    s.body.v_world += h * r.a_world;
-    s.body.q_world_body.coeffs() += h * r.q_dot;
-    s.body.omega_body += h * r.alpha_body;
-    for (std::size_t i = 0; i < s.rotors.size(); ++i) {
-      s.rotors[i].speed += h * r.rotors[i].speed;
-      s.rotors[i].acceleration += h * r.rotors[i].acceleration;
-    }
+  const std::vector<RotorState>& begin = state.rotors;
+  std::vector<RotorState> middle = state.rotors;
+  advance(middle, commands, 0.5 * dt, share);
+  std::vector<RotorState> end = state.rotors;
+  advance(end, commands, dt, share);
+
+  // the momentum of body and rotors together is what is integrated: what a rotor gains by speeding
+  // up the body loses, to the last bit
+  const Vector3d& inertia = settings_.inertia_diagonal;
+  const auto spin = [&](const std::vector<RotorState>& rotors) {
+    return Vector3d(0, 0, rotor_momentum(rotors, &RotorState::speed));
+  };
+  const Vector3d momentum = inertia.cwiseProduct(state.body.omega_body) + spin(begin);
+  const auto advanced = [&](const Rate& r, double h, const std::vector<RotorState>& rotors) {
+    RigidBodyState s = state.body;
+    s.p_world += h * r.v_world;
+    s.v_world += h * r.a_world;
+    s.q_world_body.coeffs() += h * r.q_dot;
+    s.omega_body = (momentum + h * r.torque_body - spin(rotors)).cwiseQuotient(inertia);
     return s;
   };
-  const Rate k1 = rate(state, commands, conditions);
-  const Rate k2 = rate(advanced(k1, 0.5 * dt), commands, conditions);
-  const Rate k3 = rate(advanced(k2, 0.5 * dt), commands, conditions);
-  const Rate k4 = rate(advanced(k3, dt), commands, conditions);
-  const auto mean = [dt](const auto& a, const auto& b, const auto& c, const auto& d) {
-    return (dt / 6.0) * (a + 2.0 * b + 2.0 * c + d);
+  const Rate k1 = rate(state.body, begin, conditions);
+  const Rate k2 = rate(advanced(k1, 0.5 * dt, middle), middle, conditions);
+  const Rate k3 = rate(advanced(k2, 0.5 * dt, middle), middle, conditions);
+  const Rate k4 = rate(advanced(k3, dt, end), end, conditions);
+  const auto mean = [](const auto& a, const auto& b, const auto& c, const auto& d) {
+    return (1.0 / 6.0) * (a + 2.0 * b + 2.0 * c + d);
   };
-  RigidBodyState& body = state.body;
-  body.p_world += mean(k1.v_world, k2.v_world, k3.v_world, k4.v_world);
-  body.v_world += mean(k1.a_world, k2.a_world, k3.a_world, k4.a_world);
-  body.q_world_body.coeffs() += mean(k1.q_dot, k2.q_dot, k3.q_dot, k4.q_dot);
-  body.omega_body += mean(k1.alpha_body, k2.alpha_body, k3.alpha_body, k4.alpha_body);
-  for (std::size_t i = 0; i < state.rotors.size(); ++i) {
-    RotorState& r = state.rotors[i];
-    r.speed += mean(k1.rotors[i].speed, k2.rotors[i].speed, k3.rotors[i].speed, k4.rotors[i].speed);
-    r.acceleration += mean(k1.rotors[i].acceleration,
-                           k2.rotors[i].acceleration,
-                           k3.rotors[i].acceleration,
-                           k4.rotors[i].acceleration);
+  Rate r;
+  r.v_world = mean(k1.v_world, k2.v_world, k3.v_world, k4.v_world);
+  r.a_world = mean(k1.a_world, k2.a_world, k3.a_world, k4.a_world);
+  r.q_dot = mean(k1.q_dot, k2.q_dot, k3.q_dot, k4.q_dot);
+  r.torque_body = mean(k1.torque_body, k2.torque_body, k3.torque_body, k4.torque_body);
+  state.body = advanced(r, dt, end);
+  state.body.q_world_body.normalize();
+  state.rotors = std::move(end);
+  for (RotorState& r : state.rotors) {
     if (r.speed < 0.0) r = {0.0, std::max(0.0, r.acceleration)};
   }
-  body.q_world_body.normalize();
 }
 
 BodyAcceleration Multirotor::acceleration(const VehicleState& state,
-                                          std::span<const double> commands,
                                           const FlightConditions& conditions) const {
-  const Rate r = rate(state, commands, conditions);
-  return {r.a_world, r.alpha_body};
+  const Rate r = rate(state.body, state.rotors, conditions);
+  const Vector3d spin_up(0, 0, rotor_momentum(state.rotors, &RotorState::acceleration));
+  return {r.a_world, (r.torque_body - spin_up).cwiseQuotient(settings_.inertia_diagonal)};
 }
 
 }  // namespace pointflight

@@ -35,26 +35,36 @@ class Multirotor {
   /// At rest at a pose, rotors at hover speed.
   [[nodiscard]] VehicleState hover_at(const Vector3d& p_world, double yaw) const;
 
-  /// Advances by `dt` seconds (RK4) under rotor speed commands (rad/s, clamped to the rotor's
-  /// limits; 0 or less: off), held over the step. Without rotor lag speeds take their commands at
-  /// once.
+  /// Advances by `dt` seconds under rotor speed commands (rad/s, clamped to the rotor's limits; 0 or
+  /// less: off), held over the step: rotor speeds by their closed form, the body by RK4. Without
+  /// rotor lag speeds take their commands at once.
   void step(VehicleState& state,
             std::span<const double> rotor_commands,
             double dt,
             const FlightConditions& conditions = {}) const;
 
-  /// What the state does under the commands: for the IMU.
+  /// What the state does: for the IMU.
   [[nodiscard]] BodyAcceleration acceleration(const VehicleState& state,
-                                              std::span<const double> rotor_commands,
                                               const FlightConditions& conditions = {}) const;
 
   [[nodiscard]] const VehicleSettings& settings() const { return settings_; }
 
  private:
   struct Rate;
-  [[nodiscard]] Rate rate(const VehicleState& state,
-                          std::span<const double> commands,
+  void runge_kutta(VehicleState& state,
+                   std::span<const double> commands,
+                   double dt,
+                   const FlightConditions& conditions) const;
+  [[nodiscard]] Rate rate(const RigidBodyState& body,
+                          std::span<const RotorState> rotors,
                           const FlightConditions& conditions) const;
+  /// The rotors `dt` seconds later.
+  void advance(std::span<RotorState> rotors,
+               std::span<const double> commands,
+               double dt,
+               double speed_share) const;
+  [[nodiscard]] double rotor_momentum(std::span<const RotorState> rotors,
+                                      double RotorState::*member) const;
   [[nodiscard]] double clamped(double command, double speed_share) const;
   [[nodiscard]] double ground_effect(double height) const;
 

@@ -136,7 +136,7 @@ TEST(Multirotor, SpinningTheBodyAgainstItsRotorsFeelsThem) {
   VehicleState state = vehicle.hover_at({0, 0, 0}, 0.0);
   state.body.omega_body = {2.0, 0.0, 0.0};
   const std::vector<double> commands(4, settings.hover_speed());
-  const auto a = vehicle.acceleration(state, commands);
+  const auto a = vehicle.acceleration(state);
   // H = -4 J w e3; torque on the body = -omega x H: y = -(omega_z H_x - omega_x H_z) = omega_x H_z
   const double h = -4.0 * settings.rotor.inertia * settings.hover_speed();
   EXPECT_NEAR(a.alpha_body.y(), 2.0 * h / settings.inertia_diagonal.y(), 1e-9);
@@ -148,7 +148,7 @@ TEST(Multirotor, DragTakesEnergyAway) {
   VehicleState state = vehicle.hover_at({0, 0, 0}, 0.0);
   state.body.v_world = {8, 0, 0};
   const std::vector<double> commands(4, settings.hover_speed());
-  const auto a = vehicle.acceleration(state, commands);
+  const auto a = vehicle.acceleration(state);
   const double by_hand = (0.5 * kAirDensity * settings.drag_area.x() * 64.0 +
                           4.0 * settings.rotor.drag_coefficient * settings.hover_speed() * 8.0) /
                          settings.mass;

@@ -51,15 +51,17 @@ std::vector<double> LoopController::update(const RigidBodyState& state,
                                                  double yaw,
                                                  double yaw_rate) const {
       const AttitudeDemand demand = self.demanded_attitude(state, a, jerk, yaw, yaw_rate);
-      return self.mixer_.speeds({demand.thrust, self.demanded_torque(state, demand, dt, memory)});
+      const Vector3d torque = self.demanded_torque(state, demand, dt, memory);
+      return self.speeds(demand.thrust, torque, dt, memory);
     }
     std::vector<double> operator()(const RotorSpeedCommand& c) const { return c.speeds; }
     std::vector<double> operator()(const BodyRateCommand& c) const {
-      return self.mixer_.speeds({c.thrust, self.rate_torque(state, c.omega_body)});
+      return self.speeds(c.thrust, self.rate_torque(state, c.omega_body), dt, memory);
     }
     std::vector<double> operator()(const AttitudeCommand& c) const {
       const AttitudeDemand demand{c.q_world_body.toRotationMatrix(), c.omega_body, c.thrust};
-      return self.mixer_.speeds({demand.thrust, self.demanded_torque(state, demand, dt, memory)});
+      const Vector3d torque = self.demanded_torque(state, demand, dt, memory);
+      return self.speeds(demand.thrust, torque, dt, memory);
     }
     std::vector<double> operator()(const AccelerationCommand& c) const {
       return accelerate(self.limited_acceleration(c.a_world), Vector3d::Zero(), c.yaw, c.yaw_rate);
@@ -82,6 +84,19 @@ std::vector<double> LoopController::update(const RigidBodyState& state,
     memory.level = setpoint.index();
   }
   return std::visit(Visitor{*this, state, dt, memory}, setpoint);
+}
+
+/// A rotor that speeds up turns the body as well: by J_r dw/dt beside k_m w^2, which together answer
+/// a speed command with 1 + T s, T = J_r / (2 k_m w). A lag of that time takes it out again.
+std::vector<double> LoopController::speeds(double thrust,
+                                           const Vector3d& torque,
+                                           double dt,
+                                           ControllerMemory& memory) const {
+  const RotorModel& rotor = settings_.rotor;
+  const double slope = 2.0 * rotor.torque_coefficient * settings_.hover_speed();
+  const double lag = slope > 0.0 ? rotor.inertia / slope : 0.0;
+  memory.yaw_torque += dt / (lag + dt) * (torque.z() - memory.yaw_torque);
+  return mixer_.speeds({thrust, {torque.x(), torque.y(), memory.yaw_torque}});
 }
 
 Vector3d LoopController::limited_acceleration(const Vector3d& a) const {

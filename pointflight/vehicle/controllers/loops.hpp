@@ -61,6 +61,11 @@ class LoopController : public Controller {
                                        const Vector3d& v_world,
                                        double dt,
                                        ControllerMemory& memory) const;
+  /// Rotor speeds for thrust and torque.
+  [[nodiscard]] std::vector<double> speeds(double thrust,
+                                           const Vector3d& torque,
+                                           double dt,
+                                           ControllerMemory& memory) const;
   [[nodiscard]] Vector3d limited_acceleration(const Vector3d& a_world) const;
   [[nodiscard]] Vector3d rate_torque(const RigidBodyState& state, const Vector3d& omega) const;
 

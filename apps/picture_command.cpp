@@ -1,0 +1,153 @@
+#include <fmt/format.h>
+
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "apps/commands.hpp"
+#include "apps/pictures.hpp"
+#include "pointflight/core/input_error.hpp"
+#include "pointflight/io/cloud_reader.hpp"
+#include "pointflight/io/csv_table.hpp"
+
+namespace pointflight::apps {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct PictureFlags {
+  std::string run;
+  std::string map;
+  std::string output;
+};
+
+/// Lines of a text file split at commas, the first left out; for tables with words in them.
+std::vector<std::vector<std::string>> rows_of(const fs::path& path) {
+  std::ifstream file(path);
+  if (!file) throw InputError(fmt::format("{}: cannot open; is this a run's folder?", path.string()));
+  std::vector<std::vector<std::string>> rows;
+  std::string line;
+  std::getline(file, line);
+  while (std::getline(file, line)) {
+    std::vector<std::string> cells;
+    std::stringstream cut(line);
+    for (std::string cell; std::getline(cut, cell, ',');) cells.push_back(cell);
+    rows.push_back(std::move(cells));
+  }
+  return rows;
+}
+
+double number_of(const std::string& text, const fs::path& path) {
+  char* end = nullptr;
+  const double value = std::strtod(text.c_str(), &end);
+  if (end == text.c_str()) {
+    throw InputError(fmt::format("{}: '{}' is no number", path.string(), text));
+  }
+  return value;
+}
+
+void read_vehicle(const fs::path& folder, std::size_t number, RunPicture& picture) {
+  const CsvTable table((folder / "trajectory.csv").string());
+  const int x = table.require("px");
+  const int y = table.require("py");
+  const int z = table.require("pz");
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    picture.add_path_point(number, {table.at(row, x), table.at(row, y), table.at(row, z)});
+  }
+  const fs::path scans = folder / "scans.csv";
+  if (!fs::exists(scans)) return;
+  constexpr std::size_t kColumns = 14;
+  for (const auto& row : rows_of(scans)) {
+    if (row.size() < kColumns) throw InputError(fmt::format("{}: short row", scans.string()));
+    std::array<double, 7> pose{};
+    for (std::size_t i = 0; i < pose.size(); ++i) pose[i] = number_of(row[7 + i], scans);
+    const Pose T_world_sensor{Quaterniond(pose[3], pose[4], pose[5], pose[6]).normalized(),
+                              {pose[0], pose[1], pose[2]}};
+    const auto reader = open_cloud((folder / row[0]).string());
+    std::vector<CloudPoint> points;
+    while (reader->read(points)) {
+      for (const CloudPoint& point : points) picture.add_seen(T_world_sensor * point.position);
+    }
+  }
+}
+
+RunPicture read_run(const fs::path& folder) {
+  RunPicture picture;
+  nlohmann::json summary;
+  try {
+    summary = nlohmann::json::parse(std::ifstream(folder / "summary.json"));
+    double flown = 0.0;
+    std::size_t number = 0;
+    std::uint64_t collisions = 0;
+    double closest = 1e9;
+    const auto& vehicles = summary.at("vehicles");
+    for (const auto& vehicle : vehicles) {
+      const std::string name = vehicle.at("name").get<std::string>();
+      read_vehicle(vehicles.size() == 1 ? folder : folder / name, number++, picture);
+      flown += vehicle.at("distance_flown").get<double>();
+      collisions += vehicle.at("collisions").get<std::uint64_t>();
+      if (vehicle.at("closest_approach").is_number()) {
+        closest = std::min(closest, vehicle.at("closest_approach").get<double>());
+      }
+    }
+    picture.title = fmt::format("{:.1f} m flown in {:.1f} s, {}",
+                                flown,
+                                summary.at("simulated_time").get<double>(),
+                                summary.at("end").get<std::string>());
+    picture.subtitle = fmt::format("closest approach {}; {} collision{}; seed {}",
+                                   closest < 1e9 ? fmt::format("{:.2f} m", closest)
+                                                 : std::string("over 10 m"),
+                                   collisions,
+                                   collisions == 1 ? "" : "s",
+                                   summary.at("seed").get<std::int64_t>());
+  } catch (const nlohmann::json::exception&) {
+    throw InputError(fmt::format("{}: not the summary of a run; give the folder of `fly -o`",
+                                 (folder / "summary.json").string()));
+  }
+  const fs::path obstacles = folder / "obstacles.csv";
+  if (fs::exists(obstacles) && fs::file_size(obstacles) > 0) {
+    const auto rows = rows_of(obstacles);
+    for (const auto& row : rows) {
+      if (row.size() < 12) throw InputError(fmt::format("{}: short row", obstacles.string()));
+      picture.add_obstacle(static_cast<std::uint32_t>(number_of(row[1], obstacles)),
+                           {number_of(row[2], obstacles),
+                            number_of(row[3], obstacles),
+                            number_of(row[4], obstacles)},
+                           number_of(row[9], obstacles));
+    }
+  }
+  const fs::path events = folder / "events.csv";
+  for (const auto& row : rows_of(events)) {
+    if (row.size() < 10 || row[1] != "collision") continue;
+    picture.collisions.emplace_back(
+        number_of(row[7], events), number_of(row[8], events), number_of(row[9], events));
+  }
+  return picture;
+}
+
+}  // namespace
+
+void add_picture_command(CLI::App& parent, int& /*exit_code*/) {
+  auto* app = parent.add_subcommand("picture", "Draw a run from its folder");
+  auto flags = std::make_shared<PictureFlags>();
+  app->add_option("run", flags->run, "A folder that `fly` or a program of yours wrote")->required();
+  app->add_option("--map", flags->map, "The .pfmap it was flown in")->required();
+  app->add_option("-o,--output", flags->output, "The .png; else overview.png in the folder");
+  app->callback([flags] {
+    const auto map = SurfelMap::open(flags->map);
+    const RunPicture picture = read_run(flags->run);
+    const std::string path = flags->output.empty()
+                                 ? (fs::path(flags->run) / "overview.png").string()
+                                 : flags->output;
+    draw_overview(*map, picture, path);
+    fmt::print("{}\n", path);
+  });
+}
+
+}  // namespace pointflight::apps

@@ -1,0 +1,172 @@
+#include "pointflight/vehicle/step_response.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+#include "pointflight/core/constants.hpp"
+#include "pointflight/core/math.hpp"
+#include "pointflight/geometry/rotation.hpp"
+#include "pointflight/vehicle/controllers/loops.hpp"
+#include "pointflight/vehicle/multirotor.hpp"
+
+namespace pointflight {
+namespace {
+
+/// What is stepped, how it is read, how long it takes.
+struct Trial {
+  const char* name;
+  const char* unit;
+  double size;
+  double duration;  ///< s
+  LoopDesign design;
+  bool first_order;
+  std::function<Setpoint(double value, const RigidBodyState& state)> command;
+  std::function<double(const RigidBodyState& state)> read;
+};
+
+double roll_of(const RigidBodyState& s) {
+  return rotation_vector(s.q_world_body).x();
+}
+
+std::vector<Trial> trials_of(const VehicleSettings& v) {
+  const ControllerSettings& c = v.controller;
+  const double weight = v.mass * kGravity;
+  const auto position = [](const Vector3d& p, double yaw) {
+    PositionCommand command;
+    command.p_world = p;
+    command.yaw = yaw;
+    return command;
+  };
+  LoopDesign rate = c.roll_pitch;
+  rate.natural_frequency = 2.0 * rate.damping * rate.natural_frequency;
+  LoopDesign velocity = c.horizontal;
+  velocity.natural_frequency *= kVelocityToPosition;
+  velocity.integral = 0.0;
+  const auto long_enough = [](const LoopDesign& design) { return 12.0 / design.natural_frequency; };
+  return {
+      {"roll rate", "rad/s", 0.2, long_enough(rate), rate, true,
+       [=](double x, const RigidBodyState&) {
+         return BodyRateCommand{{x, 0, 0}, weight};
+       },
+       [](const RigidBodyState& s) { return s.omega_body.x(); }},
+      {"roll attitude", "rad", 0.1, long_enough(c.roll_pitch), c.roll_pitch, false,
+       [=](double x, const RigidBodyState&) {
+         return AttitudeCommand{quaternion_from_rpy(x, 0, 0), weight, Vector3d::Zero()};
+       },
+       [](const RigidBodyState& s) { return roll_of(s); }},
+      {"yaw", "rad", 0.1, long_enough(c.yaw), c.yaw, false,
+       [=](double x, const RigidBodyState&) { return position({0, 0, 0}, x); },
+       [](const RigidBodyState& s) { return yaw_of(s.q_world_body); }},
+      {"acceleration x", "m/s^2", 0.5, long_enough(c.roll_pitch), c.roll_pitch, false,
+       [=](double x, const RigidBodyState&) {
+         return AccelerationCommand{{x, 0, 0}, 0.0, 0.0};
+       },
+       // what the tilt makes of the thrust; drag takes its part later
+       [](const RigidBodyState& s) {
+         const Vector3d b3 = s.q_world_body * Vector3d::UnitZ();
+         return kGravity * b3.x() / b3.z();
+       }},
+      {"velocity x", "m/s", 0.5, long_enough(velocity), velocity, false,
+       [=](double x, const RigidBodyState&) {
+         return VelocityCommand{{x, 0, 0}, 0.0, 0.0};
+       },
+       [](const RigidBodyState& s) { return s.v_world.x(); }},
+      {"position x", "m", 0.5, long_enough(c.horizontal), c.horizontal, false,
+       [=](double x, const RigidBodyState&) { return position({x, 0, 0}, 0.0); },
+       [](const RigidBodyState& s) { return s.p_world.x(); }},
+      {"position z", "m", 0.5, long_enough(c.vertical), c.vertical, false,
+       [=](double x, const RigidBodyState&) { return position({0, 0, x}, 0.0); },
+       [](const RigidBodyState& s) { return s.p_world.z(); }},
+  };
+}
+
+}  // namespace
+
+void measure(StepResponse& r) {
+  double t10 = -1.0;
+  double t90 = -1.0;
+  r.overshoot = 0.0;
+  r.settling = 0.0;
+  for (std::size_t i = 0; i < r.value.size(); ++i) {
+    const double t = static_cast<double>(i) * r.step;
+    if (t10 < 0.0 && r.value[i] > 0.1) t10 = t;
+    if (t90 < 0.0 && r.value[i] > 0.9) t90 = t;
+    r.overshoot = std::max(r.overshoot, r.value[i] - 1.0);
+    if (std::abs(r.value[i] - 1.0) > 0.05) r.settling = t;
+  }
+  r.rise_time = t90 < 0.0 ? 0.0 : t90 - t10;
+  // the transform of the response's derivative is the closed loop's gain
+  const auto gain = [&](double w) {
+    double re = 0.0;
+    double im = 0.0;
+    for (std::size_t i = 1; i < r.value.size(); ++i) {
+      const double dy = r.value[i] - r.value[i - 1];
+      const auto angle = math::sincos(w * (static_cast<double>(i) - 0.5) * r.step);
+      re += dy * angle.cos;
+      im -= dy * angle.sin;
+    }
+    return std::hypot(re, im);
+  };
+  double low = 0.0;
+  double high = 0.05 * r.design.natural_frequency;
+  const double limit = 1.0 / std::sqrt(2.0);
+  while (gain(high) > limit && high < 20.0 * r.design.natural_frequency) {
+    low = high;
+    high *= 1.15;
+  }
+  for (int i = 0; i < 30; ++i) {
+    const double middle = 0.5 * (low + high);
+    (gain(middle) > limit ? low : high) = middle;
+  }
+  r.bandwidth = low;
+}
+
+std::vector<double> designed_response(const StepResponse& r) {
+  const double wn = r.design.natural_frequency;
+  const double z = r.design.damping;
+  std::vector<double> value;
+  double y = 0.0;
+  double dy = 0.0;
+  constexpr int kFine = 20;
+  const double h = r.step / kFine;
+  for (std::size_t i = 0; i < r.value.size(); ++i) {
+    value.push_back(y);
+    for (int k = 0; k < kFine; ++k) {
+      if (r.first_order) {
+        y += h * wn * (1.0 - y);
+        continue;
+      }
+      dy += h * (wn * wn * (1.0 - y) - 2.0 * z * wn * dy);
+      y += h * dy;
+    }
+  }
+  return value;
+}
+
+std::vector<StepResponse> step_responses(const VehicleSettings& settings) {
+  std::vector<StepResponse> responses;
+  const Multirotor vehicle(settings);
+  const auto controller = make_controller(settings.controller.kind, settings);
+  for (const Trial& trial : trials_of(settings)) {
+    StepResponse r;
+    r.name = trial.name;
+    r.unit = trial.unit;
+    r.size = trial.size;
+    r.design = trial.design;
+    r.first_order = trial.first_order;
+    VehicleState state = vehicle.hover_at(Vector3d::Zero(), 0.0);
+    ControllerMemory memory;
+    for (double t = 0.0; t < trial.duration; t += r.step) {
+      r.value.push_back(trial.read(state.body) / trial.size);
+      const auto speeds = controller->update(
+          state.body, trial.command(trial.size, state.body), r.step, memory);
+      vehicle.step(state, speeds, r.step);
+    }
+    measure(r);
+    responses.push_back(std::move(r));
+  }
+  return responses;
+}
+
+}  // namespace pointflight
