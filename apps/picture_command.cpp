@@ -30,7 +30,8 @@ struct PictureFlags {
 /// Lines of a text file split at commas, the first left out; for tables with words in them.
 std::vector<std::vector<std::string>> rows_of(const fs::path& path) {
   std::ifstream file(path);
-  if (!file) throw InputError(fmt::format("{}: cannot open; is this a run's folder?", path.string()));
+  if (!file)
+    throw InputError(fmt::format("{}: cannot open; is this a run's folder?", path.string()));
   std::vector<std::vector<std::string>> rows;
   std::string line;
   std::getline(file, line);
@@ -100,12 +101,12 @@ RunPicture read_run(const fs::path& folder) {
                                 flown,
                                 summary.at("simulated_time").get<double>(),
                                 summary.at("end").get<std::string>());
-    picture.subtitle = fmt::format("closest approach {}; {} collision{}; seed {}",
-                                   closest < 1e9 ? fmt::format("{:.2f} m", closest)
-                                                 : std::string("over 10 m"),
-                                   collisions,
-                                   collisions == 1 ? "" : "s",
-                                   summary.at("seed").get<std::int64_t>());
+    picture.subtitle =
+        fmt::format("closest approach {}; {} collision{}; seed {}",
+                    closest < 1e9 ? fmt::format("{:.2f} m", closest) : std::string("over 10 m"),
+                    collisions,
+                    collisions == 1 ? "" : "s",
+                    summary.at("seed").get<std::int64_t>());
   } catch (const nlohmann::json::exception&) {
     throw InputError(fmt::format("{}: not the summary of a run; give the folder of `fly -o`",
                                  (folder / "summary.json").string()));
@@ -142,9 +143,8 @@ void add_picture_command(CLI::App& parent, int& /*exit_code*/) {
   app->callback([flags] {
     const auto map = SurfelMap::open(flags->map);
     const RunPicture picture = read_run(flags->run);
-    const std::string path = flags->output.empty()
-                                 ? (fs::path(flags->run) / "overview.png").string()
-                                 : flags->output;
+    const std::string path =
+        flags->output.empty() ? (fs::path(flags->run) / "overview.png").string() : flags->output;
     draw_overview(*map, picture, path);
     fmt::print("{}\n", path);
   });

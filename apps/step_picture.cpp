@@ -8,7 +8,7 @@
 namespace pointflight::apps {
 namespace {
 
-constexpr double kWidth = 430.0;   // of a panel's plot, pixels
+constexpr double kWidth = 430.0;  // of a panel's plot, pixels
 constexpr double kHeight = 150.0;
 constexpr double kLeft = 56.0;
 constexpr double kGap = 74.0;

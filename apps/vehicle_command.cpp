@@ -49,8 +49,7 @@ void show_vehicle(const ShowFlags& flags) {
              bounding_radius(s.hull()),
              hover_power(s));
   if (s.battery.cells > 0.0) {
-    const double current =
-        hover_power(s) / s.battery.efficiency / (s.battery.cells * 3.85);
+    const double current = hover_power(s) / s.battery.efficiency / (s.battery.cells * 3.85);
     fmt::print("# battery: {:.0f} cells, {:.1f} Ah: about {:.0f} min of hover\n",
                s.battery.cells,
                s.battery.capacity,
@@ -92,8 +91,10 @@ void add_vehicle_command(CLI::App& parent, int& /*exit_code*/) {
   auto* show = app->add_subcommand(
       "show", "What a vehicle's file says: hover, thrust to weight, loops, step responses");
   auto flags = std::make_shared<ShowFlags>();
-  show->add_option("name", flags->name, "A shipped vehicle or the path of a .yaml file")->required();
-  show->add_option("--controller", flags->controller, "cascade or geometric, instead of the file's");
+  show->add_option("name", flags->name, "A shipped vehicle or the path of a .yaml file")
+      ->required();
+  show->add_option(
+      "--controller", flags->controller, "cascade or geometric, instead of the file's");
   show->add_option("--png", flags->picture, "Draw the step responses");
   show->callback([flags] { show_vehicle(*flags); });
 }

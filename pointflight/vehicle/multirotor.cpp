@@ -101,10 +101,10 @@ Multirotor::Rate Multirotor::rate(const RigidBodyState& body,
     const double w = rotors[i].speed;
     // thrust, and drag of the blades against the air that the rotor moves through sideways
     const Vector3d v_rotor = v_body + body.omega_body.cross(place.position);
-    const Vector3d f(-rotor.drag_coefficient * w * v_rotor.x(),
-                     -rotor.drag_coefficient * w * v_rotor.y(),
-                     rotor.thrust_coefficient * w * w *
-                         ground_effect(height + up_body.dot(place.position)));
+    const Vector3d f(
+        -rotor.drag_coefficient * w * v_rotor.x(),
+        -rotor.drag_coefficient * w * v_rotor.y(),
+        rotor.thrust_coefficient * w * w * ground_effect(height + up_body.dot(place.position)));
     force += f;
     torque += place.position.cross(f);
     torque.z() += place.yaw_sign * rotor.torque_coefficient * w * w;

@@ -35,8 +35,8 @@ class Multirotor {
   /// At rest at a pose, rotors at hover speed.
   [[nodiscard]] VehicleState hover_at(const Vector3d& p_world, double yaw) const;
 
-  /// Advances by `dt` seconds under rotor speed commands (rad/s, clamped to the rotor's limits; 0 or
-  /// less: off), held over the step: rotor speeds by their closed form, the body by RK4. Without
+  /// Advances by `dt` seconds under rotor speed commands (rad/s, clamped to the rotor's limits; 0
+  /// or less: off), held over the step: rotor speeds by their closed form, the body by RK4. Without
   /// rotor lag speeds take their commands at once.
   void step(VehicleState& state,
             std::span<const double> rotor_commands,

@@ -45,20 +45,42 @@ std::vector<Trial> trials_of(const VehicleSettings& v) {
   velocity.integral = 0.0;
   const auto long_enough = [](const LoopDesign& design) { return 12.0 / design.natural_frequency; };
   return {
-      {"roll rate", "rad/s", 0.2, long_enough(rate), rate, true,
+      {"roll rate",
+       "rad/s",
+       0.2,
+       long_enough(rate),
+       rate,
+       true,
        [=](double x, const RigidBodyState&) {
          return BodyRateCommand{{x, 0, 0}, weight};
        },
        [](const RigidBodyState& s) { return s.omega_body.x(); }},
-      {"roll attitude", "rad", 0.1, long_enough(c.roll_pitch), c.roll_pitch, false,
+      {"roll attitude",
+       "rad",
+       0.1,
+       long_enough(c.roll_pitch),
+       c.roll_pitch,
+       false,
        [=](double x, const RigidBodyState&) {
          return AttitudeCommand{quaternion_from_rpy(x, 0, 0), weight, Vector3d::Zero()};
        },
        [](const RigidBodyState& s) { return roll_of(s); }},
-      {"yaw", "rad", 0.1, long_enough(c.yaw), c.yaw, false,
-       [=](double x, const RigidBodyState&) { return position({0, 0, 0}, x); },
+      {"yaw",
+       "rad",
+       0.1,
+       long_enough(c.yaw),
+       c.yaw,
+       false,
+       [=](double x, const RigidBodyState&) {
+         return position({0, 0, 0}, x);
+       },
        [](const RigidBodyState& s) { return yaw_of(s.q_world_body); }},
-      {"acceleration x", "m/s^2", 0.5, long_enough(c.roll_pitch), c.roll_pitch, false,
+      {"acceleration x",
+       "m/s^2",
+       0.5,
+       long_enough(c.roll_pitch),
+       c.roll_pitch,
+       false,
        [=](double x, const RigidBodyState&) {
          return AccelerationCommand{{x, 0, 0}, 0.0, 0.0};
        },
@@ -67,16 +89,35 @@ std::vector<Trial> trials_of(const VehicleSettings& v) {
          const Vector3d b3 = s.q_world_body * Vector3d::UnitZ();
          return kGravity * b3.x() / b3.z();
        }},
-      {"velocity x", "m/s", 0.5, long_enough(velocity), velocity, false,
+      {"velocity x",
+       "m/s",
+       0.5,
+       long_enough(velocity),
+       velocity,
+       false,
        [=](double x, const RigidBodyState&) {
          return VelocityCommand{{x, 0, 0}, 0.0, 0.0};
        },
        [](const RigidBodyState& s) { return s.v_world.x(); }},
-      {"position x", "m", 0.5, long_enough(c.horizontal), c.horizontal, false,
-       [=](double x, const RigidBodyState&) { return position({x, 0, 0}, 0.0); },
+      {"position x",
+       "m",
+       0.5,
+       long_enough(c.horizontal),
+       c.horizontal,
+       false,
+       [=](double x, const RigidBodyState&) {
+         return position({x, 0, 0}, 0.0);
+       },
        [](const RigidBodyState& s) { return s.p_world.x(); }},
-      {"position z", "m", 0.5, long_enough(c.vertical), c.vertical, false,
-       [=](double x, const RigidBodyState&) { return position({0, 0, x}, 0.0); },
+      {"position z",
+       "m",
+       0.5,
+       long_enough(c.vertical),
+       c.vertical,
+       false,
+       [=](double x, const RigidBodyState&) {
+         return position({0, 0, x}, 0.0);
+       },
        [](const RigidBodyState& s) { return s.p_world.z(); }},
   };
 }
@@ -159,8 +200,8 @@ std::vector<StepResponse> step_responses(const VehicleSettings& settings) {
     ControllerMemory memory;
     for (double t = 0.0; t < trial.duration; t += r.step) {
       r.value.push_back(trial.read(state.body) / trial.size);
-      const auto speeds = controller->update(
-          state.body, trial.command(trial.size, state.body), r.step, memory);
+      const auto speeds =
+          controller->update(state.body, trial.command(trial.size, state.body), r.step, memory);
       vehicle.step(state, speeds, r.step);
     }
     measure(r);

@@ -120,7 +120,8 @@ INSTANTIATE_TEST_SUITE_P(Vehicles,
                                            Case{"lee2010", "cascade"}));
 
 TEST(VehicleShow, ShippedVehiclesReachTheirDesignInTheirOwnAir) {
-  for (const char* name : {"quad_250", "quad_330", "quad_450", "hexa_550", "octo_1045", "lee2010"}) {
+  for (const char* name :
+       {"quad_250", "quad_330", "quad_450", "hexa_550", "octo_1045", "lee2010"}) {
     for (const StepResponse& r : step_responses(load_vehicle(name))) {
       SCOPED_TRACE(std::string(name) + " " + r.name);
       EXPECT_NEAR(r.value.back(), 1.0, 0.13);  // drag takes its part where nothing integrates
@@ -354,10 +355,9 @@ TEST(Trajectory, PolynomialsDerivativesAreThoseOfItsPositions) {
   const auto read = PolynomialTrajectory::parse(
       "duration,x^0,x^1,y^0,y^1,z^0,z^1,yaw^0\n2,0,1,0,2,1,0,0\n1,2,0,4,0,1,0,0\n", "p.csv");
   EXPECT_TRUE(read->at(1.0).p_world.isApprox(Vector3d(1, 2, 1)));
-  expect_contains(error_of([] {
-                    PolynomialTrajectory::parse("duration,x^0,y^0,z^0\n-1,0,0,0\n", "p.csv");
-                  }),
-                  "p.csv:2: ");
+  expect_contains(
+      error_of([] { PolynomialTrajectory::parse("duration,x^0,y^0,z^0\n-1,0,0,0\n", "p.csv"); }),
+      "p.csv:2: ");
   expect_contains(error_of([] { PolynomialTrajectory::parse("duration,x^0\n1,0\n", "p.csv"); }),
                   "'y^");
 }
@@ -372,7 +372,8 @@ TEST(Trajectory, BSplinesInterpolateLinesAndDifferentiate) {
     const auto c = spline->at(t);
     EXPECT_TRUE(c.v_world.isApprox(Vector3d(4, -2, 0), 1e-12));
     EXPECT_LT(c.a_world.norm(), 1e-9);
-    EXPECT_NEAR(c.p_world.x(), 2.0 + 4.0 * t, 1e-12);  // its first knot has the mean of three points
+    EXPECT_NEAR(
+        c.p_world.x(), 2.0 + 4.0 * t, 1e-12);  // its first knot has the mean of three points
     EXPECT_NEAR(c.yaw_rate, 0.2, 1e-12);
   }
   // any points: derivatives against differences

@@ -13,8 +13,8 @@
 namespace pointflight {
 namespace {
 
-/// p, linear momentum, attitude as a matrix, angular momentum about the centre of mass (both world),
-/// rotor speeds and their rates.
+/// p, linear momentum, attitude as a matrix, angular momentum about the centre of mass (both
+/// world), rotor speeds and their rates.
 struct Momenta {
   Vector3d p, P, L;
   Matrix3d R;
@@ -59,8 +59,8 @@ class MomentumModel {
       const Vector3d through_air = v + (m.R * om).cross(arm) - wind_;
       const Vector3d axis = m.R.col(2);
       const Vector3d sideways = through_air - axis * axis.dot(through_air);
-      const Vector3d f = v_.rotor.thrust_coefficient * w * w * axis -
-                         v_.rotor.drag_coefficient * w * sideways;
+      const Vector3d f =
+          v_.rotor.thrust_coefficient * w * w * axis - v_.rotor.drag_coefficient * w * sideways;
       force += f;
       torque += arm.cross(f) + v_.rotors[i].yaw_sign * v_.rotor.torque_coefficient * w * w * axis;
     }
@@ -128,8 +128,8 @@ struct Tumble {
       m.w[static_cast<Eigen::Index>(i)] = s.rotors[i].speed;
       m.dw[static_cast<Eigen::Index>(i)] = s.rotors[i].acceleration;
     }
-    m.L = m.R * (settings.inertia_diagonal.cwiseProduct(s.body.omega_body) +
-                 model.rotor_momentum(m.w));
+    m.L = m.R *
+          (settings.inertia_diagonal.cwiseProduct(s.body.omega_body) + model.rotor_momentum(m.w));
     return m;
   }
 
@@ -148,7 +148,10 @@ struct Tumble {
 };
 
 /// Differences in position (m), velocity (m/s), attitude (matrix entries) and rates (rad/s).
-double difference(const VehicleState& s, const Momenta& m, const MomentumModel& model, double mass) {
+double difference(const VehicleState& s,
+                  const Momenta& m,
+                  const MomentumModel& model,
+                  double mass) {
   return std::max({(s.body.p_world - m.p).norm(),
                    (s.body.v_world - m.P / mass).norm(),
                    (s.body.q_world_body.toRotationMatrix() - m.R).norm(),
@@ -160,8 +163,7 @@ class Formulations : public ::testing::TestWithParam<const char*> {};
 TEST_P(Formulations, NewtonEulerAndMomentumAgree) {
   const Tumble tumble(GetParam());
   const MomentumModel model(tumble.settings, tumble.commands, tumble.wind);
-  const Momenta reference =
-      model.advanced(tumble.momenta(tumble.start, model), 10.0, 100000);
+  const Momenta reference = model.advanced(tumble.momenta(tumble.start, model), 10.0, 100000);
   double fastest = 0.0;
   const VehicleState flown = tumble.flown(10.0, 0.001, &fastest);
   const double apart = difference(flown, reference, model, tumble.settings.mass);
@@ -194,8 +196,7 @@ TEST_P(Formulations, EnergyIsWhatForcesPutInUnderDragAndWind) {
   FlightConditions air;
   air.wind_world = tumble.wind;
   const auto energy = [&](const VehicleState& s) {
-    return 0.5 * v.mass * s.body.v_world.squaredNorm() +
-           v.mass * kGravity * s.body.p_world.z() +
+    return 0.5 * v.mass * s.body.v_world.squaredNorm() + v.mass * kGravity * s.body.p_world.z() +
            0.5 * s.body.omega_body.dot(v.inertia_diagonal.cwiseProduct(s.body.omega_body));
   };
   // power of what acts on the body beside gravity, from forces written down here
@@ -253,8 +254,7 @@ TEST(Multirotor, GroundEffectIsCheesemanAndBennetts) {
     air.ground_z = state.body.p_world.z() + settings.rotors[0].position.z() - above;
     const double got = vehicle.acceleration(state, air).a_world.z();
     const double h = std::max(above, 0.5 * radius);
-    const double factor =
-        above > 10 * radius ? 1.0 : 1.0 / (1.0 - std::pow(radius / (4.0 * h), 2));
+    const double factor = above > 10 * radius ? 1.0 : 1.0 / (1.0 - std::pow(radius / (4.0 * h), 2));
     EXPECT_NEAR(got, kGravity * (factor - 1.0), 1e-9) << above;
   }
 }

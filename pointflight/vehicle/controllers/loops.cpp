@@ -86,8 +86,8 @@ std::vector<double> LoopController::update(const RigidBodyState& state,
   return std::visit(Visitor{*this, state, dt, memory}, setpoint);
 }
 
-/// A rotor that speeds up turns the body as well: by J_r dw/dt beside k_m w^2, which together answer
-/// a speed command with 1 + T s, T = J_r / (2 k_m w). A lag of that time takes it out again.
+/// A rotor that speeds up turns the body as well: by J_r dw/dt beside k_m w^2, which together
+/// answer a speed command with 1 + T s, T = J_r / (2 k_m w). A lag of that time takes it out again.
 std::vector<double> LoopController::speeds(double thrust,
                                            const Vector3d& torque,
                                            double dt,
