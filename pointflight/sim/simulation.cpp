@@ -203,6 +203,10 @@ void Simulation::interrupt() {
   state_.end = RunEnd::kInterrupted;
 }
 
+void Simulation::complete() {
+  state_.end = RunEnd::kCompleted;
+}
+
 bool Simulation::advance_to(SimTime time, SampleSink& sink) {
   while (state_.time < time) {
     if (!step(sink)) return false;

@@ -59,6 +59,8 @@ class Simulation {
 
   /// Ends the run early.
   void interrupt();
+  /// Ends the run as completed: a goal that only the calling program knows is reached.
+  void complete();
 
   [[nodiscard]] const SimulationState& state() const { return state_; }
   /// Goes on from a state of this simulation or a copy of it: the same bytes as the first time.

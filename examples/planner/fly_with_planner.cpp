@@ -1,0 +1,255 @@
+// Flies a drone through a map by what its LiDARs see, among moving obstacles: the planner of this
+// folder in the loop with the simulation, through the public interface only.
+//
+//   fly_with_planner MAP.pfmap -o RUN [--seed N] [--seeds N] [--obstacles N] [--threads N]
+//
+// With --seeds N it flies the seeds 1 .. N and says for each how it went; a seed that fails prints
+// the command that replays it. Exit code 0: all arrived without a collision.
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <exception>
+#include <string>
+
+#include "examples/planner/planner.hpp"
+#include "pointflight/core/input_error.hpp"
+#include "pointflight/core/random.hpp"
+#include "pointflight/sim/flight_recorder.hpp"
+#include "pointflight/sim/simulation.hpp"
+
+using namespace pointflight;
+
+namespace {
+
+struct Options {
+  std::string map;
+  std::string output;
+  int seed = 1;
+  int seeds = 0;  ///< Above 0: these many, from 1 on.
+  int obstacles = 40;
+  int threads = 0;
+};
+
+constexpr double kLow = 1.4;  // m: the layer in which drone and obstacles fly
+constexpr double kHigh = 3.2;
+
+/// Collects what a scan saw, in the world, and passes everything on to the recorder.
+class Eyes : public SampleSink {
+ public:
+  explicit Eyes(FlightRecorder* recorder) : recorder_(recorder) {}
+
+  void on_scan(const Scan& scan, const PoseAt& pose_at) override {
+    if (recorder_ != nullptr) recorder_->on_scan(scan, pose_at);
+    for (const ScanPoint& point : scan.points) {
+      const Pose T_world_sensor = pose_at(scan.start + point.time_offset);
+      seen.push_back(
+          {T_world_sensor.translation, T_world_sensor * point.position_sensor.cast<double>()});
+    }
+  }
+  void on_state(const StateSample& sample) override {
+    if (recorder_ != nullptr) recorder_->on_state(sample);
+  }
+  void on_imu(std::uint32_t vehicle, const ImuSample& sample) override {
+    if (recorder_ != nullptr) recorder_->on_imu(vehicle, sample);
+  }
+  void on_obstacle(const ObstacleSample& sample) override {
+    if (recorder_ != nullptr) recorder_->on_obstacle(sample);
+  }
+  void on_collision(const CollisionEvent& event) override {
+    if (recorder_ != nullptr) recorder_->on_collision(event);
+    if (event.entered) {
+      std::fprintf(stderr,
+                   "  collision at %.2f s with %s at (%.2f, %.2f, %.2f)\n",
+                   to_seconds(event.time),
+                   event.partner == kMapLabel ? "the map" : "an obstacle",
+                   event.place_world.x(),
+                   event.place_world.y(),
+                   event.place_world.z());
+    }
+  }
+
+  std::vector<planner::SeenPoint> seen;
+
+ private:
+  FlightRecorder* recorder_;
+};
+
+/// A free place near x, y in the flight layer.
+Vector3d free_place(const SurfelMap& map, double x, double y, const RandomStream& random) {
+  for (std::uint64_t i = 0; i < 2000; ++i) {
+    const double spread = 0.5 + 0.002 * static_cast<double>(i);
+    const auto [u, v] = random.uniform2(i);
+    const Vector3d p(x + spread * (2 * u - 1), y + spread * (2 * v - 1), 2.2);
+    if (!map.nearest(p, 0.9)) return p;
+  }
+  throw InputError("no free place was found for start and goal; give a map with more room");
+}
+
+Scenario scenario_for(const Options& options, const SurfelMap& map, int seed, Vector3d& goal) {
+  const Aabb& box = map.bounds_world();
+  const RandomStream random(static_cast<std::uint64_t>(seed), StreamId::kMissionSearch, 0);
+  const RandomStream places(static_cast<std::uint64_t>(seed), StreamId::kMissionSearch, 1);
+  const auto along = [&](double share) { return box.min.x() + share * box.size().x(); };
+  const auto across = [&](std::uint64_t i) {
+    return box.min.y() + random.uniform(i, 0.2, 0.8) * box.size().y();
+  };
+  Scenario s;
+  s.map = options.map;
+  s.seed = seed;
+  s.duration = 120.0;
+  VehicleSetup& drone = s.vehicles.front();
+  drone.start = free_place(map, along(0.08), across(0), places);
+  goal = free_place(map, along(0.92), across(1), random);
+  // one looks up, one down: a Mid-360 alone is blind for what comes from below
+  LidarMount up;
+  LidarMount down;
+  down.position = {0, 0, -0.1};
+  down.rotation_rpy_deg = {180, 0, 0};
+  drone.lidars = {up, down};
+  ObstacleSettings balls;
+  balls.count = options.obstacles;
+  balls.radius = 0.25;
+  balls.radius_max = 0.5;
+  balls.speed = 0.3;
+  balls.speed_max = 1.0;
+  balls.directions = "horizontal";
+  balls.at_border = "bounce";  // one that appears out of nothing is nobody's fault
+  balls.bounds_min = {box.min.x(), box.min.y(), kLow};
+  balls.bounds_max = {box.max.x(), box.max.y(), kHigh};
+  if (options.obstacles > 0) s.obstacles = {balls};
+  return s;
+}
+
+struct Outcome {
+  bool arrived = false;
+  std::uint64_t collisions = 0;
+  double time = 0.0;
+  double flown = 0.0;
+  double closest = 0.0;
+  double planning_ms = 0.0;  ///< The longest of all updates.
+};
+
+Outcome fly(const Options& options,
+            const std::shared_ptr<const SurfelMap>& map,
+            int seed,
+            const std::string& output,
+            const Executor& executor) {
+  Vector3d goal;
+  const Scenario scenario = scenario_for(options, *map, seed, goal);
+  Simulation simulation(scenario, map, executor);
+  std::unique_ptr<FlightRecorder> recorder;
+  if (!output.empty()) recorder = std::make_unique<FlightRecorder>(output, simulation);
+  Eyes eyes(recorder.get());
+  planner::PlannerOptions planning;
+  planning.height_min = kLow;
+  planning.height_max = kHigh;
+  planner::Planner planner(planning, goal);
+  Outcome outcome;
+  // with every scan, a little after its last beam
+  for (int scan = 1;; ++scan) {
+    const SimTime due{std::chrono::milliseconds(100 * scan + 5)};
+    if (!simulation.advance_to(due, eyes)) break;
+    const auto start = std::chrono::steady_clock::now();
+    const PositionCommand& now = simulation.status(0).autopilot.reference;
+    const auto trajectory = planner.update(eyes.seen, now, to_seconds(simulation.time()));
+    eyes.seen.clear();
+    const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
+    outcome.planning_ms = std::max(outcome.planning_ms, 1e3 * took.count());
+    if (trajectory) simulation.command(0, TrajectoryCommand{trajectory});
+    const RigidBodyState& body = simulation.status(0).state.body;
+    if ((body.p_world - goal).norm() < 0.4) {
+      outcome.arrived = true;
+      simulation.complete();
+      break;
+    }
+  }
+  if (recorder) recorder->finish(simulation);
+  const VehicleSummary& summary = simulation.summary(0);
+  outcome.collisions = summary.collisions;
+  outcome.time = to_seconds(simulation.time());
+  outcome.flown = summary.distance_flown;
+  outcome.closest = summary.closest_approach.value_or(10.0);
+  return outcome;
+}
+
+Options parse(int argc, char** argv) {
+  Options options;
+  for (int i = 1; i < argc; ++i) {
+    const std::string flag = argv[i];
+    const auto value = [&]() -> std::string {
+      if (i + 1 >= argc) throw InputError(flag + ": a value is missing");
+      return argv[++i];
+    };
+    const auto number = [&] {
+      const std::string text = value();
+      char* end = nullptr;
+      const long parsed = std::strtol(text.c_str(), &end, 10);
+      if (end == text.c_str() || *end != '\0' || parsed < 0 || parsed > 100000) {
+        throw InputError(flag + ": '" + text + "'; a whole number, not negative");
+      }
+      return static_cast<int>(parsed);
+    };
+    if (flag == "-o") {
+      options.output = value();
+    } else if (flag == "--seed") {
+      options.seed = number();
+    } else if (flag == "--seeds") {
+      options.seeds = number();
+    } else if (flag == "--obstacles") {
+      options.obstacles = number();
+    } else if (flag == "--threads") {
+      options.threads = number();
+    } else if (options.map.empty() && flag.front() != '-') {
+      options.map = flag;
+    } else {
+      throw InputError(flag + ": unknown; see the top of fly_with_planner.cpp");
+    }
+  }
+  if (options.map.empty()) {
+    throw InputError(
+        "usage: fly_with_planner MAP.pfmap -o RUN [--seed N] [--seeds N] [--obstacles N]");
+  }
+  return options;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) try {
+  const Options options = parse(argc, argv);
+  const Executor executor(options.threads);
+  const auto map = SurfelMap::open(options.map);
+  int failed = 0;
+  const int first = options.seeds > 0 ? 1 : options.seed;
+  const int last = options.seeds > 0 ? options.seeds : options.seed;
+  for (int seed = first; seed <= last; ++seed) {
+    // of many seeds only those that fail are worth their files: replay them
+    const std::string output = options.seeds > 0 ? std::string() : options.output;
+    const Outcome o = fly(options, map, seed, output, executor);
+    const bool fine = o.arrived && o.collisions == 0;
+    std::printf(
+        "seed %d: %s, %.1f m in %.1f s, closest %.2f m, %llu collision%s, a plan in %.0f ms at "
+        "most\n",
+        seed,
+        o.arrived ? "arrived" : "did not arrive",
+        o.flown,
+        o.time,
+        o.closest,
+        static_cast<unsigned long long>(o.collisions),
+        o.collisions == 1 ? "" : "s",
+        o.planning_ms);
+    std::fflush(stdout);
+    if (fine) continue;
+    ++failed;
+    std::printf("  replay: %s %s -o replay_%d --seed %d --obstacles %d\n",
+                argv[0],
+                options.map.c_str(),
+                seed,
+                seed,
+                options.obstacles);
+  }
+  return failed == 0 ? 0 : 1;
+} catch (const std::exception& error) {
+  std::fprintf(stderr, "fly_with_planner: %s\n", error.what());
+  return 2;
+}
