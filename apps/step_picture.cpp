@@ -58,7 +58,7 @@ void draw_step_responses(const VehicleSettings& vehicle,
                          const std::vector<StepResponse>& responses,
                          const std::string& path) {
   const std::size_t rows = (responses.size() + 1) / 2;
-  Canvas canvas(static_cast<int>(2 * (kLeft + kWidth) + 30.0),
+  Canvas canvas(static_cast<int>(2 * (kLeft + kWidth) + 90.0),
                 static_cast<int>(kTop + 20.0 + static_cast<double>(rows) * (kHeight + kGap)),
                 kPaper);
   canvas.text(kLeft, 30.0, vehicle.title, 17.0, kInk);

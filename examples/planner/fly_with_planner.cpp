@@ -81,7 +81,7 @@ Vector3d free_place(const SurfelMap& map, double x, double y, const RandomStream
     const double spread = 0.5 + 0.002 * static_cast<double>(i);
     const auto [u, v] = random.uniform2(i);
     const Vector3d p(x + spread * (2 * u - 1), y + spread * (2 * v - 1), 2.2);
-    if (!map.nearest(p, 0.9)) return p;
+    if (!map.nearest(p, 1.2)) return p;
   }
   throw InputError("no free place was found for start and goal; give a map with more room");
 }

@@ -35,7 +35,9 @@ double Planner::room_at(const Vector3d& p, double time, double ahead) const {
 
 double Planner::room(const Trajectory& trajectory, double time, double skip) const {
   double least = std::numeric_limits<double>::infinity();
-  for (double t = skip; t < trajectory.duration() + 0.5; t += 0.1) {
+  // and while it then rests
+  const double end = std::max(trajectory.duration(), skip) + 2.0;
+  for (double t = skip; t < end; t += 0.1) {
     least = std::min(least, room_at(trajectory.at(t).p_world, time, t - skip));
   }
   return least;
@@ -71,13 +73,17 @@ std::vector<Vector3d> Planner::search(const Vector3d& from, double time) const {
       best = node.cell;
       break;
     }
-    // the goal is far: the place at the edge of the horizon that promises most
+    // should there be no way out: the place that promises most
     const double score = left(p) + 0.3 * so_far;
     if (score < best_score) {
       best_score = score;
       best = node.cell;
     }
-    if (away > kHorizon + 1.0) break;
+    // nothing within the horizon leads to the goal sooner than what leaves it here
+    if (away > kHorizon + 1.0) {
+      best = node.cell;
+      break;
+    }
     for (int dz = -1; dz <= 1; ++dz) {
       for (int dy = -1; dy <= 1; ++dy) {
         for (int dx = -1; dx <= 1; ++dx) {
