@@ -44,6 +44,11 @@ Quaterniond interpolate(const Quaterniond& a, const Quaterniond& b, double share
   return q;
 }
 
+Pose interpolate(const Pose& a, const Pose& b, double share) {
+  return {interpolate(a.rotation, b.rotation, share),
+          (1.0 - share) * a.translation + share * b.translation};
+}
+
 double wrap_angle(double angle) {
   return angle - 2.0 * kPi * std::ceil(angle / (2.0 * kPi) - 0.5);
 }

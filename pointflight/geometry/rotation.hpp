@@ -23,6 +23,9 @@ double yaw_of(const Quaterniond& q_world_body);
 /// whose error against slerp is below 1e-9 rad for the few milliradians between physics steps.
 Quaterniond interpolate(const Quaterniond& a, const Quaterniond& b, double share);
 
+/// Between two poses: linear in position, along the shorter arc in rotation.
+Pose interpolate(const Pose& a, const Pose& b, double share);
+
 /// `angle` moved by whole turns into (-pi, pi].
 double wrap_angle(double angle);
 

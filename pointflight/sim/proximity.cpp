@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "pointflight/geometry/rotation.hpp"
+
 namespace pointflight {
 namespace {
 
@@ -43,7 +45,7 @@ class Sensing {
     state_.map_distance = distance;
     if (query_.ignores_map || !may_touch) return;
     const auto contact_at = [&](double share) {
-      const Pose pose = between(before_, query_.T_world_body, share);
+      const Pose pose = interpolate(before_, query_.T_world_body, share);
       return contact_with_map(map, *query_.hull, pose, own_moved_);
     };
     meet(kMapLabel, now, contact_at, own_moved_);
@@ -60,10 +62,10 @@ class Sensing {
     if (now->distance > moved) return;
     const auto contact_at = [&](double share) {
       return contact_with_body(*body.shape,
-                               between(body.before, body.now, share),
+                               interpolate(body.before, body.now, share),
                                body.label,
                                *query_.hull,
-                               between(before_, query_.T_world_body, share),
+                               interpolate(before_, query_.T_world_body, share),
                                moved);
     };
     meet(body.label, now, contact_at, moved);
@@ -113,7 +115,7 @@ class Sensing {
     touching_.push_back(label);
     const Duration late = from_seconds((1.0 - meeting->share) * to_seconds(query_.step));
     CollisionEvent event = event_of(label, state_.started ? query_.now - late : query_.now);
-    event.vehicle_world = between(before_, query_.T_world_body, meeting->share).translation;
+    event.vehicle_world = interpolate(before_, query_.T_world_body, meeting->share).translation;
     event.place_world = meeting->contact.place_world;
     event.penetration = inside ? -now->distance : 0.0;
     events_.push_back(event);

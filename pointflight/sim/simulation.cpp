@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cassert>
 #include <cctype>
 #include <cmath>
 #include <map>
@@ -183,6 +184,7 @@ void Simulation::check_start() {
 }
 
 std::optional<std::string> Simulation::command(std::size_t vehicle_number, const Command& command) {
+  assert(vehicle_number < vehicle_count());
   VehicleStatus& status = state_.vehicles[vehicle_number];
   auto reason = vehicle(vehicle_number)
                     .autopilot()
@@ -192,6 +194,7 @@ std::optional<std::string> Simulation::command(std::size_t vehicle_number, const
 }
 
 void Simulation::follow(std::size_t vehicle, std::shared_ptr<StateSource> source) {
+  assert(vehicle < vehicle_count());
   sources_[vehicle] = std::move(source);
 }
 

@@ -27,8 +27,7 @@ Pose StateHistory::at(SimTime time) const {
   const Record& a = *(after - 1);
   const Record& b = *after;
   const double share = to_seconds(time - a.time) / to_seconds(b.time - a.time);
-  return {interpolate(a.pose.rotation, b.pose.rotation, share),
-          (1.0 - share) * a.pose.translation + share * b.pose.translation};
+  return interpolate(a.pose, b.pose, share);
 }
 
 double StateHistory::speed_max(SimTime from, SimTime until) const {

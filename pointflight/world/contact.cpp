@@ -1,9 +1,6 @@
 #include "pointflight/world/contact.hpp"
 
-#include <cmath>
-
 #include "pointflight/core/constants.hpp"
-#include "pointflight/geometry/rotation.hpp"
 #include "pointflight/map/near_surfels.hpp"
 
 namespace pointflight {
@@ -74,11 +71,6 @@ double motion_bound(const Pose& from, const Pose& to, double radius) {
   // an angle is at most pi times the sine of its half, up to half a turn
   const double turn = kPi * (from.rotation.conjugate() * to.rotation).vec().norm();
   return (to.translation - from.translation).norm() + turn * radius;
-}
-
-Pose between(const Pose& from, const Pose& to, double share) {
-  return {interpolate(from.rotation, to.rotation, share),
-          (1.0 - share) * from.translation + share * to.translation};
 }
 
 }  // namespace pointflight

@@ -50,7 +50,4 @@ std::optional<double> first_contact(const DistanceAt& distance_at, double moved)
 /// (along a straight line and a shortest turn).
 double motion_bound(const Pose& from, const Pose& to, double radius);
 
-/// Pose at a share of the way between two: linear in position, along the shorter arc in rotation.
-Pose between(const Pose& from, const Pose& to, double share);
-
 }  // namespace pointflight

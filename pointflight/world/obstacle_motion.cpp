@@ -130,8 +130,7 @@ Pose Keyframes::at(SimTime time) const {
   const Frame& a = *(after - 1);
   const Frame& b = *after;
   const double share = to_seconds(time - a.time) / to_seconds(b.time - a.time);
-  return {interpolate(a.pose.rotation, b.pose.rotation, share),
-          (1.0 - share) * a.pose.translation + share * b.pose.translation};
+  return interpolate(a.pose, b.pose, share);
 }
 
 }  // namespace pointflight

@@ -134,6 +134,59 @@ TEST_F(Program, EndsOneForAMissionCutShortAndForACollisionUnderStop) {
   EXPECT_EQ(summary["end"], "collision");
 }
 
+TEST_F(Program, FliesASwarmAmongObstaclesAndDrawsItAgain) {
+  const TemporaryFolder folder;
+  write_file(folder / "s.yaml",
+             fmt::format("map: {}\nduration: 0.5\nvehicles:\n  - {{name: a, start: [12, 10, 4], "
+                         "copies: 2}}\n  - {{name: big, model: octo_1045, start: [12, 5, 5], "
+                         "lidars: []}}\nobstacles:\n  - {{count: 3, radius: 0.2}}\noutput: "
+                         "{{odometry: true}}\n",
+                         map()));
+  const Result fly = run(fmt::format("fly {} -o {}", folder / "s.yaml", folder / "run"));
+  EXPECT_EQ(fly.code, 0) << fly.err;
+  expect_contains(fly.out, "a1");
+  for (const char* name : {"a0/trajectory.csv",
+                           "a1/scans/0_000001.pcd",
+                           "a1/odometry.csv",
+                           "big/imu.csv",
+                           "obstacles.csv",
+                           "events.csv",
+                           "overview.png"}) {
+    EXPECT_FALSE(read_file(folder / (std::string("run/") + name)).empty()) << name;
+  }
+  const auto summary = nlohmann::json::parse(read_file(folder / "run/summary.json"));
+  EXPECT_EQ(summary["vehicles"].size(), 3u);
+  EXPECT_EQ(summary["vehicles"][2]["name"], "big");
+  EXPECT_EQ(summary["obstacles"], 3);
+  std::filesystem::remove(folder / "run/overview.png");
+  const Result again = run(fmt::format("picture {} --map {}", folder / "run", map()));
+  EXPECT_EQ(again.code, 0) << again.err;
+  EXPECT_FALSE(read_file(folder / "run/overview.png").empty());
+  expect_user_error(run(fmt::format("picture {} --map {}", folder.path(), map())), "summary.json");
+  write_file(
+      folder / "t.yaml",
+      fmt::format("map: {}\nvehicles:\n  - start: [12, 10, 4]\n  - start: [12, 10.2, 4]\n", map()));
+  expect_user_error(run(fmt::format("fly {} -o {}", folder / "t.yaml", folder / "no")),
+                    "t.yaml:4: vehicles[1].start: drone1 starts");
+  EXPECT_FALSE(std::filesystem::exists(folder / "no"));
+}
+
+TEST_F(Program, ShowsVehicles) {
+  const TemporaryFolder folder;
+  const Result list = run("vehicle list");
+  EXPECT_EQ(list.code, 0);
+  for (const char* name : {"quad_250", "quad_330", "quad_450", "hexa_550", "octo_1045"}) {
+    expect_contains(list.out, name);
+  }
+  const Result show = run(fmt::format("vehicle show hexa_550 --png {}", folder / "v.png"));
+  EXPECT_EQ(show.code, 0) << show.err;
+  expect_contains(show.out, "thrust to weight: 3.07");
+  expect_contains(show.out, "position x");
+  EXPECT_FALSE(read_file(folder / "v.png").empty());
+  expect_user_error(run("vehicle show quad_333"), "did you mean 'quad_330'");
+  expect_user_error(run("vehicle show quad_330 --controller lqr"), "one of: cascade, geometric");
+}
+
 TEST_F(Program, AFullDiskWhileFlyingIsSaid) {
   const TemporaryFolder folder;
   write_file(folder / "s.yaml",

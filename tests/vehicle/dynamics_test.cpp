@@ -156,7 +156,8 @@ TEST(Multirotor, DragTakesEnergyAway) {
 }
 
 TEST(Mixer, SpeedsAndWrenchAreInverse) {
-  for (const char* name : {"lee2010", "marsim_quad", "quad_330"}) {
+  for (const char* name :
+       {"lee2010", "marsim_quad", "quad_250", "quad_330", "quad_450", "hexa_550", "octo_1045"}) {
     SCOPED_TRACE(name);
     const VehicleSettings settings = load_vehicle(name);
     const Mixer mixer(settings);

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include "pointflight/world/clearance.hpp"
+#include "pointflight/world/contact.hpp"
 #include "pointflight/world/free_space.hpp"
 #include "tests/support.hpp"
 
@@ -9,18 +10,21 @@ namespace {
 
 using testing::map_of;
 
-TEST(Clearance, OfASphereBeforeAWallIsTheGap) {
+TEST(Contact, OfABallBeforeAWallIsTheGap) {
   ShapeScene scene;
   scene.add_rectangle({5, -3, -3}, {0, 6, 0}, {0, 0, 6});
   const auto map = map_of(scene, 0.05);
   for (const double gap : {0.05, 0.5, 2.0}) {
-    const auto c = clearance(*map, {5.0 - 0.3 - gap, 0.1, 0.2}, 0.3, 10.0);
+    const auto c = contact_with_map(
+        *map, Ball{0.3}, {Quaterniond::Identity(), {5.0 - 0.3 - gap, 0.1, 0.2}}, 10.0);
     ASSERT_TRUE(c);
     EXPECT_NEAR(c->distance, gap, 0.005);
     EXPECT_NEAR(c->place_world.x(), 5.0, 0.01);
   }
-  EXPECT_LT(clearance(*map, {4.8, 0, 0}, 0.3, 10.0)->distance, -0.09);
-  EXPECT_FALSE(clearance(*map, {-20, 0, 0}, 0.3, 10.0));
+  EXPECT_LT(
+      contact_with_map(*map, Ball{0.3}, {Quaterniond::Identity(), {4.8, 0, 0}}, 10.0)->distance,
+      -0.09);
+  EXPECT_FALSE(contact_with_map(*map, Ball{0.3}, {Quaterniond::Identity(), {-20, 0, 0}}, 10.0));
 }
 
 TEST(Clearance, AlongALineFindsAThinPole) {
