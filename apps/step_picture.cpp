@@ -67,10 +67,11 @@ void draw_step_responses(const VehicleSettings& vehicle,
   canvas.line({{kLeft + 150, 48.0}, {kLeft + 174, 48.0}}, 1.5, kDesign);
   canvas.text(kLeft + 180, 52.0, "the loop's design by itself, without rotor lag", 12.0, kInk);
   for (std::size_t i = 0; i < responses.size(); ++i) {
+    const std::size_t row = i / 2;
     draw_panel(canvas,
                responses[i],
                kLeft + static_cast<double>(i % 2) * (kWidth + kLeft),
-               kTop + 20.0 + static_cast<double>(i / 2) * (kHeight + kGap));
+               kTop + 20.0 + static_cast<double>(row) * (kHeight + kGap));
   }
   canvas.save(path);
 }

@@ -77,7 +77,7 @@ std::vector<Cone> cones_of(const RayBatch& batch) {
 
 /// Directions of a chunk's rays as arrays, in whole groups of eight.
 struct Directions {
-  std::array<float, kChunk> x, y, z;
+  std::array<float, kChunk> x{}, y{}, z{};
   std::size_t count = 0;
 
   explicit Directions(std::span<const Ray> rays) : count(rays.size()) {
@@ -93,7 +93,7 @@ struct Directions {
   /// Appends `first` + the numbers of the rays within a cone.
   void within(const Cone& cone, std::size_t first, std::vector<std::uint32_t>& found) const {
     for (std::size_t g = 0; g < count; g += kLanes) {
-      std::array<float, kLanes> cosine;
+      std::array<float, kLanes> cosine{};
       float most = -2.0f;
       for (std::size_t k = 0; k < kLanes; ++k) {
         cosine[k] = cone.axis.x() * x[g + k] + cone.axis.y() * y[g + k] + cone.axis.z() * z[g + k];
