@@ -12,8 +12,8 @@ namespace pointflight {
 /// What a surfel is in distances: its oriented box with half sides sqrt(3) s_k.
 struct SurfelBox {
   Pose T_world_box;
-  Vector3d half;       ///< m
-  std::uint32_t word;  ///< Index of the surfel in `SurfelMap::words()`.
+  Vector3d half;           ///< m
+  std::uint32_t word = 0;  ///< Index of the surfel in `SurfelMap::words()`.
 };
 
 /// The box of the surfel at a word index, in a leaf whose header is `leaf`.
@@ -45,7 +45,7 @@ void visit_near(const SurfelMap& map,
     std::uint8_t meta;
   };
   // 7 siblings a level; a corrupt map stops being followed here, or at the limit of steps
-  std::array<Entry, 512> stack;
+  std::array<Entry, 512> stack;  // NOLINT(cppcoreguidelines-pro-type-member-init): written first
   std::size_t depth = 0;
   std::size_t steps = map.nodes().size() * 9 + 16;
   if (!map.nodes().empty()) stack[depth++] = {0.0, 0, Bvh8Node::kInner};
