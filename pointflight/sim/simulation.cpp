@@ -266,16 +266,7 @@ void Simulation::sense(std::vector<StepSamples>& samples) {
             summary.closest_place_world = nearest->place_world;
             summary.closest_label = nearest->label;
           }
-          // a wreck lies still on what is below it
-          if (status.crashed && nearest && nearest->label == kMapLabel &&
-              nearest->distance <= 0.0) {
-            const Vector3d up = query.T_world_body.translation - nearest->place_world;
-            status.at_rest = status.at_rest || up.z() > 0.5 * up.norm();
-            if (status.at_rest) {
-              status.state.body.v_world.setZero();
-              status.state.body.omega_body.setZero();
-            }
-          }
+          if (status.crashed) samples[i].collisions.clear();  // it is a wreck already
         }
       });
 }

@@ -172,14 +172,7 @@ void VehicleAgent::control(VehicleStatus& status,
                            std::uint64_t step_number) const {
   const RigidBodyState& body = status.state.body;
   const double dt = to_seconds(step);
-  // touchdown: something below, near, and it is meant to land
-  const auto& nearest = status.proximity.nearest;
-  if (!status.landed && status.autopilot.armed && nearest && nearest->label == kMapLabel &&
-      nearest->distance < kTouchdown &&
-      std::holds_alternative<LandCommand>(status.autopilot.command) &&
-      body.v_world.norm() < kTouchdownSpeed) {
-    status.landed = true;
-  }
+  if (!status.landed && touches_down(status)) status.landed = true;
   while (status.next_command < commands_.size() && commands_[status.next_command].time <= now) {
     autopilot_.give(status.autopilot, commands_[status.next_command++].command, now, body);
     status.scripted = true;
@@ -214,11 +207,27 @@ void VehicleAgent::control(VehicleStatus& status,
   }
 }
 
+/// True where something below is as good as touched by a vehicle that is meant to land, or that has
+/// its rotors off.
+bool VehicleAgent::touches_down(const VehicleStatus& status) const {
+  const auto& nearest = status.proximity.nearest;
+  const RigidBodyState& body = status.state.body;
+  const bool gently = body.v_world.norm() < kTouchdownSpeed;  // else it hits: a collision
+  if (!nearest || nearest->label != kMapLabel || nearest->distance > (gently ? kTouchdown : 0.0)) {
+    return false;
+  }
+  const double below = body.p_world.z() - nearest->place_world.z();
+  if (below < 0.5 * half_extent(hull_).z() || body.v_world.z() > 0.0) return false;
+  return !status.autopilot.armed ||
+         (gently && std::holds_alternative<LandCommand>(status.autopilot.command));
+}
+
 VehicleState VehicleAgent::state_after(const VehicleStatus& status, double dt) const {
   VehicleState state = status.state;
-  if (status.at_rest || dt <= 0.0) return state;
+  if (dt <= 0.0) return state;
   dynamics_.step(state, status.rotor_commands, dt, status.conditions);
-  if (status.landed && state.body.v_world.z() <= 0.0) {
+  // rotors that run down carry nothing off
+  if (status.landed && (state.body.v_world.z() <= 0.0 || !status.autopilot.armed)) {
     state.body = status.state.body;  // the ground holds it
     state.body.v_world.setZero();
     state.body.omega_body.setZero();
@@ -244,7 +253,7 @@ ImuSample VehicleAgent::imu_sample(VehicleStatus& status,
                                    SimTime time,
                                    const VehicleState& state) const {
   BodyAcceleration acceleration;
-  if (!status.landed && !status.at_rest) {
+  if (!status.landed) {
     acceleration = dynamics_.acceleration(state, status.conditions);
   }
   ImuSample sample =

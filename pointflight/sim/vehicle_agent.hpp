@@ -135,6 +135,7 @@ class VehicleAgent {
     Command command;
   };
   void read_commands(const Scenario& scenario);
+  [[nodiscard]] bool touches_down(const VehicleStatus& status) const;
   [[nodiscard]] double ground_below(const VehicleStatus& status) const;
   [[nodiscard]] ImuSample imu_sample(VehicleStatus& status,
                                      SimTime time,

@@ -309,7 +309,7 @@ TEST(Collisions, CrashTurnsTheRotorsOffAndTheWreckLiesOnTheGround) {
   ByteSink sink;
   const Simulation simulation = run(scenario, sink, executor);
   EXPECT_TRUE(simulation.status(0).crashed);
-  EXPECT_TRUE(simulation.status(0).at_rest);
+  EXPECT_TRUE(simulation.status(0).landed);
   EXPECT_LT(simulation.status(0).state.rotors[0].speed, 1.0);
   EXPECT_NEAR(simulation.status(0).state.body.p_world.z(), 0.26, 0.1);
   EXPECT_EQ(simulation.summary(0).collisions, 1u);
@@ -481,6 +481,37 @@ TEST(Commands, OfAScenarioTakeOffFlyAndLand) {
   EXPECT_NEAR(status.state.body.p_world.z(), 0.27, 0.03);
   EXPECT_EQ(status.autopilot.timeouts, 0u);
   EXPECT_EQ(simulation.end(), RunEnd::kCompleted);
+}
+
+TEST(Commands, ALargeVehicleStaysOnTheGroundThatItHasLandedOn) {
+  // its rotors run down slowly and lift more near the ground
+  Scenario scenario = hovering();
+  VehicleSetup& v = scenario.vehicles[0];
+  v.model = "octo_1045";
+  v.start = {10, 6, 1.5};
+  v.commands.resize(1);
+  v.commands[0].kind = "land";
+  scenario.air.wind.turbulence = "light";
+  scenario.duration = 8.0;
+  ByteSink sink;
+  const Simulation simulation = run(scenario, sink, Executor(1));
+  EXPECT_TRUE(simulation.status(0).landed);
+  EXPECT_TRUE(sink.events.empty());
+  EXPECT_NEAR(simulation.status(0).state.body.p_world.z(), 0.2, 0.12);  // one corner first
+  EXPECT_EQ(simulation.status(0).state.body.v_world, Vector3d::Zero());
+  EXPECT_LT(simulation.status(0).state.rotors[0].speed, 1.0);
+}
+
+TEST(Commands, DisarmedInTheAirItFallsAndLiesWhereItFell) {
+  Scenario scenario = hovering();
+  scenario.vehicles[0].commands.resize(1);
+  scenario.vehicles[0].commands[0].kind = "disarm";
+  ByteSink sink;
+  const Simulation simulation = run(scenario, sink, Executor(1));
+  EXPECT_TRUE(simulation.status(0).landed);
+  EXPECT_NEAR(simulation.status(0).state.body.p_world.z(), 0.26, 0.05);
+  ASSERT_FALSE(sink.events.empty());  // it fell 3 m: that is a collision
+  EXPECT_EQ(sink.events[0].partner, kMapLabel);
 }
 
 TEST(Faults, DoWhatTheySay) {
