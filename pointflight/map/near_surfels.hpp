@@ -31,14 +31,11 @@ inline SurfelBox surfel_box(const SurfelMap& map, const LeafHeader& leaf, std::u
   return box;
 }
 
-/// Calls `visit(box)` for each surfel whose leaf comes within `reach` of a point, near leaves
-/// first. `visit` returns the reach from then on (never a larger one). For hulls that are not
-/// balls; the nearest surfel to a point is `SurfelMap::nearest`, which is faster.
+/// Calls `visit(box)` for each surfel whose leaf comes within `reach` of a box in the world, near
+/// leaves first. `visit` returns the reach from then on (never a larger one). For hulls that are
+/// not balls; the nearest surfel to a point is `SurfelMap::nearest`, which is faster.
 template <class Visit>
-void visit_near(const SurfelMap& map,
-                const Vector3d& point_world,
-                double reach,
-                const Visit& visit) {
+void visit_near(const SurfelMap& map, const Aabb& box_world, double reach, const Visit& visit) {
   struct Entry {
     double distance;
     std::uint32_t index;
@@ -49,7 +46,8 @@ void visit_near(const SurfelMap& map,
   std::size_t depth = 0;
   std::size_t steps = map.nodes().size() * 9 + 16;
   if (!map.nodes().empty()) stack[depth++] = {0.0, 0, Bvh8Node::kInner};
-  const Vector3d p = point_world - map.origin_world();
+  const Vector3d low = box_world.min - map.origin_world();
+  const Vector3d high = box_world.max - map.origin_world();
   while (depth > 0 && steps-- > 0) {
     const Entry entry = stack[--depth];
     if (entry.distance > reach) continue;
@@ -74,10 +72,12 @@ void visit_near(const SurfelMap& map,
       (meta == Bvh8Node::kInner ? inner : word) += meta == Bvh8Node::kInner ? 1u : meta + 1u;
       double squared = 0.0;
       for (std::size_t axis = 0; axis < 3; ++axis) {
-        const double q = p[static_cast<int>(axis)] - static_cast<double>(node.origin[axis]);
-        const double scale = static_cast<double>(node.scale);
-        const double outside =
-            std::max({0.0, node.lo[axis][lane] * scale - q, q - node.hi[axis][lane] * scale});
+        const auto origin = static_cast<double>(node.origin[axis]);
+        const auto scale = static_cast<double>(node.scale);
+        const int i = static_cast<int>(axis);
+        const double outside = std::max({0.0,
+                                         origin + node.lo[axis][lane] * scale - high[i],
+                                         low[i] - origin - node.hi[axis][lane] * scale});
         squared += outside * outside;
       }
       const double distance = std::sqrt(squared);

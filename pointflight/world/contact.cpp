@@ -11,6 +11,15 @@ double box_radius(const SurfelBox& box) {
   return box.half.norm();
 }
 
+/// The axis-aligned box around a hull at a pose.
+Aabb box_around(const Solid& hull, const Pose& pose) {
+  const Vector3d half = pose.rotation.toRotationMatrix().cwiseAbs() * half_extent(hull);
+  Aabb box;
+  box.add(pose.translation - half);
+  box.add(pose.translation + half);
+  return box;
+}
+
 }  // namespace
 
 std::optional<Contact> contact_with_map(const SurfelMap& map,
@@ -22,8 +31,6 @@ std::optional<Contact> contact_with_map(const SurfelMap& map,
     if (!nearest) return std::nullopt;
     return Contact{nearest->distance - ball->radius, nearest->center_world, kMapLabel};
   }
-  // whatever is within d of the hull is within d + its radius of its centre
-  const double radius = bounding_radius(hull);
   const Pose T_hull_world = T_world_hull.inverse();
   std::optional<Contact> best;
   double least = reach;
@@ -37,10 +44,10 @@ std::optional<Contact> contact_with_map(const SurfelMap& map,
         best = Contact{s.distance, s.place, kMapLabel};
       }
     }
-    // leaves beyond a touching hull can still be deeper in it
-    return radius + std::max(0.0, least);
+    // of what touches, something else can still be deeper
+    return std::max(0.0, least);
   };
-  visit_near(map, T_world_hull.translation, radius + reach, visit);
+  visit_near(map, box_around(hull, T_world_hull), reach, visit);
   return best;
 }
 

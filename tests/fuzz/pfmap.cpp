@@ -12,6 +12,7 @@
 #include "pointflight/geometry/shape_scene.hpp"
 #include "pointflight/map/map_builder.hpp"
 #include "pointflight/render/renderer.hpp"
+#include "pointflight/world/contact.hpp"
 
 namespace {
 
@@ -78,6 +79,9 @@ void ask_everything(const SurfelMap& map, const std::shared_ptr<const SurfelMap>
   make_renderer("beam", Scene{shared})->render(batch, hits, Executor(1));
   std::size_t surfels = 0;
   for (const Ray& ray : rays) surfels += map.nearest(ray.origin_world, 3.0) ? 1 : 0;
+  const Solid box = Cuboid{{0.3, 0.2, 0.1}};
+  const Pose turned{Quaterniond(0.8, 0.1, 0.5, 0.3).normalized(), {0.2, 0.1, 0.3}};
+  surfels += contact_with_map(map, box, turned, 2.0) ? 1 : 0;
   map.for_each_surfel([&](const Vector3d&, const Vector3d&, double, std::uint32_t) { ++surfels; });
 }
 
