@@ -18,12 +18,13 @@ constexpr double kSparse = 4.0;  // points a cell
 constexpr std::size_t kEnoughCells = 7;
 constexpr std::int32_t kWidest = 3;  // cells to each side: 7^3
 
-using BlockKey = std::array<std::int32_t, 3>;
+/// Whole numbers; as doubles, because cells of a hostile file may be thousands of kilometres wide.
+using BlockKey = std::array<double, 3>;
 
 BlockKey block_of(double resolution, const VoxelCell& cell) {
   BlockKey key{};
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    key[axis] = static_cast<std::int32_t>(std::floor(cell.voxel[axis] * resolution / kBlock));
+    key[axis] = std::floor(cell.voxel[axis] * resolution / kBlock);
   }
   return key;
 }
