@@ -4,15 +4,14 @@
 
 #include <algorithm>
 #include <cassert>
-#include <cctype>
 #include <cmath>
 #include <map>
-#include <set>
 #include <tuple>
 
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/core/random.hpp"
+#include "pointflight/sim/start_check.hpp"
 
 namespace pointflight {
 namespace {
@@ -21,23 +20,6 @@ constexpr double kHoverDuration = 10.0;     // s, where nobody has anything to d
 constexpr double kGoalTolerance = 0.5;      // m
 constexpr double kStartRoom = 1.0;          // m that random obstacles keep from starts
 constexpr std::size_t kVehiclesAChunk = 4;  // that one thread steps
-
-/// Names make folders and topics: each its own, and nothing but plain letters.
-void check_names(const Scenario& scenario, const std::vector<VehicleSetup>& fleet) {
-  std::set<std::string> names;
-  for (std::size_t i = 0; i < fleet.size(); ++i) {
-    const std::string& name = fleet[i].name;
-    const bool plain = std::all_of(name.begin(), name.end(), [](unsigned char c) {
-      return std::isalnum(c) != 0 || c == '_' || c == '-';
-    });
-    if (plain && names.insert(name).second) continue;
-    throw InputError(fmt::format("{}: '{}' {}",
-                                 scenario.place(scenario.vehicle_key(i, "name")),
-                                 name,
-                                 plain ? "is the name of two vehicles; give each its own"
-                                       : "names a folder: letters, digits, _ and - only"));
-  }
-}
 
 }  // namespace
 
@@ -111,7 +93,7 @@ Simulation::Simulation(const Scenario& scenario,
   setup->end_time = SimTime(from_seconds(scenario.duration > 0.0 ? scenario.duration : natural));
   sources_.resize(fleet.size());
   setup_ = std::move(setup);
-  check_start();
+  for (std::size_t i = 0; i < vehicle_count(); ++i) check_start(i);
 }
 
 SimTime Simulation::end_time() const {
@@ -134,53 +116,15 @@ std::vector<Body> Simulation::obstacles(SimTime from, SimTime until) const {
   return setup_->obstacles.bodies(from, until);
 }
 
-void Simulation::check_start() {
+void Simulation::check_start(std::size_t number) const {
+  const auto placed = [&](std::size_t i) {
+    return StartingVehicle{&vehicle(i), status(i).state.body.T_world_body()};
+  };
+  std::vector<StartingVehicle> before;
+  for (std::size_t i = 0; i < number; ++i) before.push_back(placed(i));
   const Scenario& scenario = setup_->scenario;
-  for (std::size_t i = 0; i < vehicle_count(); ++i) {
-    const VehicleAgent& agent = vehicle(i);
-    const Pose pose = status(i).state.body.T_world_body();
-    const Vector3d& p = pose.translation;
-    const std::string key = scenario.vehicle_key(i, "start");
-    const auto here = contact_with_map(*setup_->map, agent.hull(), pose, 0.0);
-    if (here && here->distance < 0.0) {
-      throw InputError(
-          fmt::format("{}: {}: ({:.2f}, {:.2f}, {:.2f}) of {} is {:.2f} m inside the map for a "
-                      "hull that reaches "
-                      "{:.2f} m; move it, or let `pointflight scenario new` find a free place",
-                      scenario.place(key),
-                      key,
-                      p.x(),
-                      p.y(),
-                      p.z(),
-                      agent.setup().name,
-                      -here->distance,
-                      bounding_radius(agent.hull())));
-    }
-    for (std::size_t j = 0; j < i; ++j) {
-      const VehicleAgent& other = vehicle(j);
-      const Pose pose_j = status(j).state.body.T_world_body();
-      const double apart = separation(agent.hull(), pose, other.hull(), pose_j).distance;
-      if (apart > 0.0) continue;
-      throw InputError(fmt::format("{}: {}: {} starts {:.2f} m inside {}; move one of them",
-                                   scenario.place(key),
-                                   key,
-                                   agent.setup().name,
-                                   -apart,
-                                   other.setup().name));
-    }
-    for (const Body& body : obstacles(SimTime{}, SimTime{})) {
-      const auto met = contact_with_body(
-          body.shape, body.T_world_body(SimTime{}), body.label, agent.hull(), pose, 0.0);
-      if (!met || met->distance > 0.0) continue;
-      throw InputError(
-          fmt::format("{}: {}: {} starts {:.2f} m inside obstacle {}; move one of them",
-                      scenario.place(key),
-                      key,
-                      agent.setup().name,
-                      -met->distance,
-                      body.label - kFirstObstacle));
-    }
-  }
+  check_start_is_free(
+      scenario, *setup_->map, placed(number), before, obstacles(SimTime{}, SimTime{}));
 }
 
 std::optional<std::string> Simulation::command(std::size_t vehicle_number, const Command& command) {

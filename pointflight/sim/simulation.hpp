@@ -87,7 +87,7 @@ class Simulation {
  private:
   struct Setup;
 
-  void check_start();
+  void check_start(std::size_t number) const;
   void sense(std::vector<StepSamples>& samples);
   [[nodiscard]] bool react(std::vector<StepSamples>& samples);
   void deliver(std::vector<StepSamples>& samples, SampleSink& sink);

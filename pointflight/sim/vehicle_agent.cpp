@@ -177,6 +177,7 @@ void VehicleAgent::control(VehicleStatus& status,
     autopilot_.give(status.autopilot, commands_[status.next_command++].command, now, body);
     status.scripted = true;
   }
+  if (status.crashed) status.autopilot.armed = false;  // whatever it is told
   // a level that must be repeated is, by the scenario
   if (status.scripted && status.autopilot.command.index() < std::variant_size_v<Setpoint>) {
     status.autopilot.since = now;
@@ -185,7 +186,6 @@ void VehicleAgent::control(VehicleStatus& status,
   for (std::size_t i = 0; i < status.rotor_commands.size() && faults_.any(); ++i) {
     status.rotor_commands[i] *= faults_.rotor_share(i, now);
   }
-  if (status.crashed) std::fill(status.rotor_commands.begin(), status.rotor_commands.end(), 0.0);
 
   const double error = (body.p_world - status.autopilot.reference.p_world).norm();
   status.squared_error_sum += error * error;

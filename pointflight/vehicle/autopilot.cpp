@@ -31,43 +31,51 @@ constexpr std::size_t kRepeated = std::variant_size_v<Setpoint>;  // the first o
 constexpr double kSlow = 0.15;                                    // m/s: below, hover holds a place
 constexpr double kDescent = 1e4;                                  // m: a landing ends before
 
-/// False where a number of the command is not finite.
+constexpr double kLargest =
+    1e9;  // of any number in a command: squares of larger ones overflow soon
+
+/// False where a number of the command is not finite, or of no use.
 struct Finite {
-  static bool all(const Vector3d& v) { return v.allFinite(); }
+  static bool all(const Vector3d& v) {
+    return v.allFinite() && v.cwiseAbs().maxCoeff() <= kLargest;
+  }
+  static bool all(double value) { return std::abs(value) <= kLargest; }
   bool operator()(const RotorSpeedCommand& c) const {
     for (const double speed : c.speeds) {
-      if (!std::isfinite(speed)) return false;
+      if (!all(speed)) return false;
     }
     return true;
   }
-  bool operator()(const BodyRateCommand& c) const {
-    return all(c.omega_body) && std::isfinite(c.thrust);
-  }
+  bool operator()(const BodyRateCommand& c) const { return all(c.omega_body) && all(c.thrust); }
   bool operator()(const AttitudeCommand& c) const {
-    return c.q_world_body.coeffs().allFinite() && c.q_world_body.norm() > 1e-6 &&
-           all(c.omega_body) && std::isfinite(c.thrust);
+    return all(c.q_world_body.vec()) && all(c.q_world_body.w()) && c.q_world_body.norm() > 1e-6 &&
+           all(c.omega_body) && all(c.thrust);
   }
   bool operator()(const AccelerationCommand& c) const {
-    return all(c.a_world) && std::isfinite(c.yaw) && std::isfinite(c.yaw_rate);
+    return all(c.a_world) && all(c.yaw) && all(c.yaw_rate);
   }
   bool operator()(const VelocityCommand& c) const {
-    return all(c.v_world) && std::isfinite(c.yaw) && std::isfinite(c.yaw_rate);
+    return all(c.v_world) && all(c.yaw) && all(c.yaw_rate);
   }
   bool operator()(const PositionCommand& c) const {
-    return all(c.p_world) && all(c.v_world) && all(c.a_world) && all(c.jerk_world) &&
-           std::isfinite(c.yaw) && std::isfinite(c.yaw_rate);
+    return all(c.p_world) && all(c.v_world) && all(c.a_world) && all(c.jerk_world) && all(c.yaw) &&
+           all(c.yaw_rate);
   }
   bool operator()(const TrajectoryCommand& c) const { return c.trajectory != nullptr; }
   bool operator()(const WaypointCommand& c) const {
     for (const Vector3d& p : c.mission.waypoints) {
       if (!all(p)) return false;
     }
-    return true;
+    const MotionLimits& m = c.mission.motion;
+    for (const double limit : {m.speed, m.acceleration, m.jerk, c.mission.yaw_rate_deg}) {
+      if (!all(limit) || limit <= 0.0) return false;
+    }
+    return all(c.mission.hold) && c.mission.hold >= 0.0;
   }
   bool operator()(const TakeOffCommand& c) const {
-    return std::isfinite(c.height) && c.speed > 0.0 && std::isfinite(c.speed);
+    return all(c.height) && c.speed > 0.0 && all(c.speed);
   }
-  bool operator()(const LandCommand& c) const { return c.speed > 0.0 && std::isfinite(c.speed); }
+  bool operator()(const LandCommand& c) const { return c.speed > 0.0 && all(c.speed); }
   template <class Other>
   bool operator()(const Other& /*command*/) const {
     return true;
@@ -127,7 +135,8 @@ AutopilotState Autopilot::start(const RigidBodyState& body, bool landed) const {
 
 std::optional<std::string> Autopilot::objection(const Command& command) const {
   if (!std::visit(Finite{}, command)) {
-    return fmt::format("a {} command that is not finite", name_of(command));
+    return fmt::format("a {} command with a number that is not finite or of no use",
+                       name_of(command));
   }
   if (const auto* rotors = std::get_if<RotorSpeedCommand>(&command)) {
     if (rotors->speeds.size() != settings_.rotors.size()) {

@@ -216,7 +216,12 @@ TEST(Autopilot, RefusesWhatIsNotFiniteOrNotForThisVehicleAndCounts) {
   expect_contains(*flight.give(RotorSpeedCommand{{1, 2, 3}}), "3 rotor speeds");
   expect_contains(*flight.give(BodyRateCommand{}), "takes no body_rates");
   expect_contains(*flight.give(AccelerationCommand{}), "the innermost are velocity");
-  EXPECT_EQ(flight.pilot.rejected, 6u);
+  expect_contains(*flight.give(VelocityCommand{{1e300, 0, 0}, 0.0, 0.0}), "not finite");
+  WaypointCommand still;
+  still.mission.waypoints = {{1, 0, 10}};
+  still.mission.motion.speed = 0.0;
+  expect_contains(*flight.give(still), "waypoints");
+  EXPECT_EQ(flight.pilot.rejected, 8u);
   flight.fly(1.0);
   EXPECT_LT((flight.state.body.p_world - Vector3d(0, 0, 10)).norm(), 1e-6);
   EXPECT_FALSE(flight.give(VelocityCommand{}));

@@ -1,0 +1,342 @@
+// What happens to vehicles in a run: collisions, obstacles, commands, faults, wind.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <map>
+#include <set>
+
+#include "pointflight/core/constants.hpp"
+#include "pointflight/geometry/rotation.hpp"
+#include "tests/sim/runs.hpp"
+
+namespace pointflight {
+namespace {
+
+using testing::ByteSink;
+using testing::error_of;
+using testing::expect_contains;
+using testing::hall;
+using testing::hovering;
+using testing::passing;
+using testing::run;
+using testing::TemporaryFolder;
+using testing::write_file;
+
+TEST(Collisions, SayWhoMetWhomWhenAndWhere) {
+  const Executor executor(1);
+  Scenario scenario = hovering();
+  scenario.obstacles = {passing(2.0)};
+  ByteSink sink;
+  const Simulation simulation = run(scenario, sink, executor);
+  ASSERT_EQ(sink.events.size(), 2u);
+  const CollisionEvent& met = sink.events[0];
+  EXPECT_TRUE(met.entered);
+  EXPECT_EQ(met.partner, kFirstObstacle);
+  // 3 m less both radii at 2 m/s
+  EXPECT_NEAR(to_seconds(met.time), (3.0 - 0.3 - 0.26) / 2.0, 1e-4);
+  EXPECT_NEAR(met.place_world.y(), 6 - 0.26, 1e-3);
+  EXPECT_LT(met.penetration, 2.0 * 0.001 + 1e-6);
+  EXPECT_FALSE(sink.events[1].entered);
+  EXPECT_NEAR(to_seconds(sink.events[1].time), (3.0 + 0.56) / 2.0, 1.5e-3);
+  EXPECT_EQ(simulation.summary(0).collisions, 1u);
+  EXPECT_EQ(simulation.summary(0).closest_label, kFirstObstacle);
+  EXPECT_NEAR(*simulation.summary(0).closest_approach, -0.56, 0.01);
+}
+
+TEST(Collisions, OfTwoVehiclesAreBoths) {
+  const Executor executor(2);
+  Scenario scenario = hovering();
+  scenario.vehicles.push_back(scenario.vehicles[0]);
+  scenario.vehicles[0].name = "a";
+  scenario.vehicles[1].name = "b";
+  scenario.vehicles[1].start = {14, 6, 3};
+  scenario.vehicles[1].mission.waypoints = {{6, 6, 3}};
+  scenario.vehicles[1].mission.yaw = "fixed";
+  scenario.duration = 8.0;
+  ByteSink sink;
+  const Simulation simulation = run(scenario, sink, executor);
+  ASSERT_GE(sink.events.size(), 4u);
+  EXPECT_EQ(sink.events[0].vehicle, 0u);
+  EXPECT_EQ(sink.events[0].partner, kFirstVehicle + 1);
+  EXPECT_EQ(sink.events[1].vehicle, 1u);
+  EXPECT_EQ(sink.events[1].partner, kFirstVehicle);
+  EXPECT_EQ(sink.events[0].time, sink.events[1].time);
+  EXPECT_EQ(simulation.summary(0).collisions, simulation.summary(1).collisions);
+}
+
+TEST(Collisions, CrashTurnsTheRotorsOffAndTheWreckLiesOnTheGround) {
+  const Executor executor(1);
+  Scenario scenario = hovering();
+  scenario.obstacles = {passing(2.0)};
+  scenario.vehicles[0].on_collision = "crash";
+  scenario.vehicles[0].commands.resize(1);  // a wreck does not start again
+  scenario.vehicles[0].commands[0].time = 1.5;
+  scenario.vehicles[0].commands[0].kind = "take_off";
+  scenario.duration = 6.0;
+  ByteSink sink;
+  const Simulation simulation = run(scenario, sink, executor);
+  EXPECT_TRUE(simulation.status(0).crashed);
+  EXPECT_TRUE(simulation.status(0).landed);
+  EXPECT_LT(simulation.status(0).state.rotors[0].speed, 1.0);
+  EXPECT_NEAR(simulation.status(0).state.body.p_world.z(), 0.26, 0.1);
+  EXPECT_EQ(simulation.summary(0).collisions, 1u);
+  EXPECT_EQ(simulation.end(), RunEnd::kMissionUnfinished);
+}
+
+TEST(Collisions, StopEndsTheRunAtOnce) {
+  const Executor executor(1);
+  Scenario scenario = hovering();
+  scenario.obstacles = {passing(2.0)};
+  scenario.vehicles[0].on_collision = "stop";
+  ByteSink sink;
+  const Simulation simulation = run(scenario, sink, executor);
+  EXPECT_EQ(simulation.end(), RunEnd::kCollision);
+  EXPECT_NEAR(to_seconds(simulation.time()), 1.22, 0.002);
+}
+
+TEST(Obstacles, FlyStraightStayInsideAndAreReplaced) {
+  Scenario scenario = hovering();
+  ObstacleSettings balls;
+  balls.count = 30;
+  balls.speed = 4.0;
+  balls.speed_max = 8.0;
+  balls.radius = 0.2;
+  balls.radius_max = 0.5;
+  scenario.obstacles = {balls};
+  const Executor executor(1);
+  const Simulation simulation(scenario, hall(), executor);
+  int replaced = 0;
+  std::map<Label, Vector3d> last;
+  std::map<Label, SimTime> born;
+  for (int ms = 0; ms < 20000; ms += 10) {
+    const SimTime t{std::chrono::milliseconds(ms)};
+    int present = 0;
+    for (const Body& body : simulation.obstacles(t, t)) {
+      if (t < body.from || t >= body.until) continue;
+      ++present;
+      const Vector3d p = body.T_world_body(t).translation;
+      const Aabb& box = hall()->bounds_world();
+      EXPECT_GE((p - box.min).minCoeff(), -1e-6);
+      EXPECT_GE((box.max - p).minCoeff(), -1e-6);
+      const double radius = bounding_radius(body.shape);
+      EXPECT_GE(radius, 0.2);
+      EXPECT_LE(radius, 0.5);
+      EXPECT_GE(body.speed_max, 4.0);
+      EXPECT_LE(body.speed_max, 8.0);
+      if (last.contains(body.label) && born[body.label] == body.from) {
+        EXPECT_NEAR((p - last[body.label]).norm(), 0.01 * body.speed_max, 1e-9);
+      } else if (last.contains(body.label)) {
+        ++replaced;
+        // free of the map where it appears
+        const Vector3d start = body.T_world_body(body.from).translation;
+        EXPECT_FALSE(hall()->nearest(start, radius - 0.01));
+      }
+      last[body.label] = p;
+      born[body.label] = body.from;
+    }
+    ASSERT_EQ(present, 30);
+  }
+  EXPECT_GT(replaced, 30);
+  // a function of seed and time: asked in any order, by anybody
+  const Simulation other(scenario, hall(), executor);
+  const SimTime late{std::chrono::seconds(17)};
+  const auto a = simulation.obstacles(late, late);
+  const auto b = other.obstacles(late, late);
+  ASSERT_EQ(a.size(), b.size());
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    EXPECT_EQ(a[i].T_world_body(late).translation, b[i].T_world_body(late).translation);
+  }
+}
+
+TEST(Obstacles, BounceWhereTheyAreToldTo) {
+  Scenario scenario = hovering();
+  ObstacleSettings ball;
+  ball.at_border = "bounce";
+  ball.directions = "horizontal";
+  ball.speed = 5.0;
+  ball.bounds_min = {5, 3, 4};
+  ball.bounds_max = {9, 9, 5};
+  scenario.obstacles = {ball};
+  const Simulation simulation(scenario, hall(), Executor(1));
+  const auto bodies = simulation.obstacles(SimTime{}, SimTime(std::chrono::seconds(60)));
+  ASSERT_EQ(bodies.size(), 1u);
+  Vector3d last = bodies[0].T_world_body(SimTime{}).translation;
+  for (int ms = 5; ms < 60000; ms += 5) {
+    const Vector3d p = bodies[0].T_world_body(SimTime(std::chrono::milliseconds(ms))).translation;
+    EXPECT_LE((p - last).norm(), 0.025 + 1e-9);
+    EXPECT_EQ(p.z(), last.z());
+    EXPECT_GE((p - ball.bounds_min).minCoeff(), 0.0);
+    EXPECT_GE((ball.bounds_max - p).minCoeff(), 0.0);
+    last = p;
+  }
+}
+
+TEST(Obstacles, KeyframesAndLoopsAreWhereTheirFilesSay) {
+  const auto keyframes = Keyframes::parse(
+      "time,yaw_deg,x,y,z\n# a door\n0,0,1,1,0\n2,90,1,1,0\n4,0,1,1,0\n", "door.csv", true);
+  EXPECT_NEAR(yaw_of(keyframes->at(SimTime(std::chrono::seconds(1))).rotation), kPi / 4, 1e-9);
+  EXPECT_NEAR(yaw_of(keyframes->at(SimTime(std::chrono::seconds(6))).rotation), kPi / 2, 1e-9);
+  EXPECT_EQ(keyframes->speed_max(), 0.0);
+  const auto error = [](const char* text, bool repeat) {
+    return error_of([&] { Keyframes::parse(text, "k.csv", repeat); });
+  };
+  expect_contains(error("time,x,y,z\n1,0,0,0\n0.5,1,0,0\n", false),
+                  "k.csv:3: time 0.5 s does not come after 1 s");
+  expect_contains(error("time,x,y,z\n0,0,0,0\n1,5,0,0\n", true), "k.csv:3: repeats");
+  expect_contains(error("time,x,y,z\n0,0,nan,0\n", false), "k.csv:2: ");
+  expect_contains(error("time,x,y\n0,0,0\n", false), "'z");
+  const WaypointLoop loop({{0, 0, 1}, {4, 0, 1}, {4, 3, 1}}, 2.0);
+  EXPECT_TRUE(loop.at(SimTime(std::chrono::seconds(1))).translation.isApprox(Vector3d(2, 0, 1)));
+  EXPECT_TRUE(loop.at(SimTime(std::chrono::seconds(3))).translation.isApprox(Vector3d(4, 2, 1)));
+  // 12 m round at 2 m/s
+  EXPECT_TRUE(loop.at(SimTime(std::chrono::seconds(7))).translation.isApprox(Vector3d(2, 0, 1)));
+  EXPECT_NEAR(yaw_of(loop.at(SimTime(std::chrono::seconds(3))).rotation), kPi / 2, 1e-9);
+}
+
+TEST(Obstacles, OfACloudAreSeenAndMet) {
+  const TemporaryFolder folder;
+  std::string xyz;
+  for (int i = 0; i < 40; ++i) {
+    for (int j = 0; j < 60; ++j) {  // a person-sized cylinder
+      const double a = 2 * kPi * i / 40;
+      xyz += std::to_string(0.25 * std::cos(a)) + " " + std::to_string(0.25 * std::sin(a)) + " " +
+             std::to_string(1.7 * j / 59) + "\n";
+    }
+  }
+  write_file(folder / "person.xyz", xyz);
+  Scenario scenario = hovering();
+  scenario.vehicles[0].start = {10, 6, 1};
+  scenario.vehicles[0].lidars = {LidarMount{}};
+  ObstacleSettings person = passing(1.0);
+  person.shape = "cloud";
+  person.file = folder / "person.xyz";
+  person.resolution = 0.05;
+  person.waypoints = {{10, 4, 0}, {10, 7, 0}};
+  scenario.obstacles = {person};
+  ByteSink sink;
+  run(scenario, sink, Executor(1));
+  EXPECT_GT(sink.labels[kFirstObstacle], 500);
+  ASSERT_FALSE(sink.events.empty());
+  EXPECT_EQ(sink.events[0].partner, kFirstObstacle);
+  EXPECT_NEAR(to_seconds(sink.events[0].time), 2.0 - 0.25 - 0.26, 0.04);
+}
+
+TEST(Commands, OfAScenarioTakeOffFlyAndLand) {
+  Scenario scenario = hovering();
+  VehicleSetup& v = scenario.vehicles[0];
+  v.start = {10, 6, 0.27};
+  v.landed = true;
+  v.commands.resize(4);
+  v.commands[0].time = 0.5;
+  v.commands[0].kind = "take_off";
+  v.commands[0].height = 2.0;
+  v.commands[1].time = 5.0;
+  v.commands[1].kind = "velocity";
+  v.commands[1].vector = {1, 0, 0};
+  v.commands[2].time = 8.0;
+  v.commands[2].kind = "hover";
+  v.commands[3].time = 11.0;
+  v.commands[3].kind = "land";
+  scenario.duration = 20.0;
+  ByteSink sink;
+  const Simulation simulation = run(scenario, sink, Executor(1));
+  const VehicleStatus& status = simulation.status(0);
+  EXPECT_TRUE(status.landed);
+  EXPECT_FALSE(status.autopilot.armed);
+  EXPECT_TRUE(sink.events.empty());  // standing on the ground is no collision
+  EXPECT_NEAR(status.state.body.p_world.x(), 13.2, 0.6);
+  EXPECT_NEAR(status.state.body.p_world.z(), 0.27, 0.03);
+  EXPECT_EQ(status.autopilot.timeouts, 0u);
+  EXPECT_EQ(simulation.end(), RunEnd::kCompleted);
+}
+
+TEST(Commands, ALargeVehicleStaysOnTheGroundThatItHasLandedOn) {
+  // its rotors run down slowly and lift more near the ground
+  Scenario scenario = hovering();
+  VehicleSetup& v = scenario.vehicles[0];
+  v.model = "octo_1045";
+  v.start = {10, 6, 1.5};
+  v.commands.resize(1);
+  v.commands[0].kind = "land";
+  scenario.air.wind.turbulence = "light";
+  scenario.duration = 8.0;
+  ByteSink sink;
+  const Simulation simulation = run(scenario, sink, Executor(1));
+  EXPECT_TRUE(simulation.status(0).landed);
+  EXPECT_TRUE(sink.events.empty());
+  EXPECT_NEAR(simulation.status(0).state.body.p_world.z(), 0.2, 0.12);  // one corner first
+  EXPECT_EQ(simulation.status(0).state.body.v_world, Vector3d::Zero());
+  EXPECT_LT(simulation.status(0).state.rotors[0].speed, 1.0);
+}
+
+TEST(Commands, DisarmedInTheAirItFallsAndLiesWhereItFell) {
+  Scenario scenario = hovering();
+  scenario.vehicles[0].commands.resize(1);
+  scenario.vehicles[0].commands[0].kind = "disarm";
+  ByteSink sink;
+  const Simulation simulation = run(scenario, sink, Executor(1));
+  EXPECT_TRUE(simulation.status(0).landed);
+  EXPECT_NEAR(simulation.status(0).state.body.p_world.z(), 0.26, 0.05);
+  ASSERT_FALSE(sink.events.empty());  // it fell 3 m: that is a collision
+  EXPECT_EQ(sink.events[0].partner, kMapLabel);
+}
+
+TEST(Faults, DoWhatTheySay) {
+  Scenario scenario = hovering();
+  VehicleSetup& v = scenario.vehicles[0];
+  v.lidars = {LidarMount{}, LidarMount{"vlp32c"}};
+  v.faults = {{.kind = "lidar", .from = 1.0, .until = 2.0, .index = 0},
+              {.kind = "scan_drop", .from = 0.0, .until = 0.0, .index = 1, .value = 0.5},
+              {.kind = "imu", .from = 0.5, .until = 0.0, .axis = "accel_y"},
+              {.kind = "odometry_delay", .from = 1.0, .until = 2.0, .value = 0.05}};
+  struct Watch : SampleSink {
+    void on_scan(const Scan& scan, const PoseAt&) override { ++scans[scan.sensor]; }
+    void on_imu(std::uint32_t, const ImuSample& s) override {
+      if (to_seconds(s.time) > 0.5) stuck.insert(s.accel.y());
+      if (to_seconds(s.time) > 0.5) free.insert(s.accel.x());
+    }
+    void on_odometry(const OdometrySample& s) override {
+      late += s.delivered > s.time ? 1 : 0;
+      EXPECT_GE(s.delivered, last);
+      last = s.delivered;
+    }
+    std::map<std::uint32_t, int> scans;
+    std::set<double> stuck, free;
+    int late = 0;
+    SimTime last;
+  } watch;
+  run(scenario, watch, Executor(1));
+  EXPECT_EQ(watch.scans[0], 20);
+  EXPECT_GT(watch.scans[1], 8);
+  EXPECT_LT(watch.scans[1], 22);
+  EXPECT_EQ(watch.stuck.size(), 1u);
+  EXPECT_GT(watch.free.size(), 100u);
+  EXPECT_EQ(watch.late, 200);
+  // a dead rotor
+  scenario = hovering();
+  scenario.vehicles[0].faults = {{.kind = "rotor", .from = 1.0, .until = 0.0, .index = 2}};
+  ByteSink sink;
+  const Simulation simulation = run(scenario, sink, Executor(1));
+  EXPECT_LT(simulation.status(0).state.rotors[2].speed, 1.0);
+  EXPECT_GT(sink.events.size(), 0u);
+}
+
+TEST(Air, WindIsHeldAgainstAndABatterySags) {
+  Scenario scenario = hovering();
+  scenario.air.wind.mean = {5, 0, 0};
+  scenario.duration = 20.0;
+  scenario.vehicles[0].battery = true;
+  ByteSink sink;
+  const Simulation simulation = run(scenario, sink, Executor(1));
+  const VehicleStatus& status = simulation.status(0);
+  EXPECT_NEAR(status.state.body.p_world.x(), 10.0, 0.15);  // its integral holds it
+  // leaning into the wind
+  EXPECT_LT((status.state.body.q_world_body * Vector3d::UnitZ()).x(), -0.02);
+  EXPECT_GT(status.battery.used, 0.05);
+  EXPECT_LT(status.battery.voltage, 16.8);
+  EXPECT_GT(status.battery.voltage, 15.0);
+  EXPECT_LT(status.conditions.speed_share, 1.0);
+}
+
+}  // namespace
+}  // namespace pointflight
