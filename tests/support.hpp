@@ -14,6 +14,25 @@
 
 namespace pointflight::testing {
 
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+inline constexpr bool kSanitized = true;
+#elif defined(__has_feature)
+#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
+inline constexpr bool kSanitized = true;
+#else
+inline constexpr bool kSanitized = false;
+#endif
+#else
+inline constexpr bool kSanitized = false;
+#endif
+
+/// How often a test repeats what it draws at random: a tenth under sanitizers, which look at the
+/// code and not at the numbers.
+template <class T>
+constexpr T repeats(T count) {
+  return kSanitized ? count / 10 : count;
+}
+
 /// A folder that goes away with the test.
 class TemporaryFolder {
  public:

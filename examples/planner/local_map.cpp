@@ -52,6 +52,69 @@ void transform_line(std::vector<float>& f, std::size_t n) {
   std::copy(d.begin(), d.begin() + static_cast<std::ptrdiff_t>(n), f.begin());
 }
 
+/// Points that lie together, as things that do not move yet.
+std::vector<Mover> clusters_of(const std::vector<Vector3d>& points, double time) {
+  std::vector<bool> taken(points.size(), false);
+  std::vector<Mover> found;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (taken[i]) continue;
+    std::vector<std::size_t> open = {i};
+    taken[i] = true;
+    pointflight::Aabb box;
+    std::size_t count = 0;
+    while (!open.empty()) {
+      const std::size_t at = open.back();
+      open.pop_back();
+      box.add(points[at]);
+      ++count;
+      for (std::size_t j = 0; j < points.size(); ++j) {
+        if (taken[j] || (points[j] - points[at]).norm() > kCluster) continue;
+        taken[j] = true;
+        open.push_back(j);
+      }
+    }
+    if (count < 3) continue;
+    Mover mover;
+    mover.center = 0.5 * (box.min + box.max);
+    mover.radius = 0.5 * box.size().norm();
+    mover.last_seen = time;
+    mover.track = {{time, mover.center}};
+    found.push_back(mover);
+  }
+  return found;
+}
+
+/// A known mover was seen again: a straight line through its track is its velocity.
+void follow(Mover& known, const Mover& seen) {
+  const double time = seen.last_seen;
+  known.center = seen.center;
+  known.radius = std::max(0.9 * known.radius, seen.radius);
+  known.last_seen = time;
+  known.track.emplace_back(time, seen.center);
+  std::erase_if(known.track, [&](const auto& entry) { return time - entry.first > 1.0; });
+  double mean_t = 0.0;
+  Vector3d mean_p = Vector3d::Zero();
+  for (const auto& [t, p] : known.track) {
+    mean_t += t / static_cast<double>(known.track.size());
+    mean_p += p / static_cast<double>(known.track.size());
+  }
+  double tt = 0.0;
+  Vector3d tp = Vector3d::Zero();
+  for (const auto& [t, p] : known.track) {
+    tt += (t - mean_t) * (t - mean_t);
+    tp += (t - mean_t) * (p - mean_p);
+  }
+  const double span = known.track.back().first - known.track.front().first;
+  const Vector3d velocity = tt > 0.0 ? Vector3d(tp / tt) : Vector3d(0, 0, 0);
+  double off = 0.0;  // from the line
+  for (const auto& [t, p] : known.track) {
+    off = std::max(off, (p - mean_p - (t - mean_t) * velocity).norm());
+  }
+  known.moves = known.track.size() >= 4 && span > 0.3 && velocity.norm() > 0.2 &&
+                velocity.norm() < kFastest && off < 0.35;
+  known.velocity = known.moves ? velocity : Vector3d(0, 0, 0);
+}
+
 std::int64_t cell_number(double x) {
   return static_cast<std::int64_t>(std::floor(x / LocalMap::kCell));
 }
@@ -141,7 +204,7 @@ void LocalMap::add_scan(const std::vector<SeenPoint>& points, const Vector3d& ce
     if (!contains(s.point)) continue;
     const std::size_t i = index_of(s.point);
     // where there surely was nothing something has come
-    if (free_[i] >= kSurelyFree || (seen[i] == kHit && score_[i] < 0)) fresh.push_back(s.point);
+    if (free_[i] >= kSurelyFree) fresh.push_back(s.point);
     seen[i] = kHit;
   }
   find_movers(fresh, time);
@@ -159,34 +222,7 @@ void LocalMap::add_scan(const std::vector<SeenPoint>& points, const Vector3d& ce
 
 /// Groups of fresh points are movers; matched with those known, their motion is their velocity.
 void LocalMap::find_movers(const std::vector<Vector3d>& fresh, double time) {
-  std::vector<int> group(fresh.size(), -1);
-  std::vector<Mover> found;
-  for (std::size_t i = 0; i < fresh.size(); ++i) {
-    if (group[i] >= 0) continue;
-    std::vector<std::size_t> open = {i};
-    group[i] = static_cast<int>(found.size());
-    pointflight::Aabb box;
-    std::size_t count = 0;
-    while (!open.empty()) {
-      const std::size_t at = open.back();
-      open.pop_back();
-      box.add(fresh[at]);
-      ++count;
-      for (std::size_t j = 0; j < fresh.size(); ++j) {
-        if (group[j] >= 0 || (fresh[j] - fresh[at]).norm() > kCluster) continue;
-        group[j] = group[i];
-        open.push_back(j);
-      }
-    }
-    if (count < 3) continue;
-    Mover mover;
-    mover.center = 0.5 * (box.min + box.max);
-    mover.radius = 0.5 * box.size().norm();
-    mover.last_seen = time;
-    mover.track = {{time, mover.center}};
-    found.push_back(mover);
-  }
-  for (Mover& mover : found) {
+  for (const Mover& mover : clusters_of(fresh, time)) {
     Mover* match = nullptr;
     double nearest = kMatch;
     for (Mover& known : candidates_) {
@@ -197,35 +233,9 @@ void LocalMap::find_movers(const std::vector<Vector3d>& fresh, double time) {
     }
     if (match == nullptr) {
       candidates_.push_back(mover);
-      continue;
+    } else {
+      follow(*match, mover);
     }
-    match->center = mover.center;
-    match->radius = std::max(0.9 * match->radius, mover.radius);
-    match->last_seen = time;
-    match->track.emplace_back(time, mover.center);
-    std::erase_if(match->track, [&](const auto& entry) { return time - entry.first > 1.0; });
-    // a straight line through the track
-    double mean_t = 0.0;
-    Vector3d mean_p = Vector3d::Zero();
-    for (const auto& [t, p] : match->track) {
-      mean_t += t / static_cast<double>(match->track.size());
-      mean_p += p / static_cast<double>(match->track.size());
-    }
-    double tt = 0.0;
-    Vector3d tp = Vector3d::Zero();
-    for (const auto& [t, p] : match->track) {
-      tt += (t - mean_t) * (t - mean_t);
-      tp += (t - mean_t) * (p - mean_p);
-    }
-    const double span = match->track.back().first - match->track.front().first;
-    const Vector3d velocity = tt > 0.0 ? Vector3d(tp / tt) : Vector3d(0, 0, 0);
-    double off = 0.0;  // from the line
-    for (const auto& [t, p] : match->track) {
-      off = std::max(off, (p - mean_p - (t - mean_t) * velocity).norm());
-    }
-    match->moves = match->track.size() >= 4 && span > 0.3 && velocity.norm() > 0.2 &&
-                   velocity.norm() < kFastest && off < 0.35;
-    match->velocity = match->moves ? velocity : Vector3d(0, 0, 0);
   }
   std::erase_if(candidates_, [&](const Mover& m) { return time - m.last_seen > kForget; });
   movers_.clear();

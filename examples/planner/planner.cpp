@@ -5,6 +5,8 @@
 #include <limits>
 #include <queue>
 
+#include "pointflight/core/constants.hpp"
+
 namespace planner {
 namespace {
 
@@ -185,7 +187,7 @@ std::shared_ptr<const Trajectory> Planner::spline(const std::vector<Vector3d>& p
     const Vector3d way = p - points.back().head<3>();
     if (std::hypot(way.x(), way.y()) > 0.05) {
       const double wanted = std::atan2(way.y(), way.x());
-      const double turn = std::remainder(wanted - yaw, 2.0 * 3.141592653589793);
+      const double turn = std::remainder(wanted - yaw, 2.0 * pointflight::kPi);
       yaw += std::clamp(turn, -1.5 * dt, 1.5 * dt);
     }
     points.push_back(point(p, yaw));
@@ -200,7 +202,7 @@ std::shared_ptr<const Trajectory> Planner::escape(const PositionCommand& now, do
   double most = -std::numeric_limits<double>::infinity();
   for (const double reach : {0.0, 0.6, 1.2, 2.0}) {
     for (int i = 0; i < (reach > 0.0 ? 16 : 1); ++i) {
-      const double angle = 2.0 * 3.141592653589793 * i / 16.0;
+      const double angle = 2.0 * pointflight::kPi * i / 16.0;
       const Vector3d to =
           now.p_world + 0.3 * now.v_world + reach * Vector3d(std::cos(angle), std::sin(angle), 0.0);
       auto move = spline({now.p_world, to}, now, 1.5 * options_.speed);

@@ -67,8 +67,9 @@ Simulation::Simulation(const Scenario& scenario,
     return made;
   };
   const auto fleet = scenario.fleet();
-  if (fleet.empty()) {
-    throw InputError(fmt::format("{}: no vehicles; add one", scenario.place("vehicles")));
+  if (fleet.empty() || fleet.size() >= kFirstObstacle) {
+    throw InputError(fmt::format(
+        "{}: {} vehicles; 1 to {}", scenario.place("vehicles"), fleet.size(), kFirstObstacle - 1));
   }
   check_names(scenario, fleet);
   ObstacleWorld world;
@@ -270,7 +271,8 @@ bool Simulation::step(SampleSink& sink) {
   for (std::size_t i = 0; i < vehicle_count(); ++i) {
     if (sources_[i]) {
       VehicleStatus& status = state_.vehicles[i];
-      if (auto state = sources_[i]->state_at(now + setup_->step)) {
+      const auto state = sources_[i]->state_at(now + setup_->step);
+      if (state && state->is_finite()) {
         status.summary.distance_flown += (state->p_world - status.state.body.p_world).norm();
         status.state.body = *state;
       }

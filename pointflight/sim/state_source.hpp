@@ -13,8 +13,8 @@ class StateSource {
  public:
   virtual ~StateSource() = default;
 
-  /// The state at an instant, which it may wait for; nothing: the last one stays. Asked once for
-  /// each physics step, in order.
+  /// The state at an instant, which it may wait for; nothing, or a number that is not finite: the
+  /// last one stays. Asked once for each physics step, in order.
   virtual std::optional<RigidBodyState> state_at(SimTime time) = 0;
 };
 

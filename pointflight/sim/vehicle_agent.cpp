@@ -17,6 +17,7 @@ constexpr double kCommandTime = 5.0;         // s for a command without an end o
 constexpr double kTouchdown = 0.01;          // m above what carries a vehicle that lands
 constexpr double kTouchdownSpeed = 3.0;      // m/s
 constexpr double kGroundEffectReach = 10.0;  // propeller radii
+constexpr std::size_t kLidarsMax = 256;      // their numbers have 8 bits in random streams
 
 /// The vehicle's file with what the scenario changes of it.
 VehicleSettings settings_of(const Scenario& scenario,
@@ -70,6 +71,12 @@ VehicleAgent::VehicleAgent(const Scenario& scenario,
       state_schedule_(scenario.output.trajectory_rate),
       imu_schedule_(dynamics_.settings().imu.rate),
       odometry_schedule_(scenario.output.odometry_rate) {
+  if (setup_.lidars.size() > kLidarsMax) {
+    throw InputError(fmt::format("{}: {} lidars on one vehicle; {} at most",
+                                 scenario.place(scenario.vehicle_key(number, "lidars")),
+                                 setup_.lidars.size(),
+                                 kLidarsMax));
+  }
   for (std::size_t i = 0; i < setup_.lidars.size(); ++i) {
     const LidarMount& mount = setup_.lidars[i];
     const Vector3d rpy = mount.rotation_rpy_deg * kDegree;
@@ -241,7 +248,7 @@ bool VehicleAgent::integrate(VehicleStatus& status, double dt) const {
   const RigidBodyState& body = status.state.body;
   if (status.landed && body.v_world.z() > 0.0) status.landed = false;
   status.summary.distance_flown += (body.p_world - before).norm();
-  return body.p_world.allFinite() && body.q_world_body.coeffs().allFinite();
+  return body.is_finite();
 }
 
 void VehicleAgent::crash(VehicleStatus& status) const {

@@ -102,7 +102,7 @@ class VehicleAgent {
                Duration step,
                std::uint64_t step_number) const;
 
-  /// Samples due in [now, end), end included where `last`, appended in time's order.
+  /// Samples due in [now, end), appended in time's order.
   void sample(VehicleStatus& status, SimTime now, SimTime end, StepSamples& samples) const;
 
   /// The state a part of the step later.

@@ -15,6 +15,10 @@ struct RigidBodyState {
   Vector3d omega_body = Vector3d::Zero();  ///< rad/s
 
   [[nodiscard]] Pose T_world_body() const { return {q_world_body, p_world}; }
+  [[nodiscard]] bool is_finite() const {
+    return p_world.allFinite() && v_world.allFinite() && q_world_body.coeffs().allFinite() &&
+           omega_body.allFinite();
+  }
 };
 
 /// A rotor's speed and its rate of change.

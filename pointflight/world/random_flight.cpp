@@ -20,6 +20,8 @@ constexpr std::uint64_t kPlaceDraws = 16;  // two a try
 constexpr std::uint64_t kTries = 1000;
 constexpr std::uint64_t kDrawsALife = 1u << 12;
 static_assert(kPlaceDraws + 2 * kTries < kDrawsALife);
+constexpr Duration kShortestLife =
+    std::chrono::milliseconds(1);  // for bounds that are all but flat
 
 double drawn(double low, double high, double share) {
   return high > low ? low + share * (high - low) : low;
@@ -121,6 +123,9 @@ RandomFlight::Life RandomFlight::life(std::uint64_t n, SimTime from, bool strict
   const double speed =
       drawn(settings_.speed, settings_.speed_max, random_.uniform(base + kSpeedDraw));
   life.velocity = speed * Vector3d(side * angle.cos, side * angle.sin, z);
+  for (int axis = 0; axis < 3; ++axis) {
+    if (bounds_.size()[axis] <= 0.0) life.velocity[axis] = 0.0;  // in flat bounds it stays in them
+  }
 
   life.until = SimTime::max();
   if (settings_.at_border == "bounce") return life;
@@ -130,7 +135,7 @@ RandomFlight::Life RandomFlight::life(std::uint64_t n, SimTime from, bool strict
     const double border = rate > 0.0 ? bounds_.max[axis] : bounds_.min[axis];
     const double seconds = (border - life.start[axis]) / rate;
     if (seconds < 1e9) {
-      life.until = std::min(life.until, from + std::max(from_seconds(seconds), Duration{1}));
+      life.until = std::min(life.until, from + std::max(from_seconds(seconds), kShortestLife));
     }
   }
   return life;

@@ -232,7 +232,7 @@ TEST(BeamRenderer, EqualsTheModelWithoutATree) {
   const RandomStream random(1, StreamId::kTest, 0);
   int compared = 0;
   int differing = 0;
-  for (std::uint64_t i = 0; i < 1500; ++i) {
+  for (std::uint64_t i = 0; i < testing::repeats(std::uint64_t{1500}); ++i) {
     Ray ray;
     ray.origin_world = {random.uniform(8 * i, 0.2, 5.8),
                         random.uniform(8 * i + 1, 0.2, 4.8),

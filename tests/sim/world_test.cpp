@@ -157,7 +157,8 @@ TEST(Obstacles, BounceWhereTheyAreToldTo) {
   ball.bounds_min = {5, 3, 4};
   ball.bounds_max = {9, 9, 5};
   scenario.obstacles = {ball};
-  const Simulation simulation(scenario, hall(), Executor(1));
+  const Executor executor(1);
+  const Simulation simulation(scenario, hall(), executor);
   const auto bodies = simulation.obstacles(SimTime{}, SimTime(std::chrono::seconds(60)));
   ASSERT_EQ(bodies.size(), 1u);
   Vector3d last = bodies[0].T_world_body(SimTime{}).translation;
@@ -168,6 +169,26 @@ TEST(Obstacles, BounceWhereTheyAreToldTo) {
     EXPECT_GE((p - ball.bounds_min).minCoeff(), 0.0);
     EXPECT_GE((ball.bounds_max - p).minCoeff(), 0.0);
     last = p;
+  }
+}
+
+TEST(Obstacles, StayInFlatBounds) {
+  Scenario scenario = hovering();
+  ObstacleSettings ball;
+  ball.speed = 5.0;
+  ball.bounds_min = {5, 3, 4};
+  ball.bounds_max = {9, 9, 4};
+  ObstacleSettings thin = ball;  // a life would last nanoseconds
+  thin.bounds_max.z() = 4.0 + 1e-7;
+  scenario.obstacles = {ball, thin};
+  const Executor executor(1);
+  const Simulation simulation(scenario, hall(), executor);
+  for (int s = 0; s < 20; ++s) {
+    const SimTime now{std::chrono::seconds(s)};
+    const auto bodies = simulation.obstacles(now, now);
+    ASSERT_EQ(bodies.size(), 2u);
+    EXPECT_EQ(bodies[0].T_world_body(now).translation.z(), 4.0);
+    EXPECT_NEAR(bodies[1].T_world_body(now).translation.z(), 4.0, 0.01);
   }
 }
 
@@ -255,6 +276,7 @@ TEST(Commands, ALargeVehicleStaysOnTheGroundThatItHasLandedOn) {
   Scenario scenario = hovering();
   VehicleSetup& v = scenario.vehicles[0];
   v.model = "octo_1045";
+  v.lidars.clear();
   v.start = {10, 6, 1.5};
   v.commands.resize(1);
   v.commands[0].kind = "land";

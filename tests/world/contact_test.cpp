@@ -67,7 +67,7 @@ TEST(Contact, ManyQueriesEqualBruteForceOverTheSameBoxes) {
   const auto boxes = boxes_of(*map);
   ASSERT_EQ(boxes.size(), map->surfel_count());
   Draws draw(1);
-  constexpr int kQueries = 100000;
+  constexpr int kQueries = testing::repeats(100000);
   constexpr double kReach = 0.6;
   double worst = 0.0;
   int collisions = 0;

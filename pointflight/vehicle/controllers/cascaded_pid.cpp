@@ -12,22 +12,6 @@ constexpr double kAttitudeIntegralMax = 5.0;  // rad/s^2
 
 }  // namespace
 
-AttitudeDemand CascadedPid::demanded_attitude(const RigidBodyState& state,
-                                              const Vector3d& a_world,
-                                              const Vector3d& jerk_world,
-                                              double yaw,
-                                              double yaw_rate) const {
-  const Vector3d f = tilt_limited(a_world + Vector3d(0, 0, kGravity));
-  const double specific_thrust = f.norm();
-  const Matrix3d R_now = state.q_world_body.toRotationMatrix();
-  AttitudeDemand demand;
-  demand.R_world_body = attitude_from(f / specific_thrust, yaw, R_now);
-  demand.omega_body = rates_of(demand.R_world_body, specific_thrust, jerk_world, yaw_rate);
-  // the thrust that the present attitude can turn into the demanded force
-  demand.thrust = settings().mass * std::max(0.0, f.dot(R_now.col(2)));
-  return demand;
-}
-
 Vector3d CascadedPid::demanded_torque(const RigidBodyState& state,
                                       const AttitudeDemand& demand,
                                       double dt,

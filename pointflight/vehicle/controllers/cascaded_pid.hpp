@@ -17,11 +17,6 @@ class CascadedPid : public LoopController {
   using LoopController::LoopController;
 
  protected:
-  [[nodiscard]] AttitudeDemand demanded_attitude(const RigidBodyState& state,
-                                                 const Vector3d& a_world,
-                                                 const Vector3d& jerk_world,
-                                                 double yaw,
-                                                 double yaw_rate) const override;
   [[nodiscard]] Vector3d demanded_torque(const RigidBodyState& state,
                                          const AttitudeDemand& demand,
                                          double dt,

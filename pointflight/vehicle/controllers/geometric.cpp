@@ -14,24 +14,6 @@ Vector3d vee(const Matrix3d& m) {
 
 }  // namespace
 
-AttitudeDemand GeometricController::demanded_attitude(const RigidBodyState& state,
-                                                      const Vector3d& a_world,
-                                                      const Vector3d& jerk_world,
-                                                      double yaw,
-                                                      double yaw_rate) const {
-  const Vector3d f = tilt_limited(a_world + Vector3d(0, 0, kGravity));
-  const Matrix3d R_now = state.q_world_body.toRotationMatrix();
-  // in free fall any attitude will do: the present one
-  const double specific_thrust = f.norm();
-  const Vector3d b3 =
-      specific_thrust > 1e-3 ? Vector3d(f / specific_thrust) : Vector3d(R_now.col(2));
-  AttitudeDemand demand;
-  demand.R_world_body = attitude_from(b3, yaw, R_now);
-  demand.omega_body = rates_of(demand.R_world_body, specific_thrust, jerk_world, yaw_rate);
-  demand.thrust = settings().mass * std::max(0.0, f.dot(R_now.col(2)));
-  return demand;
-}
-
 Vector3d GeometricController::demanded_torque(const RigidBodyState& state,
                                               const AttitudeDemand& demand,
                                               double /*dt*/,

@@ -19,11 +19,6 @@ class GeometricController : public LoopController {
   using LoopController::LoopController;
 
  protected:
-  [[nodiscard]] AttitudeDemand demanded_attitude(const RigidBodyState& state,
-                                                 const Vector3d& a_world,
-                                                 const Vector3d& jerk_world,
-                                                 double yaw,
-                                                 double yaw_rate) const override;
   [[nodiscard]] Vector3d demanded_torque(const RigidBodyState& state,
                                          const AttitudeDemand& demand,
                                          double dt,

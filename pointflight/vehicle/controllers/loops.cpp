@@ -169,6 +169,25 @@ Vector3d LoopController::attitude_damping() const {
   return {c.roll_pitch.damping, c.roll_pitch.damping, c.yaw.damping};
 }
 
+AttitudeDemand LoopController::demanded_attitude(const RigidBodyState& state,
+                                                 const Vector3d& a_world,
+                                                 const Vector3d& jerk_world,
+                                                 double yaw,
+                                                 double yaw_rate) const {
+  const Vector3d f = tilt_limited(a_world + Vector3d(0, 0, kGravity));
+  const Matrix3d R_now = state.q_world_body.toRotationMatrix();
+  // in free fall any attitude will do: the present one
+  const double specific_thrust = f.norm();
+  const Vector3d b3 =
+      specific_thrust > 1e-3 ? Vector3d(f / specific_thrust) : Vector3d(R_now.col(2));
+  AttitudeDemand demand;
+  demand.R_world_body = attitude_from(b3, yaw, R_now);
+  demand.omega_body = rates_of(demand.R_world_body, specific_thrust, jerk_world, yaw_rate);
+  // the thrust that the present attitude can turn into the demanded force
+  demand.thrust = settings_.mass * std::max(0.0, f.dot(R_now.col(2)));
+  return demand;
+}
+
 Vector3d LoopController::tilt_limited(const Vector3d& f) const {
   const double tilt_max = settings_.controller.tilt_max_deg;
   if (tilt_max >= 90.0) return f;

@@ -12,8 +12,7 @@ struct AttitudeDemand {
   double thrust = 0.0;  ///< N along the present body z.
 };
 
-/// What all controllers share: everything but how an acceleration becomes an attitude and how an
-/// attitude error becomes a torque.
+/// What all controllers share: everything but how an attitude error becomes a torque.
 class LoopController : public Controller {
  public:
   explicit LoopController(const VehicleSettings& settings);
@@ -24,13 +23,6 @@ class LoopController : public Controller {
                                            ControllerMemory& memory) const override;
 
  protected:
-  /// What an acceleration (without gravity) is flown with.
-  [[nodiscard]] virtual AttitudeDemand demanded_attitude(const RigidBodyState& state,
-                                                         const Vector3d& a_world,
-                                                         const Vector3d& jerk_world,
-                                                         double yaw,
-                                                         double yaw_rate) const = 0;
-
   /// Torque (N m, body) towards an attitude.
   [[nodiscard]] virtual Vector3d demanded_torque(const RigidBodyState& state,
                                                  const AttitudeDemand& demand,
@@ -43,16 +35,20 @@ class LoopController : public Controller {
   [[nodiscard]] Vector3d attitude_frequency() const;
   [[nodiscard]] Vector3d attitude_damping() const;
 
+ private:
+  /// Attitude, rates and thrust for an acceleration (world, without gravity).
+  [[nodiscard]] AttitudeDemand demanded_attitude(const RigidBodyState& state,
+                                                 const Vector3d& a_world,
+                                                 const Vector3d& jerk_world,
+                                                 double yaw,
+                                                 double yaw_rate) const;
   /// Force per mass with its tilt cut to the limit: the vertical part is kept.
   [[nodiscard]] Vector3d tilt_limited(const Vector3d& specific_force_world) const;
-
   /// Rates that turn body z with the jerk, and yaw (Mellinger, Kumar 2011, eqs. 7 and 8), limited.
   [[nodiscard]] Vector3d rates_of(const Matrix3d& R_world_body,
                                   double specific_thrust,
                                   const Vector3d& jerk_world,
                                   double yaw_rate) const;
-
- private:
   [[nodiscard]] Vector3d position_loop(const RigidBodyState& state,
                                        const PositionCommand& command,
                                        double dt,
