@@ -11,6 +11,7 @@
 
 #include "apps/commands.hpp"
 #include "apps/pictures.hpp"
+#include "apps/ros_session.hpp"
 #include "apps/scenario_command.hpp"
 #include "apps/terminal.hpp"
 #include "pointflight/core/input_error.hpp"
@@ -32,33 +33,15 @@ struct FlyFlags {
   int threads = 0;
   bool force = false;
   bool snapshot = false;
+  RosFlags ros;
 };
 
-/// Passes samples on to the files and to the picture, and says collisions as they happen.
-class FlySink : public SampleSink {
+/// Says collisions as they happen.
+class CollisionLog : public SampleSink {
  public:
-  FlySink(const Simulation& simulation, FlightRecorder& recorder, RunPicture& picture)
-      : simulation_(simulation), recorder_(recorder), picture_(picture) {}
+  explicit CollisionLog(const Simulation& simulation) : simulation_(simulation) {}
 
-  void on_state(const StateSample& sample) override {
-    recorder_.on_state(sample);
-    picture_.on_state(sample);
-  }
-  void on_odometry(const OdometrySample& sample) override { recorder_.on_odometry(sample); }
-  void on_imu(std::uint32_t vehicle, const ImuSample& sample) override {
-    recorder_.on_imu(vehicle, sample);
-  }
-  void on_scan(const Scan& scan, const PoseAt& pose_at) override {
-    recorder_.on_scan(scan, pose_at);
-    picture_.on_scan(scan, pose_at);
-  }
-  void on_obstacle(const ObstacleSample& sample) override {
-    recorder_.on_obstacle(sample);
-    picture_.on_obstacle(sample);
-  }
   void on_collision(const CollisionEvent& event) override {
-    recorder_.on_collision(event);
-    picture_.on_collision(event);
     constexpr int kSaid = 20;
     if (!event.entered || said_ > kSaid) return;
     log(said_++ == kSaid
@@ -78,8 +61,6 @@ class FlySink : public SampleSink {
 
  private:
   const Simulation& simulation_;
-  FlightRecorder& recorder_;
-  RunPicture& picture_;
   int said_ = 0;
 };
 
@@ -240,18 +221,29 @@ int fly(const FlyFlags& flags) {
     for (LidarMount& mount : vehicle.lidars) mount.snapshot = mount.snapshot || flags.snapshot;
   }
   const auto map = scenario.open_map();
+  prepare_for_ros(flags.ros, scenario);
   Simulation simulation(scenario, map, executor);
   warn_about(scenario, *map);
   if (flags.force) clear_earlier_run(flags, simulation);
 
   FlightRecorder recorder(flags.output, simulation);
   RunPicture picture;
-  FlySink sink(simulation, recorder, picture);
+  CollisionLog collisions(simulation);
+  SampleSplitter sink;
+  for (SampleSink* each : {static_cast<SampleSink*>(&recorder),
+                           static_cast<SampleSink*>(&picture),
+                           static_cast<SampleSink*>(&collisions)}) {
+    sink.add(*each);
+  }
+  RosSession ros(flags.ros, simulation);
+  if (ros.sink() != nullptr) sink.add(*ros.sink());
+  ros.start();
   catch_interrupts();
   const Progress progress = terminal_progress();
   const Pace pace(rate);
   const auto start = Clock::now();
   while (simulation.step(sink)) {
+    ros.on_time(simulation.time());
     if (interrupted()) simulation.interrupt();
     pace.wait_for(simulation.time());
     if (simulation.time().time_since_epoch() % std::chrono::milliseconds(100) == Duration{0}) {
@@ -260,6 +252,7 @@ int fly(const FlyFlags& flags) {
   }
   const double wall = std::chrono::duration<double>(Clock::now() - start).count();
   end_progress();
+  ros.close();
   write_timing(flags, simulation, wall, executor.threads());
   describe_run(simulation, picture);
   draw_overview(*map, picture, (fs::path(flags.output) / "overview.png").string());
@@ -284,6 +277,7 @@ void add_fly_command(CLI::App& parent, int& exit_code) {
   app->add_flag("--force", flags->force, "Write into a folder that is not empty");
   app->add_flag(
       "--snapshot", flags->snapshot, "All beams of a scan from one pose, as in the paper");
+  add_ros_flags(*app, flags->ros);
   app->callback([flags, &exit_code] { exit_code = fly(*flags); });
 }
 

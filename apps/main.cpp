@@ -32,6 +32,7 @@ int run(int argc, char** argv) {
   add_lidar_command(app, exit_code);
   add_vehicle_command(app, exit_code);
   add_picture_command(app, exit_code);
+  add_bag_command(app, exit_code);
   add_compare_command(app, exit_code);
   add_fidelity_command(app, exit_code);
   try {

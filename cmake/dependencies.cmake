@@ -26,7 +26,7 @@ else()
 endif()
 
 # sleef, xxhash and lzf come without a CMake package of a stable name: linked as plain libraries.
-foreach(library sleef xxhash lzf lzma hwy)
+foreach(library sleef xxhash lzf lzma hwy md zstd lz4 z)
   find_library(POINTFLIGHT_${library} ${library} REQUIRED)
 endforeach()
 

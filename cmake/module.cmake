@@ -18,11 +18,14 @@ function(pointflight_target_options target)
   endif()
 endfunction()
 
-# pointflight_module(name PUBLIC libs... PRIVATE libs...): the library target pointflight::<name>
-# from all sources in pointflight/<name>.
+# pointflight_module(name [FOLDER folder] PUBLIC libs... PRIVATE libs...): the library target
+# pointflight::<name> from all sources in pointflight/<name>, or in the folder.
 function(pointflight_module name)
-  cmake_parse_arguments(ARG "" "" "PUBLIC;PRIVATE" ${ARGN})
-  file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/pointflight/${name}/*.cpp)
+  cmake_parse_arguments(ARG "" "FOLDER" "PUBLIC;PRIVATE" ${ARGN})
+  if(NOT ARG_FOLDER)
+    set(ARG_FOLDER pointflight/${name})
+  endif()
+  file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/${ARG_FOLDER}/*.cpp)
   add_library(pointflight_${name} STATIC ${sources})
   add_library(pointflight::${name} ALIAS pointflight_${name})
   set_target_properties(pointflight_${name} PROPERTIES EXPORT_NAME ${name}

@@ -20,34 +20,38 @@ allowed() {
     fidelity) echo "core geometry io map render fidelity" ;;
     world) echo "core geometry io map world" ;;
     sim) echo "core geometry io map render lidar vehicle world sim" ;;
+    ros_common) echo "core geometry io map render lidar vehicle world sim ros_common" ;;
+    recording) echo "core ros_common recording" ;;
   esac
 }
-for folder in core geometry io map render lidar vehicle world fidelity sim; do
-  for used in $(grep -rhoE '#include "(pointflight|apps|tests)/[a-z_]+' "pointflight/$folder" |
-                sed 's/.*"//; s/pointflight\///' | sort -u); do
+for folder in core geometry io map render lidar vehicle world fidelity sim ros_common recording; do
+  where=pointflight/$folder
+  [ -d "$where" ] || where=$folder
+  for used in $(grep -rhoE '#include "(pointflight/[a-z_]+|apps|tests|examples|ros_common|recording|ros1|ros2)/' "$where" |
+                sed 's/.*"//; s/^pointflight\///; s/\/$//' | sort -u); do
     case " $(allowed "$folder") " in
       *" $used "*) ;;
-      *) breach "pointflight/$folder includes $used: an arrow that goes up (docs/architecture.md)" ;;
+      *) breach "$where includes $used: an arrow that goes up (docs/architecture.md)" ;;
     esac
   done
 done
 
 # The path from seed to output must give the same bits on every CPU: no libm transcendentals there.
 found=$(grep -rnE '(std::|[^a-zA-Z_:.>])(sin|cos|tan|asin|acos|atan|atan2|exp|exp2|log|log2|log10|pow|sinh|cosh|tanh)f?\(' \
-        pointflight --include='*.cpp' --include='*.hpp' | sed 's,//.*,,' | grep -E '(sin|cos|tan|exp|exp2|log|log2|log10|pow|atan|atan2)f?\(' | grep -vE 'math::|core/math.hpp')
+        pointflight ros_common recording --include='*.cpp' --include='*.hpp' | sed 's,//.*,,' | grep -E '(sin|cos|tan|exp|exp2|log|log2|log10|pow|atan|atan2)f?\(' | grep -vE 'math::|core/math.hpp')
 [ -z "$found" ] || { echo "libm instead of core/math.hpp:"; breach "$found"; }
-found=$(grep -rnE 'AngleAxis|slerp|computeDirect\(|<random>' pointflight --include='*.cpp' --include='*.hpp' |
+found=$(grep -rnE 'AngleAxis|slerp|computeDirect\(|<random>' pointflight ros_common recording --include='*.cpp' --include='*.hpp' |
         grep -vE ':[0-9]*: *//|//.*(slerp|computeDirect|AngleAxis)')
 [ -z "$found" ] || { echo "calls libm or <random>:"; breach "$found"; }
 
 # The core reads no wall clock and prints nothing.
-found=$(grep -rnE 'system_clock|steady_clock|time\(nullptr|std::(cout|cerr)|fmt::print|printf\(' pointflight \
-        --include='*.cpp' --include='*.hpp')
+found=$(grep -rnE 'system_clock|steady_clock|time\(nullptr|std::(cout|cerr)|fmt::print|printf\(' \
+        pointflight ros_common recording --include='*.cpp' --include='*.hpp')
 [ -z "$found" ] || { echo "wall clock or printing in the library:"; breach "$found"; }
 
 # Public headers: std and Eigen only, so that a user needs no other headers.
 found=$(grep -rnE '#include <(fmt|yaml-cpp|nlohmann|tbb|oneapi|nanoflann|xxhash|lzf|liblzf|assimp|Random123|hwy|lzma)' \
-        pointflight --include='*.hpp' | grep -vE 'io/byte_cursor.hpp|-inl.hpp')
+        pointflight ros_common recording --include='*.hpp' | grep -vE 'io/byte_cursor.hpp|-inl.hpp')
 [ -z "$found" ] || { echo "third-party headers in public headers:"; breach "$found"; }
 
 exit $failed

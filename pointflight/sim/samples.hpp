@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <vector>
 
 #include "pointflight/lidar/lidar.hpp"
 #include "pointflight/vehicle/command.hpp"
@@ -59,6 +60,35 @@ class SampleSink {
   virtual void on_scan(const Scan& /*scan*/, const PoseAt& /*pose_at*/) {}
   virtual void on_collision(const CollisionEvent& /*event*/) {}
   virtual void on_obstacle(const ObstacleSample& /*sample*/) {}
+};
+
+/// Passes samples on to several sinks, in the order in which they were added.
+class SampleSplitter : public SampleSink {
+ public:
+  /// The sink must outlive the splitter.
+  void add(SampleSink& sink) { sinks_.push_back(&sink); }
+
+  void on_state(const StateSample& sample) override {
+    for (SampleSink* sink : sinks_) sink->on_state(sample);
+  }
+  void on_odometry(const OdometrySample& sample) override {
+    for (SampleSink* sink : sinks_) sink->on_odometry(sample);
+  }
+  void on_imu(std::uint32_t vehicle, const ImuSample& sample) override {
+    for (SampleSink* sink : sinks_) sink->on_imu(vehicle, sample);
+  }
+  void on_scan(const Scan& scan, const PoseAt& pose_at) override {
+    for (SampleSink* sink : sinks_) sink->on_scan(scan, pose_at);
+  }
+  void on_collision(const CollisionEvent& event) override {
+    for (SampleSink* sink : sinks_) sink->on_collision(event);
+  }
+  void on_obstacle(const ObstacleSample& sample) override {
+    for (SampleSink* sink : sinks_) sink->on_obstacle(sample);
+  }
+
+ private:
+  std::vector<SampleSink*> sinks_;
 };
 
 }  // namespace pointflight

@@ -139,6 +139,8 @@ void describe(SettingsVisitor& v, Scenario& s) {
   });
   v.section({"output", "", "what is written"},
             [&](SettingsVisitor& w) { describe_output(w, s.output); });
+  v.section({"ros", "", "names of messages, for --ros1, --ros2 and --record"},
+            [&](SettingsVisitor& w) { describe(w, s.ros); });
 }
 
 std::vector<VehicleSetup> Scenario::fleet() const {
@@ -214,6 +216,8 @@ std::string scenario_reference() {
   defaults.vehicles.front().commands.resize(1);
   defaults.vehicles.front().faults.resize(1);
   defaults.obstacles.resize(1);
+  defaults.ros.outputs.resize(1);
+  defaults.ros.inputs.resize(1);
   SettingsTable table;
   describe(table, defaults);
   return table.text();

@@ -12,6 +12,7 @@
 #include "pointflight/map/surfel_map.hpp"
 #include "pointflight/sim/command_script.hpp"
 #include "pointflight/sim/faults.hpp"
+#include "pointflight/sim/ros_setup.hpp"
 #include "pointflight/vehicle/mission.hpp"
 #include "pointflight/world/obstacles.hpp"
 #include "pointflight/world/wind.hpp"
@@ -87,6 +88,7 @@ struct Scenario {
   std::vector<ObstacleSettings> obstacles;
   AirSetup air;
   OutputSetup output;
+  RosSetup ros;
 
   [[nodiscard]] std::string folder() const;
 

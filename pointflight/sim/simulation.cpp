@@ -105,6 +105,10 @@ const Scenario& Simulation::scenario() const {
   return setup_->scenario;
 }
 
+const SurfelMap& Simulation::map() const {
+  return *setup_->map;
+}
+
 const VehicleAgent& Simulation::vehicle(std::size_t number) const {
   return *setup_->agents[number];
 }

@@ -70,6 +70,7 @@ class Simulation {
   [[nodiscard]] SimTime end_time() const;
   [[nodiscard]] RunEnd end() const { return state_.end; }
   [[nodiscard]] const Scenario& scenario() const;
+  [[nodiscard]] const SurfelMap& map() const;
 
   [[nodiscard]] std::size_t vehicle_count() const { return state_.vehicles.size(); }
   [[nodiscard]] const VehicleAgent& vehicle(std::size_t number) const;

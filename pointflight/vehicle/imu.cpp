@@ -39,6 +39,7 @@ ImuSample Imu::sample(std::int64_t index,
   const Quaterniond q_imu_body = q_body_imu_.conjugate();
   ImuSample sample;
   sample.time = time;
+  sample.q_world_imu = state.q_world_body * q_body_imu_;
   sample.gyro = q_imu_body * w + biases.gyro +
                 settings_.gyro_noise_density / std::sqrt(dt) * normals(StreamId::kImuGyroNoise);
   sample.accel = q_imu_body * force + biases.accel +

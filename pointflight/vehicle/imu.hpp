@@ -13,6 +13,7 @@ struct ImuSample {
   SimTime time;
   Vector3d gyro;   ///< rad/s, IMU axes.
   Vector3d accel;  ///< Specific force, m/s^2, IMU axes: +9.81 on z when level and at rest.
+  Quaterniond q_world_imu = Quaterniond::Identity();  ///< Truth: the attitude of its axes.
 };
 
 /// What an ideal accelerometer at the body origin reads: acceleration minus gravity (REP 145).

@@ -1,0 +1,53 @@
+#include <fmt/format.h>
+
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <memory>
+
+#include "apps/commands.hpp"
+#include "recording/mcap_reader.hpp"
+
+namespace pointflight::apps {
+namespace {
+
+void show(const std::string& path) {
+  const RecordingInfo info = read_mcap(path);
+  const double seconds = 1e-9 * static_cast<double>(info.end - info.start);
+  fmt::print("{}\n", path);
+  fmt::print("  format       {}{}\n",
+             info.format,
+             info.library.empty() ? "" : fmt::format(", written by {}", info.library));
+  fmt::print("  complete     {}\n",
+             info.complete ? "yes" : "no: cut short; what follows is what can be read");
+  fmt::print("  messages     {} in {} chunks ({})\n",
+             info.messages,
+             info.chunks,
+             info.compression.empty() ? "none" : info.compression);
+  if (info.messages > 0) {
+    fmt::print("  time         {:.3f} to {:.3f}, {:.3f} s\n",
+               1e-9 * static_cast<double>(info.start),
+               1e-9 * static_cast<double>(info.end),
+               seconds);
+  }
+  for (const auto& attachment : info.attachments) {
+    fmt::print("  attachment   {}, {} bytes\n", attachment.name, attachment.size);
+  }
+  for (const auto& topic : info.topics) {
+    const double rate = seconds > 0.0 ? static_cast<double>(topic.messages) / seconds : 0.0;
+    fmt::print("  {:>8}  {:>7.1f} Hz  {}  {}\n", topic.messages, rate, topic.name, topic.type);
+  }
+}
+
+}  // namespace
+
+void add_bag_command(CLI::App& parent, int& /*exit_code*/) {
+  auto* app = parent.add_subcommand("bag", "Recordings that `fly --record` made");
+  app->require_subcommand(1);
+  auto* info = app->add_subcommand("info", "What is in a recording");
+  auto path = std::make_shared<std::string>();
+  info->add_option("file", *path, "A .mcap, or a .mcap.active that was cut short")->required();
+  info->callback([path] { show(*path); });
+}
+
+}  // namespace pointflight::apps

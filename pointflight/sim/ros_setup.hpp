@@ -1,0 +1,44 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "pointflight/core/settings.hpp"
+
+namespace pointflight {
+
+/// A message that goes out, and under which name. In names and frames `{id}` stands for the
+/// vehicle's number as the profile counts, `{vehicle}` for its name, `{lidar}` for its LiDAR's.
+struct RosOutput {
+  std::string kind;         ///< What it says: ros_common/outputs.cpp has the list.
+  std::string topic;        ///< "-": not sent.
+  std::string frame;        ///< header.frame_id; empty: what the profile calls it.
+  std::string child_frame;  ///< Of odometry and transforms; "-": none.
+  double rate = -1.0;       ///< Hz at most; 0: each sample; -1: as the profile has it, or each.
+  std::string layout;       ///< Of clouds.
+  double resolution = 0.0;  ///< Of the map's cloud, m; 0: the map's own.
+};
+
+/// A message that comes in.
+struct RosInput {
+  std::string kind;             ///< What it is taken for: ros_common/profile.cpp has the list.
+  std::string topic;            ///< "-": not read.
+  std::string unit = "si";      ///< Of rotor speeds: "si" (rad/s) or "rpm".
+  std::string frame = "world";  ///< Of velocities that name no frame: "world" or "body".
+};
+
+void describe(SettingsVisitor& visitor, RosOutput& output);
+void describe(SettingsVisitor& visitor, RosInput& input);
+
+/// A scenario's `ros`: for ROS 1, ROS 2 and recordings.
+struct RosSetup {
+  std::string profile = "default";  ///< A shipped one, or a path.
+  std::string epoch;                ///< "now", or seconds since 1970; empty: the profile's.
+  /// Of each kind that is named here, instead of the profile's; what is left open is the profile's.
+  std::vector<RosOutput> outputs;
+  std::vector<RosInput> inputs;
+};
+
+void describe(SettingsVisitor& visitor, RosSetup& setup);
+
+}  // namespace pointflight

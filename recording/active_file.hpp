@@ -1,0 +1,37 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <cstdio>
+#include <span>
+#include <string>
+
+namespace pointflight {
+
+/// A recording that grows: `NAME.active` until it is complete, then `NAME`. What was flushed stays
+/// readable whatever happens to the program; nothing is ever removed. A failed write throws
+/// InputError with the path and the system's reason.
+class ActiveFile {
+ public:
+  explicit ActiveFile(std::string path);
+  ~ActiveFile();
+  ActiveFile(const ActiveFile&) = delete;
+  ActiveFile& operator=(const ActiveFile&) = delete;
+
+  void write(std::span<const std::byte> bytes);
+  void flush();
+  /// Closes it and gives it its name.
+  void commit();
+
+  [[nodiscard]] std::uint64_t size() const { return size_; }
+  [[nodiscard]] const std::string& path() const { return path_; }
+
+ private:
+  [[noreturn]] void fail(int error);
+
+  std::string path_, active_path_;
+  std::FILE* file_ = nullptr;
+  std::uint64_t size_ = 0;
+};
+
+}  // namespace pointflight

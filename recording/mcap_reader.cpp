@@ -1,0 +1,250 @@
+#include "recording/mcap_reader.hpp"
+
+#include <fmt/format.h>
+#include <lz4frame.h>
+#include <zlib.h>
+#include <zstd.h>
+
+#include <algorithm>
+#include <array>
+#include <set>
+
+#include "pointflight/core/input_error.hpp"
+#include "pointflight/core/mapped_file.hpp"
+#include "recording/mcap_format.hpp"
+
+namespace pointflight {
+namespace {
+
+using mcap::Opcode;
+using mcap::RecordReader;
+
+constexpr std::uint64_t kLargestChunk = std::uint64_t{1} << 28;  // bytes, unpacked
+
+/// Bytes of a packed chunk; empty where they do not unpack to `size`.
+std::vector<std::byte> unpacked(std::span<const std::byte> packed,
+                                const std::string& how,
+                                std::uint64_t size) {
+  std::vector<std::byte> out;
+  if (how.empty()) {
+    out.assign(packed.begin(), packed.end());
+  } else if (how == "zstd") {
+    // the frame says its size as well: memory is taken only where both agree
+    if (ZSTD_getFrameContentSize(packed.data(), packed.size()) != size) return {};
+    out.resize(size);
+    if (ZSTD_decompress(out.data(), size, packed.data(), packed.size()) != size) return {};
+  } else if (how == "lz4") {
+    constexpr std::uint64_t kMostGain = 255;  // of LZ4
+    if (size > kMostGain * packed.size()) return {};
+    out.resize(size);
+    LZ4F_dctx* context = nullptr;
+    if (LZ4F_isError(LZ4F_createDecompressionContext(&context, LZ4F_VERSION)) != 0) return {};
+    std::size_t to = 0;
+    std::size_t from = 0;
+    for (;;) {
+      std::size_t room = out.size() - to;
+      std::size_t taken = packed.size() - from;
+      const std::size_t more =
+          LZ4F_decompress(context, out.data() + to, &room, packed.data() + from, &taken, nullptr);
+      to += room;
+      from += taken;
+      if (LZ4F_isError(more) != 0 || more == 0 || (room == 0 && taken == 0)) break;
+    }
+    LZ4F_freeDecompressionContext(context);
+    if (to != size) return {};
+  }
+  return out.size() == size ? out : std::vector<std::byte>{};
+}
+
+/// Walks over records and counts.
+class Reading {
+ public:
+  Reading(RecordingInfo& info, const std::function<void(const RecordedMessage&)>& on_message)
+      : info_(info), on_message_(on_message) {}
+
+  /// All whole records of `bytes`; true where the last one ends where the bytes end.
+  bool records(std::span<const std::byte> bytes, bool in_chunk) {
+    std::size_t at = 0;
+    while (bytes.size() - at >= mcap::kRecordHead) {
+      const auto opcode = static_cast<Opcode>(bytes[at]);
+      std::uint64_t length = 0;
+      std::memcpy(&length, bytes.data() + at + 1, sizeof(length));
+      if (length > bytes.size() - at - mcap::kRecordHead) return false;
+      record(opcode, bytes.subspan(at + mcap::kRecordHead, length), in_chunk);
+      at += mcap::kRecordHead + length;
+      if (in_chunk) continue;
+      data_ended_ = data_ended_ || opcode == Opcode::kDataEnd;
+      ended_ = opcode == Opcode::kFooter;
+      if (ended_) return true;
+    }
+    return at == bytes.size();
+  }
+
+  [[nodiscard]] bool ended() const { return ended_; }
+
+  void finish() {
+    for (const auto& entry : channels_) {
+      const Channel& channel = entry.second;
+      if (!channel.known) continue;
+      const auto same = std::find_if(info_.topics.begin(), info_.topics.end(), [&](const auto& t) {
+        return t.name == channel.topic && t.type == channel.type;
+      });
+      if (same != info_.topics.end()) {
+        same->messages += channel.messages;
+      } else {
+        info_.topics.push_back({channel.topic, channel.type, channel.messages});
+      }
+    }
+    std::sort(info_.topics.begin(), info_.topics.end(), [](const auto& a, const auto& b) {
+      return a.name < b.name;
+    });
+    for (const std::string& how : compressions_) {
+      info_.compression += (info_.compression.empty() ? "" : ", ") + (how.empty() ? "none" : how);
+    }
+  }
+
+ private:
+  struct Channel {
+    std::string topic, type;
+    std::uint64_t messages = 0;
+    bool known = false;
+  };
+
+  void record(Opcode opcode, std::span<const std::byte> content, bool in_chunk) {
+    RecordReader reader(content);
+    switch (opcode) {
+      case Opcode::kHeader: {
+        const std::string profile = reader.text();
+        info_.format = profile.empty() ? "MCAP" : "MCAP, profile " + profile;
+        info_.library = reader.text();
+        break;
+      }
+      case Opcode::kSchema: {
+        const auto id = reader.number<std::uint16_t>();
+        std::string name = reader.text();
+        if (reader.ok()) schemas_[id] = std::move(name);
+        break;
+      }
+      case Opcode::kChannel: {
+        const auto id = reader.number<std::uint16_t>();
+        const auto schema = reader.number<std::uint16_t>();
+        std::string topic = reader.text();
+        if (!reader.ok()) break;
+        Channel& channel = channels_[id];
+        channel.topic = std::move(topic);
+        channel.type = schemas_[schema];
+        channel.known = true;
+        break;
+      }
+      case Opcode::kMessage:
+        if (!data_ended_) message(reader);
+        break;
+      case Opcode::kChunk:
+        if (!in_chunk && !data_ended_) chunk(reader);
+        break;
+      case Opcode::kAttachment: {
+        static_cast<void>(reader.take(16));  // times
+        RecordingInfo::Attachment attachment;
+        attachment.name = reader.text();
+        attachment.media_type = reader.text();
+        attachment.size = reader.number<std::uint64_t>();
+        if (reader.ok()) info_.attachments.push_back(std::move(attachment));
+        break;
+      }
+      default:
+        break;
+    }
+  }
+
+  void message(RecordReader& reader) {
+    const auto id = reader.number<std::uint16_t>();
+    static_cast<void>(reader.take(4));  // sequence
+    const auto time = static_cast<std::int64_t>(reader.number<std::uint64_t>());
+    static_cast<void>(reader.take(8));  // publish time
+    const auto channel = channels_.find(id);
+    if (!reader.ok() || channel == channels_.end()) return;
+    ++channel->second.messages;
+    if (info_.messages++ == 0) info_.start = info_.end = time;
+    info_.start = std::min(info_.start, time);
+    info_.end = std::max(info_.end, time);
+    if (on_message_) {
+      on_message_({channel->second.topic, channel->second.type, time, reader.take(reader.left())});
+    }
+  }
+
+  void chunk(RecordReader& reader) {
+    static_cast<void>(reader.take(16));  // times
+    const auto size = reader.number<std::uint64_t>();
+    const auto crc = reader.number<std::uint32_t>();
+    const std::string how = reader.text();
+    const auto packed = reader.take(reader.number<std::uint64_t>());
+    if (!reader.ok() || size > kLargestChunk) return;
+    const auto bytes = unpacked(packed, how, size);
+    const auto sum = crc32_z(0, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size());
+    if (bytes.size() != size || (crc != 0 && crc != sum)) {
+      info_.complete = false;
+      return;
+    }
+    ++info_.chunks;
+    compressions_.insert(how);
+    records(bytes, true);
+  }
+
+  RecordingInfo& info_;
+  const std::function<void(const RecordedMessage&)>& on_message_;
+  std::map<std::uint16_t, std::string> schemas_;
+  std::map<std::uint16_t, Channel> channels_;
+  std::set<std::string> compressions_;
+  bool ended_ = false;
+  bool data_ended_ = false;
+};
+
+}  // namespace
+
+RecordingInfo read_mcap_bytes(std::span<const std::byte> bytes,
+                              const std::string& name,
+                              const std::function<void(const RecordedMessage&)>& on_message) {
+  const auto magic = std::as_bytes(std::span(mcap::kMagic));
+  if (bytes.size() < magic.size() || !std::equal(magic.begin(), magic.end(), bytes.begin())) {
+    throw InputError(
+        fmt::format("{}: is not an MCAP file (it does not begin with its magic)", name));
+  }
+  RecordingInfo info;
+  info.format = "MCAP";
+  Reading reading(info, on_message);
+  reading.records(bytes.subspan(magic.size()), false);
+  info.complete = info.complete && reading.ended();
+  reading.finish();
+  return info;
+}
+
+RecordingInfo read_mcap(const std::string& path,
+                        const std::function<void(const RecordedMessage&)>& on_message) {
+  const MappedFile file(path);
+  return read_mcap_bytes(file.bytes(), path, on_message);
+}
+
+std::string read_mcap_attachment(const std::string& path, const std::string& attachment) {
+  const MappedFile file(path);
+  const auto bytes = file.bytes();
+  std::size_t at = mcap::kMagic.size();
+  while (at < bytes.size() && bytes.size() - at >= mcap::kRecordHead) {
+    std::uint64_t length = 0;
+    std::memcpy(&length, bytes.data() + at + 1, sizeof(length));
+    if (length > bytes.size() - at - mcap::kRecordHead) break;
+    RecordReader reader(bytes.subspan(at + mcap::kRecordHead, length));
+    if (static_cast<Opcode>(bytes[at]) == Opcode::kAttachment) {
+      static_cast<void>(reader.take(16));
+      const std::string name = reader.text();
+      static_cast<void>(reader.text());
+      const auto data = reader.take(reader.number<std::uint64_t>());
+      if (reader.ok() && name == attachment) {
+        return {reinterpret_cast<const char*>(data.data()), data.size()};
+      }
+    }
+    at += mcap::kRecordHead + length;
+  }
+  throw InputError(fmt::format("{}: has no attachment '{}'", path, attachment));
+}
+
+}  // namespace pointflight

@@ -1,0 +1,518 @@
+#include "ros_common/bridge.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <numeric>
+
+#include "pointflight/core/constants.hpp"
+#include "pointflight/geometry/rotation.hpp"
+#include "ros_common/conversion.hpp"
+#include "ros_common/point_layout.hpp"
+#include "ros_common/scan_messages.hpp"
+
+namespace pointflight {
+namespace {
+
+constexpr std::size_t kMapPointsMax = 1'000'000;
+constexpr std::size_t kPathPosesMax = 2000;
+constexpr double kPathSpacing = 0.1;     // m between poses of a path
+constexpr double kSurfaceSpacing = 0.1;  // m between points on obstacles
+constexpr std::size_t kScanTimes = 21;   // that MARSIM takes the mean of
+constexpr double kRpm = 30.0 / kPi;      // of a rad/s
+
+constexpr msg::ColorRGBA kVehicleColor{0.0f, 0.45f, 0.70f, 0.9f};
+constexpr msg::ColorRGBA kObstacleColor{0.55f, 0.25f, 0.65f, 0.8f};
+constexpr msg::ColorRGBA kCollisionColor{0.85f, 0.1f, 0.1f, 0.9f};
+
+/// Layout of clouds that the profile leaves open.
+const PointLayout& layout_of(const RosOutput& output, const char* otherwise) {
+  return point_layout(output.layout.empty() ? otherwise : output.layout);
+}
+
+Pose imu_mount(const ImuSettings& imu) {
+  const Vector3d rpy = imu.rotation_rpy_deg * kDegree;
+  return {quaternion_from_rpy(rpy.x(), rpy.y(), rpy.z()), imu.position};
+}
+
+msg::KeyValue key_value(const char* key, const std::string& value) {
+  return {key, value};
+}
+
+}  // namespace
+
+struct RosBridge::Stream : OutputStream {
+  explicit Stream(OutputStream stream)
+      : OutputStream(std::move(stream)), schedule(settings.rate > 0.0 ? settings.rate : 1.0) {}
+
+  Schedule schedule;
+  std::optional<SimTime> first;  ///< Sample: the schedule counts from it.
+  std::int64_t next = 0;         ///< Of the schedule.
+  std::vector<int> numbers;      ///< At each outlet.
+  std::uint32_t sent = 0;
+  msg::Path path;
+  double path_spacing = kPathSpacing;
+};
+
+RosBridge::RosBridge(const Simulation& simulation, const RosProfile& profile, Duration epoch)
+    : simulation_(simulation), profile_(profile), epoch_(epoch) {
+  for (OutputStream& stream : output_streams(simulation, profile)) {
+    streams_.push_back(std::make_unique<Stream>(std::move(stream)));
+  }
+}
+
+RosBridge::~RosBridge() = default;
+
+double RosBridge::odometry_rate(const RosProfile& profile) {
+  double rate = 0.0;
+  for (const RosOutput& output : profile.outputs) {
+    if (output.kind == "odometry" || output.kind == "tf" || output.kind == "pose") {
+      rate = std::max(rate, output.rate);
+    }
+  }
+  return rate;
+}
+
+void RosBridge::add(Outlet& outlet) {
+  outlets_.push_back(&outlet);
+  std::map<std::string, int> known;  // several streams may share a topic
+  for (const auto& stream : streams_) {
+    const auto [at, is_new] = known.try_emplace(stream->topic.name, 0);
+    if (is_new) at->second = outlet.advertise(stream->topic);
+    stream->numbers.push_back(at->second);
+  }
+}
+
+std::vector<Topic> RosBridge::topics() const {
+  std::vector<Topic> topics;
+  for (const auto& stream : streams_) topics.push_back(stream->topic);
+  return topics;
+}
+
+bool RosBridge::is_wanted(const Stream& stream) const {
+  for (std::size_t i = 0; i < outlets_.size(); ++i) {
+    if (outlets_[i]->has_readers(stream.numbers[i])) return true;
+  }
+  return false;
+}
+
+bool RosBridge::is_due(Stream& stream, SimTime time) const {
+  if (stream.settings.rate <= 0.0) return is_wanted(stream);
+  if (!stream.first) stream.first = time;
+  const SimTime since(time - *stream.first);
+  if (stream.schedule.at(stream.next) > since) return false;
+  while (stream.schedule.at(stream.next) <= since) ++stream.next;
+  return is_wanted(stream);
+}
+
+template <class M>
+void RosBridge::send(Stream& stream, M message, SimTime leaves) {
+  if constexpr (requires { message.header; }) message.header.seq = stream.sent;
+  ++stream.sent;
+  latest_ = std::max(latest_, leaves);  // outlets see time go one way
+  const std::int64_t time = (latest_.time_since_epoch() + epoch_).count();
+  Bytes ros1;
+  Bytes cdr;
+  for (std::size_t i = 0; i < outlets_.size(); ++i) {
+    if (!outlets_[i]->has_readers(stream.numbers[i])) continue;
+    Bytes& bytes = outlets_[i]->wire() == Wire::kRos1 ? ros1 : cdr;
+    if (!bytes) {
+      bytes = std::make_shared<const std::vector<std::byte>>(outlets_[i]->wire() == Wire::kRos1
+                                                                 ? encode<Wire::kRos1>(message)
+                                                                 : encode<Wire::kCdr>(message));
+    }
+    outlets_[i]->send(stream.numbers[i], bytes, time);
+  }
+}
+
+void RosBridge::start() {
+  for (Outlet* outlet : outlets_) outlet->start();
+  on_time(SimTime{});  // the clock before anything with a stamp
+  for (const auto& stream : streams_) {
+    if (stream->type->kind == OutputKind::kMap) send_map(*stream);
+    if (stream->type->kind == OutputKind::kTfStatic) send_static_transforms(*stream);
+  }
+}
+
+void RosBridge::shift_epoch(Duration by) {
+  epoch_ += by;
+  latest_ = SimTime{};
+  for (const auto& stream : streams_) {
+    stream->next = 0;
+    stream->first.reset();
+    stream->path = {};
+  }
+}
+
+void RosBridge::send_cloud(Stream& stream, const std::vector<Vector3f>& points, SimTime time) {
+  msg::PointCloud2 cloud = cloud_of_points(points, {}, layout_of(stream.settings, "xyzi"));
+  cloud.header = header_of(time, epoch_, stream.settings.frame);
+  send(stream, std::move(cloud), time);
+}
+
+void RosBridge::send_map(Stream& stream) {
+  const MapCloud map = map_cloud(simulation_.map(), stream.settings.resolution, kMapPointsMax);
+  msg::PointCloud2 cloud =
+      cloud_of_points(map.points, map.intensities, layout_of(stream.settings, "xyzi"));
+  cloud.header = header_of(SimTime{}, epoch_, stream.settings.frame);
+  send(stream, std::move(cloud), SimTime{});
+}
+
+void RosBridge::send_static_transforms(Stream& stream) {
+  msg::TFMessage message;
+  for (std::size_t v = 0; v < simulation_.vehicle_count(); ++v) {
+    const VehicleAgent& agent = simulation_.vehicle(v);
+    RosNames names{agent.setup().name, profile_.first_id + static_cast<std::int64_t>(v), ""};
+    const msg::Header header = header_of(SimTime{}, epoch_, with_names(profile_.body_frame, names));
+    const auto lidars = lidar_names(agent);
+    for (std::size_t l = 0; l < lidars.size(); ++l) {
+      names.lidar = lidars[l];
+      const MountedLidar& mounted = agent.lidars()[l];
+      const std::string frame = with_names(profile_.sensor_frame, names);
+      message.transforms.push_back(transform_of(mounted.T_body_sensor, header, frame));
+      if (!is_camera(mounted.lidar->settings())) continue;
+      msg::Header sensor = header;
+      sensor.frame_id = frame;
+      const Pose turned{optical(Quaterniond::Identity()), Vector3d::Zero()};
+      message.transforms.push_back(transform_of(turned, sensor, frame + kOpticalSuffix));
+    }
+  }
+  // an IMU with a frame of its own
+  for (const auto& other : streams_) {
+    if (other->type->kind != OutputKind::kImu) continue;
+    const VehicleAgent& agent = simulation_.vehicle(other->vehicle);
+    const RosNames names{
+        agent.setup().name, profile_.first_id + static_cast<std::int64_t>(other->vehicle), ""};
+    const std::string body = with_names(profile_.body_frame, names);
+    if (other->settings.frame == body) continue;
+    message.transforms.push_back(transform_of(imu_mount(agent.settings().imu),
+                                              header_of(SimTime{}, epoch_, body),
+                                              other->settings.frame));
+  }
+  send(stream, std::move(message), SimTime{});
+}
+
+void RosBridge::on_time(SimTime time) {
+  if (!obstacles_.empty()) send_obstacles();
+  for (const auto& stream : streams_) {
+    const OutputKind kind = stream->type->kind;
+    if (kind == OutputKind::kClock && is_due(*stream, time)) {
+      send(*stream, msg::Clock{stamp_of(time, epoch_)}, time);
+    }
+    if (kind == OutputKind::kDiagnostics && is_due(*stream, time)) {
+      send_diagnostics(*stream, time);
+    }
+  }
+}
+
+void RosBridge::on_odometry(const OdometrySample& sample) {
+  for (const auto& s : streams_) {
+    Stream& stream = *s;
+    const OutputKind kind = stream.type->kind;
+    const bool own = stream.vehicle == sample.vehicle;
+    if (kind == OutputKind::kVehicleCloud) {
+      // the other one's hull, as this one would see it
+      if (own || !is_due(stream, sample.delivered)) continue;
+      std::vector<Vector3f> points;
+      append_surface(simulation_.vehicle(sample.vehicle).shape(),
+                     sample.state.T_world_body(),
+                     kSurfaceSpacing,
+                     points);
+      send_cloud(stream, points, sample.time);
+      continue;
+    }
+    if (!own) continue;
+    const auto header = header_of(sample.time, epoch_, stream.settings.frame);
+    switch (kind) {
+      case OutputKind::kOdometry:
+        if (!is_due(stream, sample.delivered)) break;
+        send(stream,
+             odometry_of(
+                 sample.state, header, stream.settings.child_frame, profile_.twist == "world"),
+             sample.delivered);
+        break;
+      case OutputKind::kPose:
+        if (!is_due(stream, sample.delivered)) break;
+        send(stream,
+             msg::PoseStamped{header, pose_of(sample.state.T_world_body())},
+             sample.delivered);
+        break;
+      case OutputKind::kCameraPose: {
+        if (!is_due(stream, sample.delivered)) break;
+        Pose pose = sample.state.T_world_body();
+        pose.rotation = optical(pose.rotation);
+        send(stream, msg::PoseStamped{header, pose_of(pose)}, sample.delivered);
+        break;
+      }
+      case OutputKind::kTf:
+        if (!is_due(stream, sample.delivered)) break;
+        send(stream,
+             msg::TFMessage{
+                 {transform_of(sample.state.T_world_body(), header, stream.settings.child_frame)}},
+             sample.delivered);
+        break;
+      case OutputKind::kRotorSpeeds: {
+        if (!is_due(stream, sample.delivered)) break;
+        msg::Float32MultiArray speeds;
+        for (const double w : simulation_.status(sample.vehicle).rotor_commands) {
+          speeds.data.push_back(static_cast<float>(w * kRpm));
+        }
+        send(stream, std::move(speeds), sample.delivered);
+        break;
+      }
+      case OutputKind::kPath:
+        send_path(stream, sample);
+        break;
+      case OutputKind::kModel:
+      case OutputKind::kVelocity:
+      case OutputKind::kTrajectory:
+      case OutputKind::kCovariance:
+      case OutputKind::kSensorModel:
+      case OutputKind::kLabel:
+        send_markers(stream, sample);
+        break;
+      default:
+        break;
+    }
+  }
+}
+
+void RosBridge::send_path(Stream& stream, const OdometrySample& sample) {
+  auto& poses = stream.path.poses;
+  const auto header = header_of(sample.time, epoch_, stream.settings.frame);
+  const Vector3d& p = sample.state.p_world;
+  if (poses.empty() || (vector_of(poses.back().pose.position) - p).norm() >= stream.path_spacing) {
+    poses.push_back({header, pose_of(sample.state.T_world_body())});
+  }
+  if (poses.size() > kPathPosesMax) {
+    // every second one goes: a long path stays a small message
+    for (std::size_t i = 0; 2 * i < poses.size(); ++i) poses[i] = poses[2 * i];
+    poses.resize((poses.size() + 1) / 2);
+    stream.path_spacing *= 2.0;
+  }
+  if (!is_due(stream, sample.delivered)) return;
+  stream.path.header = header;
+  send(stream, stream.path, sample.delivered);
+}
+
+void RosBridge::send_markers(Stream& stream, const OdometrySample& sample) {
+  if (!is_due(stream, sample.delivered)) return;
+  const VehicleAgent& agent = simulation_.vehicle(sample.vehicle);
+  const auto header = header_of(sample.time, epoch_, stream.settings.frame);
+  const Pose pose = sample.state.T_world_body();
+  const auto id = static_cast<std::int32_t>(sample.vehicle);
+  msg::Marker marker = marker_of(agent.hull(), pose, header, stream.type->name, id, kVehicleColor);
+  switch (stream.type->kind) {
+    case OutputKind::kVelocity:
+      marker.type = msg::Marker::kArrow;
+      marker.pose = {};
+      marker.scale = {0.05, 0.1, 0.1};  // shaft, head, head's length
+      marker.points = {point_of(sample.state.p_world),
+                       point_of(Vector3d(sample.state.p_world + 0.5 * sample.state.v_world))};
+      break;
+    case OutputKind::kTrajectory:
+      marker.type = msg::Marker::kLineStrip;
+      marker.pose = {};
+      marker.scale = {0.05, 0.0, 0.0};
+      for (const auto& entry : stream.path.poses) marker.points.push_back(entry.pose.position);
+      stream.path.poses.push_back({header, pose_of(pose)});
+      if (stream.path.poses.size() > kPathPosesMax)
+        stream.path.poses.erase(stream.path.poses.begin());
+      break;
+    case OutputKind::kCovariance:
+      marker.type = msg::Marker::kSphere;  // of the truth: a point
+      marker.scale = {1e-3, 1e-3, 1e-3};
+      break;
+    case OutputKind::kSensorModel:
+      marker.type = msg::Marker::kCylinder;
+      if (!agent.lidars().empty()) marker.pose = pose_of(pose * agent.lidars()[0].T_body_sensor);
+      marker.scale = {0.08, 0.08, 0.06};
+      break;
+    case OutputKind::kLabel:
+      marker.type = msg::Marker::kText;
+      marker.pose.position.z += 0.5;
+      marker.scale = {0.0, 0.0, 0.3};
+      marker.text = agent.setup().name;
+      break;
+    default:
+      break;
+  }
+  send(stream, std::move(marker), sample.delivered);
+}
+
+void RosBridge::on_imu(std::uint32_t vehicle, const ImuSample& sample) {
+  for (const auto& stream : streams_) {
+    if (stream->type->kind != OutputKind::kImu || stream->vehicle != vehicle) continue;
+    if (!is_due(*stream, sample.time)) continue;
+    const ImuSettings& settings = simulation_.vehicle(vehicle).settings().imu;
+    const ImuCustoms customs{profile_.imu_unit == "g", profile_.imu_gravity == "down"};
+    send(*stream,
+         imu_of(sample, settings, header_of(sample.time, epoch_, stream->settings.frame), customs),
+         sample.time);
+  }
+}
+
+void RosBridge::on_scan(const Scan& scan, const PoseAt& pose_at) {
+  for (const auto& stream : streams_) {
+    const bool of_lidar = stream->type->per == OutputType::Per::kLidar;
+    if (of_lidar && stream->vehicle == scan.vehicle && stream->lidar == scan.sensor &&
+        is_due(*stream, scan.end)) {
+      send_scan(*stream, scan, pose_at);
+    }
+    if (stream->type->kind == OutputKind::kScanTime && stream->vehicle == scan.vehicle &&
+        scan_times_.size() >= kScanTimes && is_due(*stream, scan.end)) {
+      const double sum = std::accumulate(scan_times_.begin(), scan_times_.end(), 0.0);
+      msg::PoseStamped message;
+      message.header.stamp = stamp_of(scan.end, epoch_);
+      message.pose.position.x = sum / static_cast<double>(scan_times_.size());
+      send(*stream, std::move(message), scan.end);
+    }
+  }
+}
+
+void RosBridge::send_scan(Stream& stream, const Scan& scan, const PoseAt& pose_at) {
+  const LidarSettings& lidar =
+      simulation_.vehicle(scan.vehicle).lidars()[scan.sensor].lidar->settings();
+  const RosOutput& s = stream.settings;
+  switch (stream.type->kind) {
+    case OutputKind::kCloud:
+      if (s.layout == "livox_custom") {
+        send(stream, custom_cloud_of(scan, s.frame, epoch_), scan.end);
+      } else {
+        send(stream, cloud_of(scan, layout_of(s, "xyzit"), s.frame, epoch_), scan.end);
+      }
+      break;
+    case OutputKind::kCloudWorld:
+      send(stream,
+           cloud_of(scan, layout_of(s, "xyzi"), s.frame, epoch_, world_points(scan, pose_at)),
+           scan.end);
+      break;
+    case OutputKind::kDepth: {
+      msg::Image image = depth_image_of(scan, lidar);
+      image.header = header_of(cloud_time(scan, false), epoch_, s.frame);
+      send(stream, std::move(image), scan.end);
+      break;
+    }
+    case OutputKind::kCameraInfo: {
+      msg::CameraInfo info = camera_info_of(lidar);
+      info.header = header_of(cloud_time(scan, false), epoch_, s.frame);
+      send(stream, std::move(info), scan.end);
+      break;
+    }
+    case OutputKind::kSensorPose: {
+      const SimTime time = cloud_time(scan, false);
+      Pose pose = pose_at(time);
+      pose.rotation = optical(pose.rotation);
+      send(stream, msg::PoseStamped{header_of(time, epoch_, s.frame), pose_of(pose)}, scan.end);
+      break;
+    }
+    case OutputKind::kTfScan: {
+      const SimTime time = cloud_time(scan, false);
+      send(stream,
+           msg::TFMessage{
+               {transform_of(pose_at(time), header_of(time, epoch_, s.frame), s.child_frame)}},
+           scan.end);
+      break;
+    }
+    default:
+      break;
+  }
+}
+
+void RosBridge::on_collision(const CollisionEvent& event) {
+  if (!event.entered) return;
+  for (const auto& stream : streams_) {
+    if (stream->type->kind != OutputKind::kCollisions || !is_wanted(*stream)) continue;
+    constexpr double kRadius = 0.15;  // m
+    send(*stream,
+         msg::MarkerArray{{marker_of(Solid{Ball{kRadius}},
+                                     {Quaterniond::Identity(), event.place_world},
+                                     header_of(event.time, epoch_, stream->settings.frame),
+                                     "collisions",
+                                     collisions_,
+                                     kCollisionColor)}},
+         event.time);
+  }
+  ++collisions_;
+}
+
+void RosBridge::on_obstacle(const ObstacleSample& sample) {
+  if (!obstacles_.empty() && obstacles_.front().time != sample.time) send_obstacles();
+  obstacles_.push_back(sample);
+}
+
+/// All obstacles of one instant.
+void RosBridge::send_obstacles() {
+  const SimTime time = obstacles_.front().time;
+  for (const auto& stream : streams_) {
+    const OutputKind kind = stream->type->kind;
+    if (kind != OutputKind::kObstacles && kind != OutputKind::kMovingCloud) continue;
+    if (!is_due(*stream, time)) continue;
+    msg::MarkerArray markers;
+    std::vector<Vector3f> points;
+    for (const Body& body : simulation_.obstacles(time, time)) {
+      if (time < body.from || time >= body.until) continue;
+      const Pose pose = body.T_world_body(time);
+      if (kind == OutputKind::kMovingCloud) {
+        append_surface(body.shape, pose, kSurfaceSpacing, points);
+        continue;
+      }
+      const auto* solid = std::get_if<Solid>(&body.shape);
+      const Solid shown = solid != nullptr ? *solid : Solid{Ball{bounding_radius(body.shape)}};
+      markers.markers.push_back(marker_of(shown,
+                                          pose,
+                                          header_of(time, epoch_, stream->settings.frame),
+                                          "obstacles",
+                                          static_cast<std::int32_t>(body.label - kFirstObstacle),
+                                          kObstacleColor));
+    }
+    if (kind == OutputKind::kMovingCloud) {
+      send_cloud(*stream, points, time);
+    } else {
+      send(*stream, std::move(markers), time);
+    }
+  }
+  obstacles_.clear();
+}
+
+void RosBridge::note_scan_time(double seconds) {
+  scan_times_.push_back(seconds);
+  if (scan_times_.size() > kScanTimes) scan_times_.erase(scan_times_.begin());
+}
+
+void RosBridge::send_diagnostics(Stream& stream, SimTime time) {
+  msg::DiagnosticArray message;
+  message.header = header_of(time, epoch_, "");
+  for (std::size_t v = 0; v < simulation_.vehicle_count(); ++v) {
+    const VehicleStatus& s = simulation_.status(v);
+    msg::DiagnosticStatus status;
+    status.name = "pointflight: " + simulation_.vehicle(v).setup().name;
+    status.hardware_id = simulation_.vehicle(v).setup().model;
+    constexpr auto kWarn = msg::Octet{1};
+    constexpr auto kError = msg::Octet{2};
+    if (s.crashed) {
+      status.level = kError;
+      status.message = "crashed";
+    } else if (!s.proximity.touching.empty()) {
+      status.level = kWarn;
+      status.message = "in contact";
+    } else {
+      status.message = s.landed ? "on the ground" : name_of(s.autopilot.command);
+    }
+    status.values = {
+        key_value("time", fmt::format("{:.3f}", to_seconds(time))),
+        key_value("command", name_of(s.autopilot.command)),
+        key_value("armed", s.autopilot.armed ? "true" : "false"),
+        key_value("clearance",
+                  s.proximity.nearest ? fmt::format("{:.2f}", s.proximity.nearest->distance) : ""),
+        key_value("collisions", fmt::format("{}", s.summary.collisions)),
+        key_value("commands_rejected", fmt::format("{}", s.autopilot.rejected)),
+        key_value("last_rejection", s.autopilot.last_rejection),
+        key_value("command_timeouts", fmt::format("{}", s.autopilot.timeouts)),
+        key_value("scans", fmt::format("{}", s.summary.scans))};
+    message.status.push_back(std::move(status));
+  }
+  send(stream, std::move(message), time);
+}
+
+}  // namespace pointflight

@@ -1,0 +1,76 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <vector>
+
+#include "pointflight/sim/simulation.hpp"
+#include "ros_common/outputs.hpp"
+#include "ros_common/profile.hpp"
+#include "ros_common/wire.hpp"
+
+namespace pointflight {
+
+/// Makes the messages of a profile from a run's samples and hands them to outlets: ROS 1, ROS 2,
+/// recordings. Decides nothing else; a message without readers is not made. One thread.
+class RosBridge : public SampleSink {
+ public:
+  /// Stamps count from `epoch` (since the Unix epoch). The simulation must outlive it. Throws
+  /// InputError (a profile that cannot be).
+  RosBridge(const Simulation& simulation, const RosProfile& profile, Duration epoch);
+  ~RosBridge() override;
+
+  /// Before `start`. The outlet must outlive the bridge.
+  void add(Outlet& outlet);
+  /// Makes all topics known and sends what is latched: map, static transforms.
+  void start();
+
+  /// The run has reached a time: sends what follows the clock. Call after each step.
+  void on_time(SimTime time);
+  void on_odometry(const OdometrySample& sample) override;
+  void on_imu(std::uint32_t vehicle, const ImuSample& sample) override;
+  void on_scan(const Scan& scan, const PoseAt& pose_at) override;
+  void on_collision(const CollisionEvent& event) override;
+  void on_obstacle(const ObstacleSample& sample) override;
+
+  /// After a reset the run starts again at zero, but stamps go on.
+  void shift_epoch(Duration by);
+  [[nodiscard]] Duration epoch() const { return epoch_; }
+
+  /// How long the last scan took by the wall clock, s: for `scan_time`; recordings leave it at 0.
+  void note_scan_time(double seconds);
+
+  /// What goes out.
+  [[nodiscard]] std::vector<Topic> topics() const;
+  /// The rate of odometry samples that the profile needs, Hz.
+  [[nodiscard]] static double odometry_rate(const RosProfile& profile);
+
+ private:
+  struct Stream;
+
+  [[nodiscard]] bool is_wanted(const Stream& stream) const;
+  [[nodiscard]] bool is_due(Stream& stream, SimTime time) const;
+  template <class M>
+  void send(Stream& stream, M message, SimTime leaves);
+  void send_cloud(Stream& stream, const std::vector<Vector3f>& points, SimTime time);
+  void send_map(Stream& stream);
+  void send_static_transforms(Stream& stream);
+  void send_path(Stream& stream, const OdometrySample& sample);
+  void send_markers(Stream& stream, const OdometrySample& sample);
+  void send_diagnostics(Stream& stream, SimTime time);
+  void send_obstacles();
+  void send_scan(Stream& stream, const Scan& scan, const PoseAt& pose_at);
+
+  const Simulation& simulation_;
+  RosProfile profile_;
+  Duration epoch_;
+  std::vector<Outlet*> outlets_;
+  std::vector<std::unique_ptr<Stream>> streams_;
+  std::vector<ObstacleSample> obstacles_;  ///< Of one instant, not sent yet.
+  std::int32_t collisions_ = 0;
+  std::vector<double> scan_times_;
+  SimTime latest_;  ///< That anything left at.
+};
+
+}  // namespace pointflight

@@ -1,0 +1,85 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "pointflight/sim/simulation.hpp"
+#include "ros_common/description.hpp"
+#include "ros_common/profile.hpp"
+
+namespace pointflight {
+
+/// What a profile's outputs can say, and what they are made from.
+enum class OutputKind {
+  kOdometry,
+  kImu,
+  kCloud,
+  kCloudWorld,
+  kMovingCloud,   ///< Points on the surfaces of obstacles.
+  kVehicleCloud,  ///< Points on the hull of the other vehicle whose odometry came.
+  kDepth,
+  kCameraInfo,
+  kPose,
+  kCameraPose,  ///< The body's pose in optical axes, with odometry.
+  kSensorPose,
+  kPath,
+  kTf,
+  kTfScan,  ///< The sensor's pose with each scan.
+  kTfStatic,
+  kClock,
+  kMap,
+  kObstacles,
+  kCollisions,
+  kModel,
+  kVelocity,
+  kTrajectory,
+  kCovariance,
+  kSensorModel,
+  kLabel,
+  kRotorSpeeds,
+  kDiagnostics,
+  kScanTime,
+};
+
+/// A row of the table of kinds.
+struct OutputType {
+  enum class Per { kRun, kVehicle, kLidar };
+  OutputKind kind = OutputKind::kOdometry;
+  const char* name = "";    ///< In profiles.
+  Per per = Per::kVehicle;  ///< What there is one of each for.
+  MessageType (*type)() = nullptr;
+  const char* help = "";
+  bool latched = false;
+  bool large = false;  ///< Paced on ROS 2.
+  std::size_t depth = 10;
+};
+
+/// What the optical frame (z ahead, x right, y down) of a camera ends in.
+inline constexpr const char* kOpticalSuffix = "_optical";
+
+/// All kinds, in the order in which they are sent at one instant.
+std::span<const OutputType> output_types();
+
+/// The kind of a name.
+const OutputType& output_type(std::string_view name);
+
+/// One message stream of a run: an output of the profile for one vehicle or LiDAR.
+struct OutputStream {
+  const OutputType* type = nullptr;
+  RosOutput settings;  ///< Names written out.
+  Topic topic;
+  std::size_t vehicle = 0;
+  std::size_t lidar = 0;
+};
+
+/// Names of a vehicle's LiDARs: their model's, with a number where several are alike.
+std::vector<std::string> lidar_names(const VehicleAgent& vehicle);
+
+/// The streams of a profile in a run. Outputs with `{lidar}` in their topic have one for each
+/// LiDAR; without it the first that fits (a camera for depth pictures). Throws InputError where two
+/// streams have one topic but different types.
+std::vector<OutputStream> output_streams(const Simulation& simulation, const RosProfile& profile);
+
+}  // namespace pointflight

@@ -1,0 +1,74 @@
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "pointflight/core/time.hpp"
+#include "pointflight/lidar/scan.hpp"
+#include "ros_common/messages.hpp"
+
+namespace pointflight {
+
+/// How the points of a PointCloud2 lie in memory: what a sensor's ROS driver sends.
+///
+/// To add one: an entry in the table in point_layout.cpp, a test of its fields and values.
+struct PointLayout {
+  /// What a field holds.
+  enum class Source {
+    kX,
+    kY,
+    kZ,
+    kIntensity,
+    kRing,
+    kTag,            ///< Livox: 0x10, a single return of good confidence.
+    kSecondsAfter,   ///< After the cloud's stamp.
+    kNanosAfter,     ///< The same.
+    kAbsoluteNanos,  ///< Since the epoch.
+    kAbsoluteSeconds,
+    kRangeMillimetres,
+    kZero,
+  };
+  struct Field {
+    const char* name;
+    std::uint32_t offset;
+    msg::PointField::Datatype type;
+    Source source;
+  };
+  const char* name;
+  const char* help;
+  std::uint32_t step;  ///< Bytes a point.
+  std::span<const Field> fields;
+  bool timed;  ///< Points have times: stamped with the first one.
+};
+
+/// Layout of a name. Throws InputError with the names there are.
+const PointLayout& point_layout(const std::string& name);
+
+/// All of them.
+std::span<const PointLayout> point_layouts();
+
+/// The instant that a cloud of this scan is stamped with: that of its first point where points have
+/// times (the scan's start without points), else the middle of the scan.
+SimTime cloud_time(const Scan& scan, bool timed);
+
+/// The scan as a cloud: height 1, no NaN, in firing order. Stamps count from `epoch`. Positions are
+/// the sensor's at each point's own time, unless `positions` (one for each point) gives others.
+msg::PointCloud2 cloud_of(const Scan& scan,
+                          const PointLayout& layout,
+                          const std::string& frame,
+                          Duration epoch,
+                          std::span<const Vector3f> positions = {});
+
+/// The same as Livox' CustomMsg: tag 0x10, line = ring.
+msg::CustomMsg custom_cloud_of(const Scan& scan, const std::string& frame, Duration epoch);
+
+/// Bare points as a cloud of a layout without times.
+msg::PointCloud2 cloud_of_points(std::span<const Vector3f> points,
+                                 std::span<const float> intensities,
+                                 const PointLayout& layout);
+
+/// A time of the run as ROS has it.
+msg::Time stamp_of(SimTime time, Duration epoch);
+
+}  // namespace pointflight

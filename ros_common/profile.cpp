@@ -1,0 +1,185 @@
+#include "ros_common/profile.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <array>
+#include <functional>
+
+#include "pointflight/core/input_error.hpp"
+#include "pointflight/core/resources.hpp"
+#include "ros_common/outputs.hpp"
+#include "ros_common/point_layout.hpp"
+
+namespace pointflight {
+namespace {
+
+constexpr std::array<std::string_view, 12> kInputs = {"position",
+                                                      "goal",
+                                                      "velocity",
+                                                      "attitude",
+                                                      "rotors",
+                                                      "joy",
+                                                      "take_off_land",
+                                                      "hover",
+                                                      "pause",
+                                                      "step",
+                                                      "reset",
+                                                      "arm"};
+constexpr std::array<std::string_view, 2> kEpochs = {"fixed", "now"};
+constexpr std::array<std::string_view, 2> kTwists = {"body", "world"};
+constexpr std::array<std::string_view, 2> kImuUnits = {"mps2", "g"};
+constexpr std::array<std::string_view, 2> kGravities = {"up", "down"};
+constexpr std::array<std::string_view, 2> kLivoxPackages = {"livox_ros_driver2",
+                                                            "livox_ros_driver"};
+/// Throws where a kind or layout is unknown; `place` gives file and line of a key.
+void check_names(const std::vector<RosOutput>& outputs,
+                 const std::vector<RosInput>& inputs,
+                 const std::string& prefix,
+                 const std::function<std::string(const std::string&)>& place) {
+  const auto check = [&](const std::string& key,
+                         const std::string& value,
+                         const std::vector<std::string>& known) {
+    if (std::find(known.begin(), known.end(), value) != known.end()) return;
+    const std::string close = closest_word(value, known);
+    throw InputError(fmt::format("{}: {}: '{}' is unknown; {}",
+                                 place(key),
+                                 key,
+                                 value,
+                                 close.empty() ? fmt::format("one of: {}", fmt::join(known, ", "))
+                                               : fmt::format("did you mean '{}'?", close)));
+  };
+  std::vector<std::string> kinds;
+  for (const OutputType& type : output_types()) kinds.emplace_back(type.name);
+  std::vector<std::string> layouts = {"", "livox_custom"};
+  for (const PointLayout& layout : point_layouts()) layouts.emplace_back(layout.name);
+  for (std::size_t i = 0; i < outputs.size(); ++i) {
+    check(fmt::format("{}outputs[{}].kind", prefix, i), outputs[i].kind, kinds);
+    check(fmt::format("{}outputs[{}].layout", prefix, i), outputs[i].layout, layouts);
+  }
+  for (std::size_t i = 0; i < inputs.size(); ++i) {
+    check(fmt::format("{}inputs[{}].kind", prefix, i),
+          inputs[i].kind,
+          {kInputs.begin(), kInputs.end()});
+  }
+}
+
+RosProfile read(SettingsReader& reader, const std::string& path) {
+  RosProfile profile;
+  describe(reader, profile);
+  reader.finish();
+  profile.path = path;
+  check_names(profile.outputs, profile.inputs, "", [&](const std::string& key) {
+    const auto line = reader.lines().find(key);
+    return line == reader.lines().end() ? path : fmt::format("{}:{}", path, line->second);
+  });
+  return profile;
+}
+
+/// Of the kinds that are named in `own`, those instead of `theirs`; open fields stay theirs.
+template <class Entry, class Inherit>
+std::vector<Entry> merged(std::vector<Entry> theirs,
+                          std::vector<Entry> own,
+                          const Inherit& inherit) {
+  for (Entry& entry : own) {
+    const auto base = std::find_if(
+        theirs.begin(), theirs.end(), [&](const Entry& e) { return e.kind == entry.kind; });
+    if (base != theirs.end()) inherit(entry, *base);
+  }
+  std::erase_if(theirs, [&](const Entry& e) {
+    return std::any_of(
+        own.begin(), own.end(), [&](const Entry& entry) { return entry.kind == e.kind; });
+  });
+  theirs.insert(theirs.end(), own.begin(), own.end());
+  return theirs;
+}
+
+}  // namespace
+
+void describe(SettingsVisitor& v, RosProfile& s) {
+  v.value({"title", "", "whose names these are"}, s.title);
+  v.value({"source", "", "where they were read"}, s.source);
+  v.value({"world_frame", "", ""}, s.world_frame);
+  v.value({"body_frame", "", ""}, s.body_frame);
+  v.value({"sensor_frame", "", ""}, s.sensor_frame);
+  v.value({"first_id", "", "number of the first vehicle", 0, 1000}, s.first_id);
+  v.choice({"epoch", "", "stamps from 1.7e9 s on, or from the wall clock's time at the start"},
+           s.epoch,
+           kEpochs);
+  v.choice({"twist", "", "frame of odometry's velocities"}, s.twist, kTwists);
+  v.choice({"imu_unit", "", "of accelerations"}, s.imu_unit, kImuUnits);
+  v.choice({"imu_gravity", "", "sign of gravity in accelerations; down: MARSIM"},
+           s.imu_gravity,
+           kGravities);
+  v.choice({"livox_package", "", "of CustomMsg on ROS 1"}, s.livox_package, kLivoxPackages);
+  v.list({"outputs", "", "what is sent"}, s.outputs, [](SettingsVisitor& w, RosOutput& output) {
+    describe(w, output);
+  });
+  v.list({"inputs", "", "what is read"}, s.inputs, [](SettingsVisitor& w, RosInput& input) {
+    describe(w, input);
+  });
+}
+
+RosProfile load_ros_profile(const std::string& name_or_path, const std::string& base) {
+  const std::string path = find_model("ros_profiles", name_or_path, base);
+  SettingsReader reader(path);
+  return read(reader, path);
+}
+
+RosProfile parse_ros_profile(std::string_view text, const std::string& path) {
+  SettingsReader reader(text, path);
+  return read(reader, path);
+}
+
+RosProfile profile_for(const Scenario& scenario, const std::string& name) {
+  RosProfile profile =
+      name.empty()
+          ? scenario.at("ros.profile",
+                        [&] { return load_ros_profile(scenario.ros.profile, scenario.folder()); })
+          : load_ros_profile(name);
+  check_names(scenario.ros.outputs, scenario.ros.inputs, "ros.", [&](const std::string& key) {
+    return scenario.place(key);
+  });
+  const auto take = [](std::string& own, const std::string& base) {
+    if (own.empty()) own = base;
+  };
+  profile.outputs =
+      merged(profile.outputs, scenario.ros.outputs, [&](RosOutput& own, const RosOutput& base) {
+        take(own.topic, base.topic);
+        take(own.frame, base.frame);
+        take(own.child_frame, base.child_frame);
+        take(own.layout, base.layout);
+        if (own.rate < 0.0) own.rate = base.rate;
+        if (own.resolution <= 0.0) own.resolution = base.resolution;
+      });
+  profile.inputs =
+      merged(profile.inputs, scenario.ros.inputs, [&](RosInput& own, const RosInput& base) {
+        take(own.topic, base.topic);
+      });
+  return profile;
+}
+
+std::string with_names(const std::string& pattern, const RosNames& names) {
+  std::string text;
+  for (std::size_t i = 0; i < pattern.size();) {
+    const auto is = [&](std::string_view word) {
+      return pattern.compare(i, word.size(), word) == 0;
+    };
+    if (is("{vehicle}")) {
+      text += names.vehicle;
+      i += 9;
+    } else if (is("{id}")) {
+      text += std::to_string(names.id);
+      i += 4;
+    } else if (is("{lidar}")) {
+      text += names.lidar;
+      i += 7;
+    } else {
+      text += pattern[i++];
+    }
+  }
+  return text;
+}
+
+}  // namespace pointflight

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "pointflight/core/settings.hpp"
+#include "pointflight/sim/scenario.hpp"
+
+namespace pointflight {
+
+/// Names, frames and customs of a family of programs: `data/ros_profiles/<name>.yaml`.
+struct RosProfile {
+  std::string path;
+  std::string title;
+  std::string source;
+  std::string world_frame = "world";
+  std::string body_frame = "{vehicle}/base_link";
+  std::string sensor_frame = "{vehicle}/{lidar}";
+  std::int64_t first_id = 0;
+  std::string epoch = "fixed";  ///< Of stamps: "fixed" (1.7e9 s and the run's time) or "now".
+  std::string twist = "body";   ///< Odometry's velocities: "body" (REP 105's child frame), "world"
+  std::string imu_unit = "mps2";   ///< or "g", as Livox' driver sends
+  std::string imu_gravity = "up";  ///< At rest +9.81 on z (REP 145); "down": MARSIM's a + g
+  std::string livox_package = "livox_ros_driver2";  ///< ROS 1: of CustomMsg.
+  std::vector<RosOutput> outputs;
+  std::vector<RosInput> inputs;
+};
+
+/// The one list of keys of a profile.
+void describe(SettingsVisitor& visitor, RosProfile& profile);
+
+/// Reads a profile by name ("marsim") or path; relative paths are taken from `base`.
+RosProfile load_ros_profile(const std::string& name_or_path, const std::string& base = {});
+
+/// From text, for tests and fuzzers.
+RosProfile parse_ros_profile(std::string_view text, const std::string& path);
+
+/// The profile that a scenario asks for (or `name`, where it is not empty) with the scenario's own
+/// names in it. Throws InputError with file and line.
+RosProfile profile_for(const Scenario& scenario, const std::string& name = {});
+
+/// What `{vehicle}`, `{id}` and `{lidar}` stand for.
+struct RosNames {
+  std::string vehicle;
+  std::int64_t id = 0;
+  std::string lidar;
+};
+
+/// A topic or frame with its names written out.
+std::string with_names(const std::string& pattern, const RosNames& names);
+
+}  // namespace pointflight

@@ -1,0 +1,311 @@
+// A run's messages as an outlet gets them: which, how often, in which frame, with which numbers.
+#include "ros_common/bridge.hpp"
+
+#include <gtest/gtest.h>
+
+#include <map>
+
+#include "pointflight/core/hash.hpp"
+#include "ros_common/conversion.hpp"
+#include "tests/sim/runs.hpp"
+
+namespace pointflight {
+namespace {
+
+using testing::error_of;
+using testing::expect_contains;
+using testing::hall;
+
+constexpr Duration kEpoch = std::chrono::seconds(1'700'000'000);
+
+/// Keeps what it gets.
+class Keeper : public Outlet {
+ public:
+  explicit Keeper(Wire wire = Wire::kCdr) : wire_(wire) {}
+  [[nodiscard]] Wire wire() const override { return wire_; }
+  int advertise(const Topic& topic) override {
+    topics.push_back(topic);
+    return static_cast<int>(topics.size()) - 1;
+  }
+  [[nodiscard]] bool has_readers(int /*topic*/) const override { return true; }
+  void send(int topic, const Bytes& bytes, std::int64_t time) override {
+    EXPECT_GE(time, last_);
+    last_ = time;
+    sent.push_back({topic, time, bytes});
+    for (const std::byte b : *bytes) all.push_back(b);
+  }
+
+  /// Messages of a topic.
+  template <class M>
+  std::vector<M> of(const std::string& name) const {
+    std::vector<M> messages;
+    for (const Sent& s : sent) {
+      const Topic& topic = topics[static_cast<std::size_t>(s.topic)];
+      if (topic.name != name) continue;
+      EXPECT_EQ(topic.type.md5, message_type<M>().md5) << name;
+      const auto message =
+          wire_ == Wire::kCdr ? decode<Wire::kCdr, M>(*s.bytes) : decode<Wire::kRos1, M>(*s.bytes);
+      EXPECT_TRUE(message) << name;
+      if (message) messages.push_back(*message);
+    }
+    return messages;
+  }
+
+  struct Sent {
+    int topic;
+    std::int64_t time;
+    Bytes bytes;
+  };
+  std::vector<Topic> topics;
+  std::vector<Sent> sent;
+  std::vector<std::byte> all;
+
+ private:
+  Wire wire_;
+  std::int64_t last_ = 0;
+};
+
+/// A flight of a second along x with a Mid-360.
+Scenario flight(double duration = 1.0) {
+  Scenario s = testing::hovering();
+  s.duration = duration;
+  s.vehicles[0].lidars = {LidarMount{}};
+  s.vehicles[0].mission.waypoints = {{14, 6, 3}};
+  s.vehicles[0].start_yaw_deg = 90.0;
+  s.vehicles[0].mission.yaw = "fixed";
+  return s;
+}
+
+void fly(const Scenario& scenario, const RosProfile& profile, Outlet& outlet, int threads = 2) {
+  const Executor executor(threads);
+  Simulation simulation(scenario, hall(), executor);
+  RosBridge bridge(simulation, profile, kEpoch);
+  bridge.add(outlet);
+  bridge.start();
+  while (simulation.step(bridge)) bridge.on_time(simulation.time());
+  bridge.on_time(simulation.time());
+}
+
+double seconds_of(const msg::Time& t) {
+  return t.sec - 1'700'000'000 + 1e-9 * t.nanosec;
+}
+
+TEST(RosBridge, SendsTheDefaultProfile) {
+  Keeper keeper;
+  fly(flight(), load_ros_profile("default"), keeper);
+  const auto odometry = keeper.of<msg::Odometry>("/drone0/odom");
+  ASSERT_EQ(odometry.size(), 201u);
+  EXPECT_EQ(odometry[0].header.frame_id, "world");
+  EXPECT_EQ(odometry[0].child_frame_id, "drone0/base_link");
+  EXPECT_NEAR(seconds_of(odometry[77].header.stamp), 0.385, 1e-9);
+  // it flies along the world's x and looks along y: to its right
+  EXPECT_GT(odometry.back().twist.twist.linear.y, -10.0);
+  EXPECT_LT(odometry.back().twist.twist.linear.y, -0.3);
+  EXPECT_NEAR(odometry.back().twist.twist.linear.x, 0.0, 0.05);
+
+  const auto imu = keeper.of<msg::Imu>("/drone0/imu");
+  ASSERT_EQ(imu.size(), 201u);
+  EXPECT_NEAR(imu[0].linear_acceleration.z, 9.81, 0.3);
+  EXPECT_GT(imu[0].angular_velocity_covariance[0], 0.0);
+
+  const auto clouds = keeper.of<msg::PointCloud2>("/drone0/mid360/points");
+  ASSERT_EQ(clouds.size(), 10u);
+  EXPECT_EQ(clouds[0].header.frame_id, "drone0/mid360");
+  EXPECT_EQ(clouds[0].point_step, 26u);
+  EXPECT_GT(clouds[0].width, 10000u);
+
+  EXPECT_EQ(keeper.of<msg::Clock>("/clock").size(), 201u);
+  EXPECT_EQ(keeper.of<msg::TFMessage>("/tf").size(), 101u);
+  const auto fixed = keeper.of<msg::TFMessage>("/tf_static");
+  ASSERT_EQ(fixed.size(), 1u);
+  ASSERT_EQ(fixed[0].transforms.size(), 1u);
+  EXPECT_EQ(fixed[0].transforms[0].header.frame_id, "drone0/base_link");
+  EXPECT_EQ(fixed[0].transforms[0].child_frame_id, "drone0/mid360");
+  EXPECT_EQ(fixed[0].transforms[0].transform.translation.z, 0.1);
+  const auto map = keeper.of<msg::PointCloud2>("/map");
+  ASSERT_EQ(map.size(), 1u);
+  EXPECT_GT(map[0].width, 10000u);
+  EXPECT_EQ(keeper.of<msg::DiagnosticArray>("/diagnostics").size(), 2u);
+  EXPECT_EQ(keeper.of<msg::Path>("/drone0/path").size(), 6u);
+}
+
+TEST(RosBridge, ImuSamplesThatCoverAScanComeBeforeIt) {
+  Keeper keeper;
+  fly(flight(), load_ros_profile("default"), keeper);
+  double imu_until = 0.0;
+  int scans = 0;
+  for (const auto& s : keeper.sent) {
+    const Topic& topic = keeper.topics[static_cast<std::size_t>(s.topic)];
+    if (topic.name == "/drone0/imu") {
+      imu_until = seconds_of(decode<Wire::kCdr, msg::Imu>(*s.bytes)->header.stamp);
+    } else if (topic.name == "/drone0/mid360/points") {
+      EXPECT_GE(imu_until + 1e-9, 0.1 * ++scans);
+    }
+  }
+  EXPECT_EQ(scans, 10);
+}
+
+TEST(RosBridge, WorldCloudsLieOnTheMap) {
+  Keeper keeper;
+  Scenario scenario = flight();
+  scenario.vehicles[0].lidars[0].noise = false;
+  fly(scenario, load_ros_profile("default"), keeper);
+  const auto clouds = keeper.of<msg::PointCloud2>("/drone0/mid360/points_world");
+  ASSERT_EQ(clouds.size(), 10u);
+  const msg::PointCloud2& cloud = clouds.back();  // taken in motion
+  EXPECT_EQ(cloud.header.frame_id, "world");
+  for (std::size_t i = 0; i < cloud.width; i += 97) {
+    std::array<float, 3> p{};
+    std::memcpy(p.data(), cloud.data.data() + i * cloud.point_step, sizeof p);
+    EXPECT_TRUE(hall()->nearest(Vector3f(p[0], p[1], p[2]).cast<double>(), 0.05)) << i;
+  }
+}
+
+TEST(RosBridge, BothWiresSayTheSame) {
+  Keeper cdr(Wire::kCdr);
+  Keeper ros1(Wire::kRos1);
+  const Executor executor(2);
+  Simulation simulation(flight(0.5), hall(), executor);
+  RosBridge bridge(simulation, load_ros_profile("default"), kEpoch);
+  bridge.add(cdr);
+  bridge.add(ros1);
+  bridge.start();
+  while (simulation.step(bridge)) bridge.on_time(simulation.time());
+  ASSERT_EQ(cdr.sent.size(), ros1.sent.size());
+  const auto a = cdr.of<msg::Odometry>("/drone0/odom");
+  const auto b = ros1.of<msg::Odometry>("/drone0/odom");
+  ASSERT_EQ(a.size(), b.size());
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    EXPECT_EQ(a[i].pose.pose.position.x, b[i].pose.pose.position.x);
+    EXPECT_EQ(a[i].header.stamp, b[i].header.stamp);
+    EXPECT_EQ(b[i].header.seq, i);
+  }
+}
+
+TEST(RosBridge, TheSameBytesDoesNotDependOnThreads) {
+  std::uint64_t first = 0;
+  for (const int threads : {1, 2, 8}) {
+    Keeper keeper;
+    fly(flight(0.4), load_ros_profile("default"), keeper, threads);
+    const std::uint64_t hash = hash64(keeper.all);
+    if (threads == 1) first = hash;
+    EXPECT_EQ(hash, first);
+  }
+}
+
+/// What the table of INTEROP for MARSIM's branch ubuntu20 says.
+TEST(RosBridge, MarsimsGraph) {
+  Keeper keeper(Wire::kRos1);
+  Scenario scenario = flight();
+  scenario.vehicles[0].copies = 2;
+  scenario.obstacles = {testing::passing(1.0)};
+  fly(scenario, load_ros_profile("marsim"), keeper);
+  const struct {
+    const char* topic;
+    const char* type;
+    const char* md5;
+    const char* frame;
+    std::size_t messages;  ///< In a second.
+  } expected[] = {
+      {"/quad_0/lidar_slam/odom",
+       "nav_msgs/Odometry",
+       "cd5e73d190d741a2f92e81eda573aca7",
+       "world",
+       201},
+      {"/quad_1/imu", "sensor_msgs/Imu", "6a62c6daae103f4ff57a132d6f95cec2", "quad_1", 201},
+      {"/quad0_pcl_render_node/cloud",
+       "sensor_msgs/PointCloud2",
+       "1158d486dd51d683ce2f1be655c3c181",
+       "world",
+       10},
+      {"/quad0_pcl_render_node/sensor_cloud",
+       "sensor_msgs/PointCloud2",
+       "1158d486dd51d683ce2f1be655c3c181",
+       "sensor",
+       10},
+      {"/quad0_pcl_render_node/sensor_pose",
+       "geometry_msgs/PoseStamped",
+       "d3812c3cbc69362b77dc0b19b345f8f5",
+       "map",
+       10},
+      {"/quad0_pcl_render_node/depth_img",
+       "sensor_msgs/Image",
+       "060021388200f6f0f447d0fcd9c64743",
+       "sensor",
+       10},
+      {"/quad0_pcl_render_node/dyn_cloud",
+       "sensor_msgs/PointCloud2",
+       "1158d486dd51d683ce2f1be655c3c181",
+       "world",
+       11},
+      {"/quad0_pcl_render_node/uav_cloud",
+       "sensor_msgs/PointCloud2",
+       "1158d486dd51d683ce2f1be655c3c181",
+       "world",
+       201},
+      {"/map_generator/global_cloud",
+       "sensor_msgs/PointCloud2",
+       "1158d486dd51d683ce2f1be655c3c181",
+       "world",
+       1},
+      {"/quad0_odom_visualization/robot",
+       "visualization_msgs/Marker",
+       "4048c9de2a16f4ae8e0538085ebf1b97",
+       "world",
+       201},
+  };
+  for (const auto& e : expected) {
+    std::size_t messages = 0;
+    std::string frame;
+    const Topic* topic = nullptr;
+    for (const auto& s : keeper.sent) {
+      const Topic& t = keeper.topics[static_cast<std::size_t>(s.topic)];
+      if (t.name != e.topic) continue;
+      topic = &t;
+      ++messages;
+      // header first: seq, stamp, frame
+      std::uint32_t size = 0;
+      std::memcpy(&size, s.bytes->data() + 12, 4);
+      frame.assign(reinterpret_cast<const char*>(s.bytes->data() + 16), size);
+    }
+    ASSERT_NE(topic, nullptr) << e.topic;
+    EXPECT_EQ(topic->type.ros1_name(), e.type) << e.topic;
+    EXPECT_EQ(topic->type.md5, e.md5) << e.topic;
+    EXPECT_EQ(frame, e.frame) << e.topic;
+    EXPECT_NEAR(static_cast<double>(messages), static_cast<double>(e.messages), 1.0) << e.topic;
+  }
+  // velocities in the world
+  const auto odometry = keeper.of<msg::Odometry>("/quad_0/lidar_slam/odom");
+  EXPECT_GT(odometry.back().twist.twist.linear.x, 0.3);
+  EXPECT_EQ(odometry[0].child_frame_id, "");
+  // the map's points as MARSIM packs them, clouds as well
+  const auto map = keeper.of<msg::PointCloud2>("/map_generator/global_cloud");
+  EXPECT_EQ(map[0].point_step, 16u);
+  EXPECT_EQ(map[0].point_fields.size(), 3u);
+  const auto cloud = keeper.of<msg::PointCloud2>("/quad0_pcl_render_node/cloud");
+  EXPECT_EQ(cloud[0].point_step, 32u);
+  EXPECT_EQ(cloud[0].point_fields[3].offset, 16u);
+}
+
+TEST(RosBridge, SettingsOfAProfile) {
+  RosProfile profile = parse_ros_profile(
+      "imu_unit: g\nimu_gravity: down\noutputs:\n  - {kind: imu, topic: /imu, rate: 50}\n"
+      "  - {kind: cloud, topic: /livox/lidar, layout: livox_custom, rate: 5}\n",
+      "p.yaml");
+  Keeper keeper;
+  fly(flight(), profile, keeper);
+  const auto imu = keeper.of<msg::Imu>("/imu");
+  ASSERT_EQ(imu.size(), 51u);
+  EXPECT_NEAR(imu[0].linear_acceleration.z, -1.0, 0.03);
+  const auto clouds = keeper.of<msg::CustomMsg>("/livox/lidar");
+  ASSERT_EQ(clouds.size(), 5u);
+  EXPECT_GT(clouds[0].point_num, 10000u);
+  // one name for two kinds of message
+  profile.outputs[1].topic = "/imu";
+  const Executor executor(1);
+  const Simulation simulation(flight(), hall(), executor);
+  expect_contains(error_of([&] { RosBridge(simulation, profile, kEpoch); }), "/imu would carry");
+}
+
+}  // namespace
+}  // namespace pointflight
