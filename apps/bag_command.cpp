@@ -6,13 +6,15 @@
 #include <memory>
 
 #include "apps/commands.hpp"
+#include "apps/modules.hpp"
 #include "recording/mcap_reader.hpp"
 
 namespace pointflight::apps {
 namespace {
 
 void show(const std::string& path) {
-  const RecordingInfo info = read_mcap(path);
+  const bool is_bag = path.ends_with(".bag") || path.ends_with(".bag.active");
+  const RecordingInfo info = is_bag ? ros1_module().read_bag(path) : read_mcap(path);
   const double seconds = 1e-9 * static_cast<double>(info.end - info.start);
   fmt::print("{}\n", path);
   fmt::print("  format       {}{}\n",
@@ -20,10 +22,10 @@ void show(const std::string& path) {
              info.library.empty() ? "" : fmt::format(", written by {}", info.library));
   fmt::print("  complete     {}\n",
              info.complete ? "yes" : "no: cut short; what follows is what can be read");
-  fmt::print("  messages     {} in {} chunks ({})\n",
+  fmt::print("  messages     {}{}\n",
              info.messages,
-             info.chunks,
-             info.compression.empty() ? "none" : info.compression);
+             info.chunks > 0 ? fmt::format(" in {} chunks ({})", info.chunks, info.compression)
+                             : std::string());
   if (info.messages > 0) {
     fmt::print("  time         {:.3f} to {:.3f}, {:.3f} s\n",
                1e-9 * static_cast<double>(info.start),
@@ -46,7 +48,8 @@ void add_bag_command(CLI::App& parent, int& /*exit_code*/) {
   app->require_subcommand(1);
   auto* info = app->add_subcommand("info", "What is in a recording");
   auto path = std::make_shared<std::string>();
-  info->add_option("file", *path, "A .mcap, or a .mcap.active that was cut short")->required();
+  info->add_option("file", *path, "A .mcap or .bag, or a .mcap.active that was cut short")
+      ->required();
   info->callback([path] { show(*path); });
 }
 

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <thread>
 
 #include "apps/commands.hpp"
@@ -28,7 +29,7 @@ using Clock = std::chrono::steady_clock;
 struct FlyFlags {
   std::string input;
   std::string output;
-  std::string rate = "max";
+  std::string rate;  ///< Empty: real time with ROS, else as fast as it goes.
   std::int64_t seed = -1;
   int threads = 0;
   bool force = false;
@@ -69,16 +70,23 @@ class Pace {
  public:
   explicit Pace(double rate) : rate_(rate) {}
 
+  /// After a pause: from here on.
+  void restart_at(SimTime time) {
+    start_ = Clock::now();
+    from_ = time;
+  }
+
   void wait_for(SimTime time) const {
     if (rate_ <= 0.0) return;
     const auto due = start_ + std::chrono::duration_cast<Clock::duration>(
-                                  std::chrono::duration<double>(to_seconds(time) / rate_));
+                                  std::chrono::duration<double>(to_seconds(time - from_) / rate_));
     if (due - Clock::now() > std::chrono::milliseconds(2)) std::this_thread::sleep_until(due);
   }
 
  private:
   double rate_;
   Clock::time_point start_ = Clock::now();
+  SimTime from_;
 };
 
 double parse_rate(const std::string& text) {
@@ -97,6 +105,8 @@ Scenario load_input(const FlyFlags& flags, const Executor& executor) {
   Scenario scenario =
       make_scenario(flags.input, flags.input, "mid360", "quad_330", 60.0, 2.0, executor);
   scenario.path.clear();
+  // somebody else will say where to fly
+  if (flags.ros.is_live()) scenario.vehicles.front().mission.waypoints.clear();
   return scenario;
 }
 
@@ -191,12 +201,13 @@ void print_vehicle(const Simulation& simulation, std::size_t v) {
 }
 
 void print_result(const FlyFlags& flags, const Simulation& simulation, double wall) {
-  fmt::print("{}\n", flags.output);
+  fmt::print("{}\n", flags.output.empty() ? flags.input : flags.output);
   fmt::print("  end               {}, after {:.1f} s\n",
              to_string(simulation.end()),
              to_seconds(simulation.time()));
   for (std::size_t v = 0; v < simulation.vehicle_count(); ++v) print_vehicle(simulation, v);
   fmt::print("  real-time factor  {:.1f}\n", to_seconds(simulation.time()) / wall);
+  if (flags.output.empty()) return;
   fmt::print("  picture           {}\n", (fs::path(flags.output) / "overview.png").string());
 }
 
@@ -211,9 +222,45 @@ int exit_code_of(RunEnd end) {
   }
 }
 
+/// Files and picture of a run; nothing without a folder.
+class RunFiles {
+ public:
+  RunFiles(const FlyFlags& flags, const Simulation& simulation) : flags_(flags) {
+    if (flags.output.empty()) return;
+    if (flags.force) clear_earlier_run(flags, simulation);
+    recorder_.emplace(flags.output, simulation);
+    sinks_.add(*recorder_);
+    sinks_.add(picture_);
+  }
+
+  [[nodiscard]] SampleSink& sink() { return ended_ ? nothing_ : sinks_; }
+
+  /// The run starts again, which its files cannot: they end here.
+  void end(const Simulation& simulation) {
+    if (ended_ || !recorder_) return;
+    ended_ = true;
+    describe_run(simulation, picture_);
+    draw_overview(simulation.map(), picture_, (fs::path(flags_.output) / "overview.png").string());
+    recorder_->finish(simulation);
+  }
+
+ private:
+  const FlyFlags& flags_;
+  std::optional<FlightRecorder> recorder_;
+  RunPicture picture_;
+  SampleSplitter sinks_;
+  SampleSink nothing_;
+  bool ended_ = false;
+};
+
 int fly(const FlyFlags& flags) {
-  const double rate = parse_rate(flags.rate);
-  check_folder(flags);
+  if (flags.output.empty() && !flags.ros.any()) {
+    throw InputError("give a folder for the results with -o, or --ros1 or --record");
+  }
+  // others live on the wall clock
+  const double rate =
+      parse_rate(flags.rate.empty() ? (flags.ros.is_live() ? "1.0" : "max") : flags.rate);
+  if (!flags.output.empty()) check_folder(flags);
   const Executor executor(flags.threads);
   Scenario scenario = load_input(flags, executor);
   if (flags.seed >= 0) scenario.seed = flags.seed;
@@ -224,26 +271,35 @@ int fly(const FlyFlags& flags) {
   prepare_for_ros(flags.ros, scenario);
   Simulation simulation(scenario, map, executor);
   warn_about(scenario, *map);
-  if (flags.force) clear_earlier_run(flags, simulation);
 
-  FlightRecorder recorder(flags.output, simulation);
-  RunPicture picture;
+  RunFiles files(flags, simulation);
   CollisionLog collisions(simulation);
-  SampleSplitter sink;
-  for (SampleSink* each : {static_cast<SampleSink*>(&recorder),
-                           static_cast<SampleSink*>(&picture),
-                           static_cast<SampleSink*>(&collisions)}) {
-    sink.add(*each);
-  }
-  RosSession ros(flags.ros, simulation);
-  if (ros.sink() != nullptr) sink.add(*ros.sink());
-  ros.start();
   catch_interrupts();
+  RosSession ros(flags.ros, simulation);
   const Progress progress = terminal_progress();
-  const Pace pace(rate);
+  const SimulationState at_start = simulation.state();
+  if (!ros.start()) return kInterrupted;
+  Pace pace(rate);
   const auto start = Clock::now();
-  while (simulation.step(sink)) {
-    ros.on_time(simulation.time());
+  for (bool running = true; running;) {
+    SampleSplitter sink;
+    sink.add(files.sink());
+    sink.add(collisions);
+    if (ros.sink() != nullptr) sink.add(*ros.sink());
+    running = simulation.step(sink);
+    RosSession::Next next = ros.after_step();
+    while (next == RosSession::Next::kWait && !interrupted()) {
+      next = ros.after_step();
+      pace.restart_at(simulation.time());
+    }
+    if (next == RosSession::Next::kReset) {
+      files.end(simulation);
+      const SimTime reached = simulation.time();
+      simulation.restore(at_start);
+      ros.was_reset(reached);
+      pace.restart_at(simulation.time());
+      running = true;
+    }
     if (interrupted()) simulation.interrupt();
     pace.wait_for(simulation.time());
     if (simulation.time().time_since_epoch() % std::chrono::milliseconds(100) == Duration{0}) {
@@ -253,10 +309,8 @@ int fly(const FlyFlags& flags) {
   const double wall = std::chrono::duration<double>(Clock::now() - start).count();
   end_progress();
   ros.close();
-  write_timing(flags, simulation, wall, executor.threads());
-  describe_run(simulation, picture);
-  draw_overview(*map, picture, (fs::path(flags.output) / "overview.png").string());
-  recorder.finish(simulation);
+  if (!flags.output.empty()) write_timing(flags, simulation, wall, executor.threads());
+  files.end(simulation);
   print_result(flags, simulation, wall);
   return exit_code_of(simulation.end());
 }
@@ -267,11 +321,12 @@ void add_fly_command(CLI::App& parent, int& exit_code) {
   auto* app = parent.add_subcommand("fly", "Fly a scenario, or a map in a scenario made up for it");
   auto flags = std::make_shared<FlyFlags>();
   app->add_option("scenario", flags->input, "A scenario .yaml, or a .pfmap")->required();
-  app->add_option("-o,--output", flags->output, "Folder for the results")->required();
+  app->add_option("-o,--output", flags->output, "Folder for the results; needed without ROS");
   app->add_option("--seed", flags->seed, "Instead of the scenario's")
       ->check(CLI::Range(std::int64_t{0}, std::int64_t{9000000000000000}));
-  app->add_option("--rate", flags->rate, "Simulated seconds a second: 'max', or 1.0 for real time")
-      ->capture_default_str();
+  app->add_option("--rate",
+                  flags->rate,
+                  "Simulated seconds a second: 'max', or 1.0 for real time (the default with ROS)");
   app->add_option("--threads", flags->threads, "0: all cores; results never depend on it")
       ->check(CLI::Range(0, 1024));
   app->add_flag("--force", flags->force, "Write into a folder that is not empty");

@@ -6,9 +6,11 @@
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
 #include <algorithm>
-#include <chrono>
 #include <filesystem>
+#include <thread>
 
+#include "apps/flags.hpp"
+#include "apps/modules.hpp"
 #include "apps/terminal.hpp"
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/core/mapped_file.hpp"
@@ -21,10 +23,7 @@ namespace fs = std::filesystem;
 
 /// Some ROS programs misread times near zero: runs start here unless told otherwise.
 constexpr Duration kFixedEpoch = std::chrono::seconds(1'700'000'000);
-
-bool is_on(const RosFlags& flags) {
-  return !flags.records.empty();
-}
+constexpr double kEndless = 1e6;  // s
 
 /// Of a flag or a scenario's key: "now", or seconds since 1970.
 Duration epoch_from(const std::string& text, const std::string& place) {
@@ -48,82 +47,217 @@ Duration epoch_of(const RosFlags& flags, const Scenario& scenario, const RosProf
     return epoch_from(scenario.ros.epoch, scenario.place("ros.epoch"));
   }
   // recordings by themselves are the same each time
-  const bool live = false;
-  return live && profile.epoch == "now" ? epoch_from("now", "") : kFixedEpoch;
+  return flags.is_live() && profile.epoch == "now" ? epoch_from("now", "") : kFixedEpoch;
+}
+
+/// The file that a scenario came from, or the scenario as a file.
+std::string text_of(const Scenario& scenario) {
+  if (scenario.path.empty()) return scenario_yaml(scenario);
+  const MappedFile file(scenario.path);
+  const auto bytes = file.bytes();
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
 }  // namespace
 
+/// Counts scans, for lockstep.
+class RosSession::ScanCount : public SampleSink {
+ public:
+  void on_scan(const Scan& /*scan*/, const PoseAt& /*pose_at*/) override { ++scans; }
+  std::uint64_t scans = 0;
+  std::uint64_t answered = 0;
+};
+
 void add_ros_flags(CLI::App& app, RosFlags& flags) {
+  app.add_flag("--ros1", flags.ros1, "Publish to ROS 1 and take commands from it, in real time");
+  app.add_option("--profile",
+                 flags.profile,
+                 "Names of messages: default, marsim, ego, livox, ... or a path (docs/ros.md)");
+  app.add_option("--epoch", flags.epoch, "Stamps start 'now', or at seconds since 1970");
+  app.add_option("--node", flags.node, "Name of the ROS node")->capture_default_str();
+  app.add_flag("--no-wait", flags.no_wait, "Fly even while there is no ROS 1 master yet");
+  app.add_option("--lockstep",
+                 flags.lockstep,
+                 "Wait after each scan for a command, so many seconds at most")
+      ->check(within(0.0, 3600.0));
   app.add_option("--record",
                  flags.records,
-                 "Record all messages into FILE.mcap (as ROS 2); may be given again")
+                 "Record all messages into FILE.mcap (ROS 2) or FILE.bag (ROS 1); again for more")
       ->type_name("FILE")
       ->expected(1)
       ->take_all();
   app.add_option("--compression", flags.compression, "Of recordings: zstd, lz4 or none")
       ->check(CLI::IsMember({"zstd", "lz4", "none"}))
       ->capture_default_str();
-  app.add_option("--profile",
-                 flags.profile,
-                 "Names of messages: default, marsim, ego, livox, ... or a path (docs/ros.md)");
-  app.add_option("--epoch", flags.epoch, "Stamps start 'now', or at seconds since 1970");
 }
 
 void prepare_for_ros(const RosFlags& flags, Scenario& scenario) {
-  if (!is_on(flags)) return;
+  if (!flags.any()) return;
   const RosProfile profile = profile_for(scenario, flags.profile);
   scenario.output.odometry_rate =
       std::max(scenario.output.odometry_rate, RosBridge::odometry_rate(profile));
+  const bool planned = std::any_of(
+      scenario.vehicles.begin(), scenario.vehicles.end(), [](const VehicleSetup& vehicle) {
+        return !vehicle.mission.waypoints.empty() || !vehicle.commands.empty();
+      });
+  if (flags.is_live() && !planned && scenario.duration <= 0.0) scenario.duration = kEndless;
 }
 
-RosSession::RosSession(const RosFlags& flags, const Simulation& simulation) {
-  if (!is_on(flags)) return;
+RosSession::RosSession(const RosFlags& flags, Simulation& simulation)
+    : flags_(flags), simulation_(simulation) {
+  if (!flags.any()) return;
   const Scenario& scenario = simulation.scenario();
   const RosProfile profile = profile_for(scenario, flags.profile);
   const Duration epoch = epoch_of(flags, scenario, profile);
   bridge_ = std::make_unique<RosBridge>(simulation, profile, epoch);
   for (const std::string& path : flags.records) {
-    if (fs::path(path).extension() != ".mcap") {
-      throw InputError(fmt::format("--record: {}: give a name that ends in .mcap", path));
-    }
     if (std::find(paths_.begin(), paths_.end(), path) != paths_.end()) {
       throw InputError(fmt::format("--record: {} is given twice", path));
     }
-    McapOptions options;
-    options.compression = flags.compression;
-    auto writer = std::make_unique<McapWriter>(path, options);
-    if (!scenario.path.empty()) {
-      const MappedFile file(scenario.path);
-      const auto bytes = file.bytes();
-      writer->attach("scenario.yaml",
-                     "application/yaml",
-                     {reinterpret_cast<const char*>(bytes.data()), bytes.size()},
-                     epoch.count());
+    const std::string extension = fs::path(path).extension().string();
+    if (extension == ".mcap") {
+      McapOptions options;
+      options.compression = flags.compression;
+      auto writer = std::make_unique<McapWriter>(path, options);
+      writer->attach("scenario.yaml", "application/yaml", text_of(scenario), epoch.count());
+      recordings_.push_back(std::move(writer));
+    } else if (extension == ".bag") {
+      // bags know no zstd
+      const std::string compression = flags.compression == "zstd" ? "lz4" : flags.compression;
+      recordings_.push_back(ros1_module().bag_writer(path, compression));
     } else {
-      writer->attach("scenario.yaml", "application/yaml", scenario_yaml(scenario), epoch.count());
+      throw InputError(fmt::format("--record: {}: give a name that ends in .mcap or .bag", path));
     }
     paths_.push_back(path);
-    outlets_.push_back(std::move(writer));
-    bridge_->add(*outlets_.back());
+    bridge_->add(*recordings_.back());
   }
+  TransportOptions options;
+  options.node = flags.node;
+  options.log = [](const std::string& text) { log(text); };
+  if (flags.ros1) transports_.push_back(ros1_module().transport(options));
+  inbox_ = std::make_unique<Inbox>(simulation, profile);
+  for (const auto& transport : transports_) {
+    bridge_->add(*transport);
+    inbox_->connect(*transport);
+  }
+  scans_ = std::make_unique<ScanCount>();
+  splitter_ = std::make_unique<SampleSplitter>();
+  splitter_->add(*bridge_);
+  splitter_->add(*scans_);
 }
 
 RosSession::~RosSession() = default;
 
-void RosSession::start() {
-  if (bridge_) bridge_->start();
+SampleSink* RosSession::sink() {
+  return splitter_.get();
 }
 
-void RosSession::on_time(SimTime time) {
-  if (bridge_) bridge_->on_time(time);
+bool RosSession::start() {
+  if (!bridge_) return true;
+  bridge_->start();
+  while (!flags_.no_wait && std::any_of(transports_.begin(), transports_.end(), [](const auto& t) {
+    return !t->is_connected();
+  })) {
+    if (interrupted()) return false;
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  return true;
+}
+
+RosSession::Next RosSession::after_step() {
+  if (!bridge_) return Next::kStep;
+  if (!paused_ || step_once_) {
+    bridge_->on_time(simulation_.time());
+    if (flags_.lockstep > 0.0 && scans_->scans > scans_->answered) wait_for_answer();
+    if (step_once_ && scans_->scans > scans_->answered) step_once_ = false;
+    scans_->answered = scans_->scans;
+  }
+  take_orders();
+  if (std::exchange(reset_, false)) return Next::kReset;
+  if (!paused_ || step_once_) return Next::kStep;
+  bridge_->repeat_clock();
+  std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  return Next::kWait;
+}
+
+void RosSession::take_orders() {
+  for (const Order& order : inbox_->take()) {
+    if (const auto* vehicle = std::get_if<VehicleOrder>(&order)) {
+      simulation_.command(vehicle->vehicle, vehicle->command);
+      answers_ += vehicle->is_answer ? 1 : 0;
+    } else if (const auto* pause = std::get_if<PauseOrder>(&order)) {
+      if (paused_ != pause->pause) log(pause->pause ? "paused" : "going on");
+      paused_ = pause->pause;
+    } else if (std::holds_alternative<StepOrder>(order)) {
+      step_once_ = paused_;
+    } else {
+      reset_ = true;
+    }
+  }
+  say_troubles();
+}
+
+void RosSession::wait_for_answer() {
+  using Clock = std::chrono::steady_clock;
+  const std::uint64_t before = answers_;
+  const auto until = Clock::now() + std::chrono::duration<double>(flags_.lockstep);
+  while (answers_ == before && !paused_ && !reset_ && !interrupted()) {
+    if (Clock::now() > until) {
+      if (late_answers_++ == 0) {
+        log(fmt::format(
+            "warning: no command within {} s of the scan at {:.1f} s; flying on (said once)",
+            flags_.lockstep,
+            to_seconds(simulation_.time())));
+      }
+      return;
+    }
+    std::this_thread::sleep_for(std::chrono::microseconds(200));
+    take_orders();
+  }
+}
+
+/// The first of each kind at once, their number in the end.
+void RosSession::say_troubles() {
+  const std::uint64_t malformed = inbox_->malformed();
+  if (malformed > 0 && said_malformed_ == 0) {
+    said_malformed_ = malformed;
+    log(fmt::format("warning: {}; left out (said once, counted)", inbox_->last_reason()));
+  }
+  if (said_rejected_ > 0) return;
+  for (std::size_t v = 0; v < simulation_.vehicle_count(); ++v) {
+    const AutopilotState& autopilot = simulation_.status(v).autopilot;
+    if (autopilot.rejected == 0) continue;
+    said_rejected_ = autopilot.rejected;
+    log(fmt::format("warning: {}: {}; not taken (said once, counted)",
+                    simulation_.vehicle(v).setup().name,
+                    autopilot.last_rejection));
+    return;
+  }
+}
+
+void RosSession::was_reset(SimTime reached) {
+  // stamps never go back: others would drop everything
+  bridge_->shift_epoch(reached.time_since_epoch() + std::chrono::seconds(1));
+  log("reset: at the start again; stamps go on");
 }
 
 void RosSession::close() {
-  for (std::size_t i = 0; i < outlets_.size(); ++i) {
-    outlets_[i]->close();
+  for (std::size_t i = 0; i < recordings_.size(); ++i) {
+    recordings_[i]->close();
     log(fmt::format(
         "recorded {}, {:.1f} MB", paths_[i], 1e-6 * static_cast<double>(fs::file_size(paths_[i]))));
+  }
+  for (const auto& transport : transports_) {
+    transport->close();
+    if (transport->dropped() > 0) {
+      log(fmt::format("{} messages were dropped for slow subscribers", transport->dropped()));
+    }
+  }
+  if (inbox_ && inbox_->malformed() > 0) {
+    log(fmt::format("{} malformed messages were left out", inbox_->malformed()));
+  }
+  if (late_answers_ > 0) {
+    log(fmt::format("{} scans had no command within {} s", late_answers_, flags_.lockstep));
   }
 }
 

@@ -1,45 +1,84 @@
 #pragma once
 
 #include <CLI/App.hpp>
+#include <chrono>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "ros_common/bridge.hpp"
+#include "ros_common/inputs.hpp"
 
 namespace pointflight::apps {
 
 /// Flags of `fly` for ROS and recordings.
 struct RosFlags {
+  bool ros1 = false;
+  std::string node = "pointflight";
+  bool no_wait = false;              ///< Fly on without a master.
   std::string profile;               ///< Empty: the scenario's.
   std::string epoch;                 ///< Empty: the scenario's or profile's.
+  double lockstep = 0.0;             ///< Wait so long for an answer to each scan, s; 0: not at all.
   std::vector<std::string> records;  ///< Files.
   std::string compression = "zstd";
+
+  /// Somebody outside may listen and command.
+  [[nodiscard]] bool is_live() const { return ros1; }
+  [[nodiscard]] bool any() const { return is_live() || !records.empty(); }
 };
 
 void add_ros_flags(CLI::App& app, RosFlags& flags);
 
-/// What a profile needs of a scenario: samples as often as it sends them. Throws InputError.
+/// What a profile needs of a scenario: samples as often as it sends them; a flight that nobody has
+/// planned goes on until it is interrupted. Throws InputError.
 void prepare_for_ros(const RosFlags& flags, Scenario& scenario);
 
-/// The recordings of a flight, and the bridge that feeds them.
+/// ROS and the recordings of a flight, the bridge that feeds them, and what they ask for.
 class RosSession {
  public:
   /// Opens everything that the flags ask for. Throws InputError.
-  RosSession(const RosFlags& flags, const Simulation& simulation);
+  RosSession(const RosFlags& flags, Simulation& simulation);
   ~RosSession();
 
   /// Where samples go, or null where nothing was asked for.
-  [[nodiscard]] SampleSink* sink() { return bridge_.get(); }
-  void start();
-  void on_time(SimTime time);
-  /// Recordings get their names; says what was recorded.
+  [[nodiscard]] SampleSink* sink();
+  /// Connects; waits for a master where there is none yet. False where it was interrupted.
+  bool start();
+
+  /// What has to be done before the next step.
+  enum class Next { kStep, kWait, kReset };
+  /// Call after each step: sends what follows the clock, gives commands to the vehicles, waits for
+  /// a planner in lockstep. `kWait`: paused; ask again.
+  Next after_step();
+
+  /// After the simulation was set back to its start.
+  void was_reset(SimTime reached);
+
+  /// Recordings get their names; says what was recorded, and what went wrong.
   void close();
 
  private:
+  class ScanCount;
+  void take_orders();
+  void wait_for_answer();
+  void say_troubles();
+
+  RosFlags flags_;
+  Simulation& simulation_;
   std::vector<std::string> paths_;
-  std::vector<std::unique_ptr<Outlet>> outlets_;
+  std::vector<std::unique_ptr<Outlet>> recordings_;
+  std::vector<std::unique_ptr<Transport>> transports_;
   std::unique_ptr<RosBridge> bridge_;
+  std::unique_ptr<ScanCount> scans_;
+  std::unique_ptr<SampleSplitter> splitter_;
+  std::unique_ptr<Inbox> inbox_;
+  bool paused_ = false;
+  bool step_once_ = false;
+  bool reset_ = false;
+  std::uint64_t answers_ = 0;
+  std::uint64_t late_answers_ = 0;
+  std::uint64_t said_malformed_ = 0;
+  std::uint64_t said_rejected_ = 0;
 };
 
 }  // namespace pointflight::apps

@@ -7,27 +7,9 @@
 #include <string>
 #include <vector>
 
-namespace pointflight {
+#include "ros_common/wire.hpp"
 
-/// What is in a recording.
-struct RecordingInfo {
-  struct Topic {
-    std::string name, type;
-    std::uint64_t messages = 0;
-  };
-  struct Attachment {
-    std::string name, media_type;
-    std::uint64_t size = 0;
-  };
-  std::string format;       ///< "MCAP, profile ros2", "ROS 1 bag 2.0"
-  std::string library;      ///< What wrote it, if it says so.
-  std::string compression;  ///< "zstd", "lz4", "none"; several with commas.
-  std::uint64_t messages = 0, chunks = 0;
-  std::int64_t start = 0, end = 0;  ///< ns since the Unix epoch, of the first and last message.
-  std::vector<Topic> topics;        ///< By name.
-  std::vector<Attachment> attachments;
-  bool complete = true;  ///< False: cut short, what is counted is what can be read.
-};
+namespace pointflight {
 
 /// A message of a recording; valid during the callback.
 struct RecordedMessage {

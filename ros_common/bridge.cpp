@@ -205,6 +205,13 @@ void RosBridge::on_time(SimTime time) {
   }
 }
 
+void RosBridge::repeat_clock() {
+  for (const auto& stream : streams_) {
+    if (stream->type->kind != OutputKind::kClock || !is_wanted(*stream)) continue;
+    send(*stream, msg::Clock{stamp_of(latest_, epoch_)}, latest_);
+  }
+}
+
 void RosBridge::on_odometry(const OdometrySample& sample) {
   for (const auto& s : streams_) {
     Stream& stream = *s;

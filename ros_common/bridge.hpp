@@ -28,6 +28,8 @@ class RosBridge : public SampleSink {
 
   /// The run has reached a time: sends what follows the clock. Call after each step.
   void on_time(SimTime time);
+  /// The clock once more, for a run that is paused.
+  void repeat_clock();
   void on_odometry(const OdometrySample& sample) override;
   void on_imu(std::uint32_t vehicle, const ImuSample& sample) override;
   void on_scan(const Scan& scan, const PoseAt& pose_at) override;

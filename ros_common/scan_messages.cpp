@@ -135,9 +135,11 @@ MapCloud map_cloud(const SurfelMap& map, double resolution, std::size_t points_m
     map.for_each_surfel([&](const Vector3d& center, const Vector3d&, double, std::uint32_t word) {
       if (cloud.points.size() > points_max) return;
       const Vector3d cell = ((center - low) / cloud.resolution).array().floor();
-      const auto key = static_cast<std::uint64_t>(cell.x()) |
-                       static_cast<std::uint64_t>(cell.y()) << 21 |
-                       static_cast<std::uint64_t>(cell.z()) << 42;
+      // stored centres may lie a little outside of the bounds
+      const auto index = [&](int axis) {
+        return static_cast<std::uint64_t>(static_cast<std::int64_t>(cell[axis]) + 1);
+      };
+      const std::uint64_t key = index(0) | index(1) << 21 | index(2) << 42;
       if (!all && !taken.insert(key).second) return;
       cloud.points.emplace_back(center.cast<float>());
       cloud.intensities.push_back(map.intensity(word));

@@ -72,4 +72,58 @@ class Outlet {
   virtual void close() {}
 };
 
+/// A ROS: messages go out and come in.
+class Transport : public Outlet {
+ public:
+  /// Calls `on_message` for what is sent on a topic, from a thread of its own; what this transport
+  /// sends itself is left out. ROS 1: of whatever definition the sender has (`Received`).
+  virtual void subscribe(const Topic& topic, std::function<void(const Received&)> on_message) = 0;
+
+  /// True once it has found the ROS it belongs to (ROS 1: a master).
+  virtual bool is_connected() const = 0;
+
+  /// Messages that were dropped because somebody was too slow to take them.
+  virtual std::uint64_t dropped() const { return 0; }
+};
+
+struct TransportOptions {
+  std::string node = "pointflight";
+  bool localhost_only = false;                  ///< ROS 2.
+  bool shared_memory = false;                   ///< ROS 2.
+  std::function<void(const std::string&)> log;  ///< Lines for the user, from any thread.
+};
+
+/// What is in a recording.
+struct RecordingInfo {
+  struct Topic {
+    std::string name, type;
+    std::uint64_t messages = 0;
+  };
+  struct Attachment {
+    std::string name, media_type;
+    std::uint64_t size = 0;
+  };
+  std::string format;       ///< "MCAP, profile ros2", "ROS 1 bag 2.0"
+  std::string library;      ///< What wrote it, if it says so.
+  std::string compression;  ///< "zstd", "lz4", "none"; several with commas.
+  std::uint64_t messages = 0, chunks = 0;
+  std::int64_t start = 0, end = 0;  ///< ns since the Unix epoch, of the first and last message.
+  std::vector<Topic> topics;        ///< By name.
+  std::vector<Attachment> attachments;
+  bool complete = true;  ///< False: cut short, what is counted is what can be read.
+};
+
+/// What the ROS 1 module gives; errors are std::runtime_error with words for the user.
+struct Ros1Module {
+  std::unique_ptr<Transport> (*transport)(const TransportOptions& options);
+  /// A .bag by Debian's rosbag; compression "lz4", "bz2" or "none".
+  std::unique_ptr<Outlet> (*bag_writer)(const std::string& path, const std::string& compression);
+  RecordingInfo (*read_bag)(const std::string& path);
+};
+
+/// What the ROS 2 module gives.
+struct Ros2Module {
+  std::unique_ptr<Transport> (*transport)(const TransportOptions& options);
+};
+
 }  // namespace pointflight

@@ -70,7 +70,7 @@ struct Finite {
     for (const double limit : {m.speed, m.acceleration, m.jerk, c.mission.yaw_rate_deg}) {
       if (!all(limit) || limit <= 0.0) return false;
     }
-    return all(c.mission.hold) && c.mission.hold >= 0.0;
+    return all(c.mission.hold) && c.mission.hold >= 0.0 && all(c.mission.final_yaw.value_or(0.0));
   }
   bool operator()(const TakeOffCommand& c) const {
     return all(c.height) && c.speed > 0.0 && all(c.speed);
@@ -110,6 +110,20 @@ class Climb : public Trajectory {
   double yaw_;
   SmoothMove move_;
 };
+
+/// The velocity in the world and the heading that it goes with.
+VelocityCommand in_world(const VelocityCommand& command,
+                         const AutopilotState& state,
+                         const RigidBodyState& body,
+                         double dt) {
+  VelocityCommand world = command;
+  if (command.turn) world.yaw = wrap_angle(state.reference.yaw + command.yaw_rate * dt);
+  if (command.in_body) {
+    const Quaterniond level = quaternion_from_rpy(0.0, 0.0, yaw_of(body.q_world_body));
+    world.v_world = level * command.v_world;
+  }
+  return world;
+}
 
 }  // namespace
 
@@ -177,7 +191,11 @@ std::optional<std::string> Autopilot::give(AutopilotState& state,
   if (const auto* c = std::get_if<TrajectoryCommand>(&command)) {
     state.trajectory = c->trajectory;
   } else if (const auto* w = std::get_if<WaypointCommand>(&command)) {
-    state.trajectory = std::make_shared<Mission>(from, yaw, w->mission);
+    MissionSettings mission = w->mission;
+    for (Vector3d& p : mission.waypoints) {
+      if (w->keep_height) p.z() = from.z();
+    }
+    state.trajectory = std::make_shared<Mission>(from, yaw, mission);
   } else if (const auto* t = std::get_if<TakeOffCommand>(&command)) {
     state.armed = true;
     state.memory = {};
@@ -207,7 +225,10 @@ Setpoint Autopilot::hover(AutopilotState& state, const RigidBodyState& body) con
   return VelocityCommand{Vector3d::Zero(), state.reference.yaw, 0.0};
 }
 
-Setpoint Autopilot::setpoint(AutopilotState& state, const RigidBodyState& body, SimTime now) const {
+Setpoint Autopilot::setpoint(AutopilotState& state,
+                             const RigidBodyState& body,
+                             SimTime now,
+                             double dt) const {
   const bool repeated = state.command.index() < kRepeated;
   if (repeated && command_timeout_.count() > 0 && now - state.since > command_timeout_) {
     ++state.timeouts;
@@ -223,6 +244,8 @@ Setpoint Autopilot::setpoint(AutopilotState& state, const RigidBodyState& body, 
           AttitudeCommand unit = c;
           unit.q_world_body.normalize();
           return unit;
+        } else if constexpr (std::is_same_v<C, VelocityCommand>) {
+          return in_world(c, state, body, dt);
         } else if constexpr (std::is_constructible_v<Setpoint, C>) {
           return c;
         } else {
@@ -243,7 +266,7 @@ std::vector<double> Autopilot::rotor_speeds(
     state.reference.yaw = yaw_of(body.q_world_body);
     return std::vector<double>(settings_.rotors.size(), 0.0);
   }
-  const Setpoint wanted = setpoint(state, body, now);
+  const Setpoint wanted = setpoint(state, body, now, dt);
   // what is recorded as the command: what of it there is
   PositionCommand& r = state.reference;
   if (const auto* p = std::get_if<PositionCommand>(&wanted)) {

@@ -56,7 +56,8 @@ class Autopilot {
  private:
   [[nodiscard]] Setpoint setpoint(AutopilotState& state,
                                   const RigidBodyState& body,
-                                  SimTime now) const;
+                                  SimTime now,
+                                  double dt) const;
   [[nodiscard]] Setpoint hover(AutopilotState& state, const RigidBodyState& body) const;
 
   VehicleSettings settings_;

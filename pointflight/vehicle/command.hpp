@@ -37,6 +37,8 @@ struct VelocityCommand {
   Vector3d v_world = Vector3d::Zero();
   double yaw = 0.0;
   double yaw_rate = 0.0;
+  bool turn = false;     ///< Turn at `yaw_rate` from the present heading on; `yaw` is not used.
+  bool in_body = false;  ///< `v_world` is along the level body axes: ahead, left, up.
 };
 
 /// What a controller is asked for over a control period, the innermost first.
@@ -54,6 +56,7 @@ struct TrajectoryCommand {
 /// Fly through waypoints from where the vehicle is, straight and at rest at each.
 struct WaypointCommand {
   MissionSettings mission;
+  bool keep_height = false;  ///< Waypoints are at the present height, whatever their z.
 };
 /// Rise by `height` (m) from the present place; arms.
 struct TakeOffCommand {

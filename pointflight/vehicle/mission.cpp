@@ -90,6 +90,19 @@ Mission::Mission(const Vector3d& start, double yaw, const MissionSettings& setti
     length_ += distance;
     goal_ = waypoint;
   }
+  if (!settings.final_yaw) return;
+  Leg last;  // turns on the spot
+  last.start = duration_;
+  last.from = goal_;
+  last.direction = Vector3d::Zero();
+  last.yaw_from = yaw_;
+  const double turn = wrap_angle(*settings.final_yaw - yaw_);
+  last.yaw_sign = turn < 0.0 ? -1.0 : 1.0;
+  last.turn = SmoothMove(std::abs(turn), turning);
+  last.travel = SmoothMove(0.0, settings.motion);
+  legs_.push_back(last);
+  duration_ += last.turn.duration();
+  yaw_ = wrap_angle(yaw_ + turn);
 }
 
 PositionCommand Mission::at(double t) const {

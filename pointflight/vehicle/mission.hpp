@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -45,6 +46,7 @@ struct MissionSettings {
   double yaw_rate_deg = 90.0;      ///< Limit while turning.
   double hold = 0.0;               ///< Seconds at each waypoint.
   std::vector<Vector3d> waypoints;
+  std::optional<double> final_yaw;  ///< Heading to turn to in the end, rad.
 };
 
 /// Flies straight legs between waypoints, smooth in time and at rest at each, turning towards the

@@ -1,0 +1,49 @@
+#include "apps/modules.hpp"
+
+#include <dlfcn.h>
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <string>
+
+#include "pointflight/core/input_error.hpp"
+
+namespace pointflight::apps {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The module that a library's entry function returns.
+template <class Module>
+const Module& load(const std::string& name, const std::string& what, const std::string& packages) {
+  std::error_code error;
+  const fs::path program = fs::read_symlink("/proc/self/exe", error);
+  const fs::path root = program.parent_path().parent_path();
+  const std::string file = fmt::format("lib{}.so", name);
+  std::string reason = "this build has none";
+  for (const char* folder : {"lib/pointflight", POINTFLIGHT_LIBDIR "/pointflight"}) {
+    const fs::path path = root / folder / file;
+    if (!fs::exists(path, error)) continue;
+    // stays loaded: what it made lives until the program ends
+    void* library = dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL);
+    if (library == nullptr) {
+      reason = dlerror();  // NOLINT(concurrency-mt-unsafe): called from one thread
+      continue;
+    }
+    using Entry = const Module* (*)();
+    const auto entry = reinterpret_cast<Entry>(dlsym(library, (name + "_module").c_str()));
+    if (entry != nullptr) return *entry();
+    reason = fmt::format("{} is of another version", path.string());
+  }
+  throw InputError(fmt::format("{}: {}; install {} and build again", what, reason, packages));
+}
+
+}  // namespace
+
+const Ros1Module& ros1_module() {
+  static const Ros1Module& module =
+      load<Ros1Module>("pointflight_ros1", "ROS 1", "libroscpp-dev and librosbag-storage-dev");
+  return module;
+}
+
+}  // namespace pointflight::apps

@@ -1,0 +1,11 @@
+#pragma once
+
+#include "ros_common/wire.hpp"
+
+namespace pointflight::apps {
+
+/// The library that speaks ROS 1, loaded when first asked for. Throws InputError that says what to
+/// install where this build has none.
+const Ros1Module& ros1_module();
+
+}  // namespace pointflight::apps

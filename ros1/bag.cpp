@@ -1,0 +1,122 @@
+#include "ros1/bag.hpp"
+
+#include <rosbag/bag.h>
+#include <rosbag/view.h>
+
+#include <cstdio>
+#include <map>
+#include <stdexcept>
+
+#include "ros1/raw_message.hpp"
+
+namespace pointflight {
+namespace {
+
+constexpr std::uint32_t kChunkSize = 4u << 20;  // bytes
+
+class BagWriter : public Outlet {
+ public:
+  BagWriter(const std::string& path, const std::string& compression)
+      : path_(path), active_(path + ".active") {
+    try {
+      bag_.open(active_, rosbag::bagmode::Write);
+    } catch (const rosbag::BagException& error) {
+      throw std::runtime_error(active_ + ": cannot be written: " + error.what());
+    }
+    bag_.setCompression(compression == "lz4"   ? rosbag::compression::LZ4
+                        : compression == "bz2" ? rosbag::compression::BZ2
+                                               : rosbag::compression::Uncompressed);
+    bag_.setChunkThreshold(kChunkSize);
+  }
+
+  ~BagWriter() override {
+    try {
+      bag_.close();  // without `close` it keeps the name that says so
+    } catch (const rosbag::BagException&) {
+      // the disk is full: what lies there is all there will be
+    }
+  }
+
+  Wire wire() const override { return Wire::kRos1; }
+
+  int advertise(const Topic& topic) override {
+    topics_.push_back(std::make_unique<Topic>(topic));
+    auto header = boost::make_shared<ros::M_string>();
+    (*header)["topic"] = topic.name;
+    (*header)["type"] = topic.type.ros1_name();
+    (*header)["md5sum"] = topic.type.md5;
+    (*header)["message_definition"] = topic.type.definition;
+    if (topic.latched) (*header)["latching"] = "1";
+    headers_.push_back(header);
+    return static_cast<int>(topics_.size()) - 1;
+  }
+
+  bool has_readers(int /*topic*/) const override { return true; }
+
+  void send(int topic, const Bytes& bytes, std::int64_t time) override {
+    const auto i = static_cast<std::size_t>(topic);
+    constexpr std::int64_t kSecond = 1'000'000'000;
+    const ros::Time stamp(static_cast<std::uint32_t>(time / kSecond),
+                          static_cast<std::uint32_t>(time % kSecond));
+    try {
+      bag_.write(topics_[i]->name, stamp, RawMessage{topics_[i].get(), bytes}, headers_[i]);
+    } catch (const rosbag::BagException& error) {
+      throw std::runtime_error(active_ + ": writing failed: " + error.what() +
+                               "; what was recorded until then is in it (rosbag reindex)");
+    }
+  }
+
+  void close() override {
+    try {
+      bag_.close();
+    } catch (const rosbag::BagException& error) {
+      throw std::runtime_error(active_ + ": writing failed: " + error.what());
+    }
+    if (std::rename(active_.c_str(), path_.c_str()) != 0) {
+      throw std::runtime_error(active_ + ": cannot be renamed to " + path_);
+    }
+  }
+
+ private:
+  std::string path_, active_;
+  rosbag::Bag bag_;
+  std::vector<std::unique_ptr<Topic>> topics_;
+  std::vector<boost::shared_ptr<ros::M_string>> headers_;
+};
+
+}  // namespace
+
+std::unique_ptr<Outlet> make_bag_writer(const std::string& path, const std::string& compression) {
+  return std::make_unique<BagWriter>(path, compression);
+}
+
+RecordingInfo read_bag(const std::string& path) {
+  try {
+    const rosbag::Bag bag(path, rosbag::bagmode::Read);
+    rosbag::View view(bag);
+    RecordingInfo info;
+    info.format = "ROS 1 bag " + std::to_string(bag.getMajorVersion()) + "." +
+                  std::to_string(bag.getMinorVersion());
+    std::map<std::string, RecordingInfo::Topic> topics;
+    for (const rosbag::ConnectionInfo* connection : view.getConnections()) {
+      topics[connection->topic] = {connection->topic, connection->datatype, 0};
+    }
+    for (const rosbag::MessageInstance& message : view) {
+      ++topics[message.getTopic()].messages;
+      ++info.messages;
+    }
+    for (const auto& entry : topics) info.topics.push_back(entry.second);
+    if (info.messages > 0) {
+      info.start = static_cast<std::int64_t>(view.getBeginTime().toNSec());
+      info.end = static_cast<std::int64_t>(view.getEndTime().toNSec());
+    }
+    return info;
+  } catch (const rosbag::BagUnindexedException&) {
+    throw std::runtime_error(path + ": was cut short and has no index; run: rosbag reindex " +
+                             path);
+  } catch (const rosbag::BagException& error) {
+    throw std::runtime_error(path + ": is not a readable bag: " + error.what());
+  }
+}
+
+}  // namespace pointflight

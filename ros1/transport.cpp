@@ -1,0 +1,191 @@
+#include "ros1/transport.hpp"
+
+#include <XmlRpcClient.h>
+#include <ros/network.h>
+#include <ros/ros.h>
+
+#include <atomic>
+#include <chrono>
+#include <mutex>
+#include <thread>
+
+#include "ros1/raw_message.hpp"
+
+namespace pointflight {
+namespace {
+
+/// A roscpp node. roscpp has queues and threads of its own: a slow subscriber costs nobody but
+/// itself.
+class Ros1Transport : public Transport {
+ public:
+  explicit Ros1Transport(const TransportOptions& options) : options_(options) {
+    // no master yet is no error: it is looked for until it is there
+    ros::init(ros::M_string{}, options_.node, ros::init_options::NoSigintHandler);
+  }
+
+  ~Ros1Transport() override {
+    stop_ = true;
+    if (connecting_.joinable()) connecting_.join();
+    if (spinner_) spinner_->stop();
+    publishers_.clear();
+    subscribers_.clear();
+    node_.reset();
+    if (ros::isStarted()) ros::shutdown();
+  }
+
+  Wire wire() const override { return Wire::kRos1; }
+
+  int advertise(const Topic& topic) override {
+    topics_.push_back(std::make_unique<Topic>(topic));
+    latched_.emplace_back();
+    return static_cast<int>(topics_.size()) - 1;
+  }
+
+  void subscribe(const Topic& topic, std::function<void(const Received&)> on_message) override {
+    inputs_.push_back({topic, std::move(on_message)});
+  }
+
+  void start() override {
+    connecting_ = std::thread([this] { connect(); });
+  }
+
+  bool is_connected() const override { return connected_; }
+
+  bool has_readers(int topic) const override {
+    if (topics_[static_cast<std::size_t>(topic)]->latched) return true;
+    return connected_ && publishers_[static_cast<std::size_t>(topic)].getNumSubscribers() > 0;
+  }
+
+  void send(int topic, const Bytes& bytes, std::int64_t /*time*/) override {
+    const auto i = static_cast<std::size_t>(topic);
+    if (!connected_) {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      if (!connected_) {
+        if (topics_[i]->latched) latched_[i] = bytes;  // for when the master is there
+        return;
+      }
+    }
+    publishers_[i].publish(RawMessage{topics_[i].get(), bytes});
+  }
+
+ private:
+  struct Input {
+    Topic topic;
+    std::function<void(const Received&)> on_message;
+  };
+
+  void log(const std::string& text) const {
+    if (options_.log) options_.log(text);
+  }
+
+  /// Looks for the master, then makes the node and everything on it.
+  void connect() {
+    bool said = false;
+    while (!stop_ && !ros::master::check()) {
+      if (!said) {
+        log("ROS 1: no master at " + ros::master::getURI() +
+            "; start roscore, or set ROS_MASTER_URI; still looking");
+      }
+      said = true;
+      for (int i = 0; i < 10 && !stop_; ++i) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(50));
+      }
+    }
+    if (stop_) return;
+    if (said) log("ROS 1: found the master");
+    if (is_taken("/" + options_.node)) {
+      log("ROS 1: a node named /" + options_.node +
+          " runs already and is shut down by this one; give --node another name");
+    }
+    node_ = std::make_unique<ros::NodeHandle>();
+    const std::lock_guard<std::mutex> lock(mutex_);
+    for (const auto& topic : topics_) publishers_.push_back(advertised(*topic));
+    for (const Input& input : inputs_) subscribers_.push_back(subscribed(input));
+    for (std::size_t i = 0; i < topics_.size(); ++i) {
+      if (latched_[i]) publishers_[i].publish(RawMessage{topics_[i].get(), latched_[i]});
+    }
+    spinner_ = std::make_unique<ros::AsyncSpinner>(1);
+    spinner_->start();
+    connected_ = true;
+  }
+
+  /// True where the master knows a living node of this name: it would be shut down by ours.
+  static bool is_taken(const std::string& name) {
+    XmlRpc::XmlRpcValue request;
+    XmlRpc::XmlRpcValue response;
+    XmlRpc::XmlRpcValue payload;
+    request[0] = "/pointflight_probe";
+    request[1] = name;
+    if (!ros::master::execute("lookupNode", request, response, payload, false)) return false;
+    std::string host;
+    std::uint32_t port = 0;
+    if (!ros::network::splitURI(static_cast<std::string>(payload), host, port)) return false;
+    XmlRpc::XmlRpcClient client(host.c_str(), static_cast<int>(port), "/");
+    XmlRpc::XmlRpcValue call;
+    call[0] = "/pointflight_probe";
+    return client.execute("getPid", call, response);
+  }
+
+  ros::Publisher advertised(const Topic& topic) {
+    ros::AdvertiseOptions options;
+    options.topic = topic.name;
+    options.queue_size = static_cast<std::uint32_t>(topic.depth);
+    options.md5sum = topic.type.md5;
+    options.datatype = topic.type.ros1_name();
+    options.message_definition = topic.type.definition;
+    options.has_header = topic.type.definition.rfind("std_msgs/Header header", 0) == 0;
+    options.latch = topic.latched;
+    return node_->advertise(options);
+  }
+
+  ros::Subscriber subscribed(const Input& input) {
+    using Event = ros::MessageEvent<const RawReceived>;
+    const std::string self = ros::this_node::getName();
+    const auto callback = [on_message = input.on_message, self](const Event& event) {
+      if (event.getPublisherName() == self) return;
+      Received received;
+      const auto message = event.getConstMessage();
+      received.data = message->bytes.data();
+      received.size = message->bytes.size();
+      const ros::M_string& header = event.getConnectionHeader();
+      const auto entry = [&](const char* key) {
+        const auto found = header.find(key);
+        return found == header.end() ? std::string() : found->second;
+      };
+      received.md5 = entry("md5sum");
+      received.definition = entry("message_definition");
+      on_message(received);
+    };
+    ros::SubscribeOptions options;
+    options.topic = input.topic.name;
+    options.queue_size = static_cast<std::uint32_t>(input.topic.depth);
+    // whatever definition the sender has: its own words are decoded
+    options.md5sum = "*";
+    options.datatype = input.topic.type.ros1_name();
+    options.helper = boost::make_shared<ros::SubscriptionCallbackHelperT<const Event&>>(
+        boost::function<void(const Event&)>(callback));
+    options.transport_hints = ros::TransportHints().tcpNoDelay();
+    return node_->subscribe(options);
+  }
+
+  TransportOptions options_;
+  std::vector<std::unique_ptr<Topic>> topics_;
+  std::vector<Bytes> latched_;  ///< Sent before there was a master.
+  std::vector<Input> inputs_;
+  std::unique_ptr<ros::NodeHandle> node_;
+  std::vector<ros::Publisher> publishers_;
+  std::vector<ros::Subscriber> subscribers_;
+  std::unique_ptr<ros::AsyncSpinner> spinner_;
+  std::thread connecting_;
+  std::mutex mutex_;
+  std::atomic<bool> connected_{false};
+  std::atomic<bool> stop_{false};
+};
+
+}  // namespace
+
+std::unique_ptr<Transport> make_ros1_transport(const TransportOptions& options) {
+  return std::make_unique<Ros1Transport>(options);
+}
+
+}  // namespace pointflight

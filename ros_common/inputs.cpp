@@ -1,0 +1,305 @@
+#include "ros_common/inputs.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "pointflight/core/constants.hpp"
+#include "pointflight/geometry/rotation.hpp"
+#include "ros_common/conversion.hpp"
+#include "ros_common/description.hpp"
+#include "ros_common/ros1_definition.hpp"
+
+namespace pointflight {
+namespace {
+
+constexpr double kRadPerSecond = kPi / 30.0;  // of an rpm
+constexpr std::size_t kOrdersMax = 10000;     // that wait; older ones go
+
+/// The message in a received one's bytes, where it has our definition.
+template <class M>
+std::optional<M> decoded(Wire wire, const Received& received) {
+  const std::span bytes(received.data, received.size);
+  if (wire == Wire::kCdr) return decode<Wire::kCdr, M>(bytes);
+  static const std::string md5 = md5_of(describe_message<M>(1));
+  if (received.md5 != md5) return std::nullopt;
+  return decode<Wire::kRos1, M>(bytes);
+}
+
+template <class M>
+PositionCommand position_from(const M& m) {
+  PositionCommand command;
+  command.p_world = vector_of(m.position);
+  command.v_world = vector_of(m.velocity);
+  command.a_world = vector_of(m.acceleration);
+  if constexpr (requires { m.jerk; }) command.jerk_world = vector_of(m.jerk);
+  command.yaw = m.yaw;
+  command.yaw_rate = m.yaw_dot;
+  return command;
+}
+
+/// A PositionCommand of any definition: by md5, else by the names of its fields.
+std::optional<PositionCommand> position_of(const InputStream& stream,
+                                           Wire wire,
+                                           const Received& received) {
+  if (wire == Wire::kCdr) {
+    if (stream.topic.type.ros2_package == msg::PositionCommandLong::kType.ros2_package) {
+      const auto m = decoded<msg::PositionCommandLong>(wire, received);
+      return m ? std::optional(position_from(*m)) : std::nullopt;
+    }
+    const auto m = decoded<msg::PositionCommandShort>(wire, received);
+    return m ? std::optional(position_from(*m)) : std::nullopt;
+  }
+  if (const auto m = decoded<msg::PositionCommandLong>(wire, received)) return position_from(*m);
+  if (const auto m = decoded<msg::PositionCommandShort>(wire, received)) return position_from(*m);
+  if (const auto m = decoded<msg::PositionCommandOldest>(wire, received)) return position_from(*m);
+  const auto numbers = numbers_of(received.definition, std::span(received.data, received.size));
+  if (!numbers) return std::nullopt;
+  PositionCommand command;
+  const auto take = [&](const std::string& name, double& value) {
+    const auto found = numbers->find(name);
+    if (found != numbers->end()) value = found->second;
+    return found != numbers->end();
+  };
+  bool all = true;
+  const auto vector = [&](const char* name, Vector3d& v, bool needed) {
+    const char* axes[3] = {".x", ".y", ".z"};
+    for (int i = 0; i < 3; ++i) all = (take(std::string(name) + axes[i], v[i]) || !needed) && all;
+  };
+  vector("position", command.p_world, true);
+  vector("velocity", command.v_world, true);
+  vector("acceleration", command.a_world, true);
+  vector("jerk", command.jerk_world, false);
+  all = take("yaw", command.yaw) && all;
+  take("yaw_dot", command.yaw_rate);
+  return all ? std::optional(command) : std::nullopt;
+}
+
+Command velocity_from(const msg::TwistStamped& m,
+                      const InputStream& stream,
+                      const OrderContext& context) {
+  VelocityCommand command;
+  command.v_world = vector_of(m.twist.linear);
+  command.yaw_rate = m.twist.angular.z;
+  const std::string& frame = m.header.frame_id;
+  const bool in_world =
+      frame.empty() ? stream.settings.frame == "world" : frame == context.world_frame;
+  command.in_body = !in_world;
+  command.turn = true;
+  return command;
+}
+
+Command attitude_from_target(const msg::AttitudeTarget& m, const OrderContext& context) {
+  const bool no_thrust = (m.type_mask & msg::AttitudeTarget::kIgnoreThrust) != 0;
+  const double thrust =
+      no_thrust ? context.mass * kGravity : static_cast<double>(m.thrust) * context.thrust_max;
+  Vector3d omega = vector_of(m.body_rate);
+  if ((m.type_mask & msg::AttitudeTarget::kIgnoreRollRate) != 0) omega.x() = 0.0;
+  if ((m.type_mask & msg::AttitudeTarget::kIgnorePitchRate) != 0) omega.y() = 0.0;
+  if ((m.type_mask & msg::AttitudeTarget::kIgnoreYawRate) != 0) omega.z() = 0.0;
+  if ((m.type_mask & msg::AttitudeTarget::kIgnoreAttitude) != 0) {
+    return BodyRateCommand{omega, thrust};
+  }
+  // a quaternion with a NaN stays one: the autopilot refuses it
+  const msg::Quaternion& q = m.orientation;
+  return AttitudeCommand{Quaterniond(q.w, q.x, q.y, q.z), thrust, omega};
+}
+
+/// Sticks as most pads have them: left up and down climbs, left aside turns, right moves. Buttons:
+/// 0 takes off, 1 lands, 2 hovers.
+Command stick_command(const msg::Joy& m, const OrderContext& context) {
+  const auto pressed = [&](std::size_t i) { return i < m.buttons.size() && m.buttons[i] != 0; };
+  if (pressed(0)) return TakeOffCommand{};
+  if (pressed(1)) return LandCommand{};
+  if (pressed(2)) return HoverCommand{};
+  const auto axis = [&](std::size_t i) {
+    return i < m.axes.size() ? static_cast<double>(m.axes[i]) : 0.0;
+  };
+  VelocityCommand command;
+  command.v_world = context.motion.speed * Vector3d(axis(4), axis(3), axis(1));
+  command.yaw_rate = axis(0);
+  command.in_body = true;
+  command.turn = true;
+  return command;
+}
+
+std::optional<Command> goal_from(const msg::PoseStamped& m, const OrderContext& context) {
+  const Vector3d p = vector_of(m.pose.position);
+  if (!p.allFinite()) return std::nullopt;
+  WaypointCommand command;
+  command.mission.motion = context.motion;
+  command.mission.waypoints = {p};
+  // RViz' flat tool knows no height
+  command.keep_height = p.z() == 0.0;
+  command.mission.final_yaw = yaw_of(rotation_of(m.pose.orientation));
+  return command;
+}
+
+}  // namespace
+
+std::optional<Order> order_of(const InputStream& stream,
+                              Wire wire,
+                              const Received& received,
+                              const OrderContext& context,
+                              std::string& reason) {
+  const std::string& kind = stream.settings.kind;
+  std::optional<Command> command;
+  bool is_answer = false;
+  if (kind == "position") {
+    is_answer = true;
+    if (const auto m = position_of(stream, wire, received)) command = *m;
+  } else if (kind == "goal") {
+    if (const auto m = decoded<msg::PoseStamped>(wire, received)) command = goal_from(*m, context);
+  } else if (kind == "velocity") {
+    is_answer = true;
+    if (const auto m = decoded<msg::TwistStamped>(wire, received)) {
+      command = velocity_from(*m, stream, context);
+    }
+  } else if (kind == "attitude") {
+    is_answer = true;
+    if (const auto m = decoded<msg::AttitudeTarget>(wire, received)) {
+      command = attitude_from_target(*m, context);
+    }
+  } else if (kind == "rotors") {
+    is_answer = true;
+    if (const auto m = decoded<msg::Float32MultiArray>(wire, received)) {
+      RotorSpeedCommand rotors;
+      const double unit = stream.settings.unit == "rpm" ? kRadPerSecond : 1.0;
+      for (const float w : m->data) rotors.speeds.push_back(unit * static_cast<double>(w));
+      command = rotors;
+    }
+  } else if (kind == "joy") {
+    if (const auto m = decoded<msg::Joy>(wire, received)) command = stick_command(*m, context);
+  } else if (kind == "take_off_land") {
+    if (const auto m = decoded<msg::TakeoffLand>(wire, received)) {
+      command = m->takeoff_land_cmd == msg::TakeoffLand::kTakeoff ? Command{TakeOffCommand{}}
+                                                                  : Command{LandCommand{}};
+    }
+  } else if (kind == "pause") {
+    if (const auto m = decoded<msg::Bool>(wire, received)) return PauseOrder{m->data};
+  } else if (decoded<msg::Empty>(wire, received)) {
+    if (kind == "step") return StepOrder{};
+    if (kind == "reset") return ResetOrder{};
+    if (kind == "hover") command = HoverCommand{};
+    if (kind == "arm") command = ArmCommand{};
+  }
+  if (command) return VehicleOrder{stream.vehicle, *command, is_answer};
+  reason = fmt::format("{}: a message of {} bytes that is no {}{}",
+                       stream.topic.name,
+                       received.size,
+                       stream.topic.type.ros1_name(),
+                       wire == Wire::kRos1 ? fmt::format(" (its md5 is {})", received.md5) : "");
+  return std::nullopt;
+}
+
+namespace {
+
+/// Types that a kind is read with.
+std::vector<MessageType> types_for(const std::string& kind, Wire wire) {
+  if (kind == "position") {
+    std::vector<MessageType> types = {message_type<msg::PositionCommandShort>()};
+    if (wire == Wire::kCdr) types.push_back(message_type<msg::PositionCommandLong>());
+    return types;
+  }
+  if (kind == "goal") return {message_type<msg::PoseStamped>()};
+  if (kind == "velocity") return {message_type<msg::TwistStamped>()};
+  if (kind == "attitude") return {message_type<msg::AttitudeTarget>()};
+  if (kind == "rotors") return {message_type<msg::Float32MultiArray>()};
+  if (kind == "joy") return {message_type<msg::Joy>()};
+  if (kind == "take_off_land") return {message_type<msg::TakeoffLand>()};
+  if (kind == "pause") return {message_type<msg::Bool>()};
+  return {message_type<msg::Empty>()};
+}
+
+bool is_of_run(const std::string& kind) {
+  return kind == "pause" || kind == "step" || kind == "reset";
+}
+
+}  // namespace
+
+std::vector<InputStream> input_streams(const Simulation& simulation,
+                                       const RosProfile& profile,
+                                       Wire wire) {
+  std::vector<InputStream> streams;
+  for (const RosInput& input : profile.inputs) {
+    if (input.topic.empty() || input.topic == "-") continue;
+    const bool vehicles_apart = input.topic.find("{id}") != std::string::npos ||
+                                input.topic.find("{vehicle}") != std::string::npos;
+    const bool once = is_of_run(input.kind) || !vehicles_apart;
+    const std::size_t vehicles = once ? 1 : simulation.vehicle_count();
+    for (std::size_t v = 0; v < vehicles; ++v) {
+      const RosNames names{
+          simulation.vehicle(v).setup().name, profile.first_id + static_cast<std::int64_t>(v), ""};
+      for (MessageType& type : types_for(input.kind, wire)) {
+        InputStream stream;
+        stream.settings = input;
+        stream.settings.topic = with_names(input.topic, names);
+        if (stream.settings.topic.front() != '/') stream.settings.topic.insert(0, "/");
+        stream.topic.name = stream.settings.topic;
+        stream.topic.type = std::move(type);
+        stream.topic.depth = 10;
+        stream.vehicle = v;
+        stream.for_all = once && !is_of_run(input.kind);
+        streams.push_back(std::move(stream));
+      }
+    }
+  }
+  return streams;
+}
+
+Inbox::Inbox(const Simulation& simulation, const RosProfile& profile)
+    : simulation_(simulation), profile_(profile) {
+  for (std::size_t v = 0; v < simulation.vehicle_count(); ++v) {
+    const VehicleSettings& s = simulation.vehicle(v).settings();
+    OrderContext context;
+    context.mass = s.mass;
+    context.thrust_max = s.thrust_to_weight() * s.mass * kGravity;
+    context.motion = simulation.vehicle(v).setup().mission.motion;
+    context.world_frame = profile.world_frame;
+    contexts_.push_back(context);
+  }
+}
+
+void Inbox::connect(Transport& transport) {
+  const Wire wire = transport.wire();
+  for (const InputStream& stream : input_streams(simulation_, profile_, wire)) {
+    transport.subscribe(stream.topic, [this, stream, wire](const Received& received) {
+      receive(stream, wire, received);
+    });
+  }
+}
+
+void Inbox::receive(const InputStream& stream, Wire wire, const Received& received) {
+  const std::size_t last = stream.for_all ? contexts_.size() : stream.vehicle + 1;
+  for (std::size_t v = stream.vehicle; v < last; ++v) {
+    InputStream own = stream;
+    own.vehicle = v;
+    std::string reason;
+    auto order = order_of(own, wire, received, contexts_[v], reason);
+    const std::lock_guard lock(mutex_);
+    if (!order) {
+      ++malformed_;
+      last_reason_ = reason;
+      return;
+    }
+    if (orders_.size() >= kOrdersMax) orders_.erase(orders_.begin());
+    orders_.push_back(std::move(*order));
+  }
+}
+
+std::vector<Order> Inbox::take() {
+  const std::lock_guard lock(mutex_);
+  return std::exchange(orders_, {});
+}
+
+std::uint64_t Inbox::malformed() const {
+  const std::lock_guard lock(mutex_);
+  return malformed_;
+}
+
+std::string Inbox::last_reason() const {
+  const std::lock_guard lock(mutex_);
+  return last_reason_;
+}
+
+}  // namespace pointflight

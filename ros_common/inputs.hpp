@@ -1,0 +1,85 @@
+#pragma once
+
+#include <cstdint>
+#include <mutex>
+#include <optional>
+#include <span>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "pointflight/sim/simulation.hpp"
+#include "ros_common/profile.hpp"
+#include "ros_common/wire.hpp"
+
+namespace pointflight {
+
+/// What a message from outside asks for.
+struct VehicleOrder {
+  std::size_t vehicle = 0;
+  Command command;
+  bool is_answer = false;  ///< A planner's: what lockstep waits for.
+};
+struct PauseOrder {
+  bool pause = true;
+};
+struct StepOrder {};  ///< While paused: go on until the next scan.
+struct ResetOrder {};
+using Order = std::variant<VehicleOrder, PauseOrder, StepOrder, ResetOrder>;
+
+/// One topic that is read, for one vehicle and one kind of message.
+struct InputStream {
+  RosInput settings;  ///< Names written out.
+  Topic topic;
+  std::size_t vehicle = 0;
+  bool for_all = false;  ///< A topic that all vehicles share.
+};
+
+/// The streams of a profile in a run. On ROS 2 a PositionCommand has a stream for each of its two
+/// definitions: readers of different types do not meet.
+std::vector<InputStream> input_streams(const Simulation& simulation,
+                                       const RosProfile& profile,
+                                       Wire wire);
+
+/// What a vehicle's orders are made with.
+struct OrderContext {
+  double mass = 1.0;        ///< kg
+  double thrust_max = 0.0;  ///< Of all rotors, N: what a thrust of 1 stands for.
+  MotionLimits motion;      ///< Of goals.
+  std::string world_frame;  ///< Velocities in any other are the body's.
+};
+
+/// The order that a message stands for. Nothing, and the reason, where it is malformed.
+std::optional<Order> order_of(const InputStream& stream,
+                              Wire wire,
+                              const Received& received,
+                              const OrderContext& context,
+                              std::string& reason);
+
+/// Takes messages from the threads of transports and gives orders to the one that flies.
+class Inbox {
+ public:
+  Inbox(const Simulation& simulation, const RosProfile& profile);
+
+  /// Subscribes to everything that the profile reads.
+  void connect(Transport& transport);
+
+  /// Orders in the order in which they came.
+  std::vector<Order> take();
+
+  [[nodiscard]] std::uint64_t malformed() const;
+  [[nodiscard]] std::string last_reason() const;
+
+ private:
+  void receive(const InputStream& stream, Wire wire, const Received& received);
+
+  const Simulation& simulation_;
+  RosProfile profile_;
+  std::vector<OrderContext> contexts_;  ///< Of each vehicle.
+  mutable std::mutex mutex_;
+  std::vector<Order> orders_;
+  std::uint64_t malformed_ = 0;
+  std::string last_reason_;
+};
+
+}  // namespace pointflight
