@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
+#include <algorithm>
 
 #include "pointflight/core/constants.hpp"
 #include "pointflight/geometry/rotation.hpp"
@@ -135,6 +135,91 @@ std::optional<Command> goal_from(const msg::PoseStamped& m, const OrderContext& 
   return command;
 }
 
+Command rotors_from(const msg::Float32MultiArray& m, const InputStream& stream) {
+  const double unit = stream.settings.unit == "rpm" ? kRadPerSecond : 1.0;
+  RotorSpeedCommand rotors;
+  for (const float w : m.data) rotors.speeds.push_back(unit * static_cast<double>(w));
+  return rotors;
+}
+
+/// How a kind of message becomes a command.
+struct Reader {
+  const char* kind;
+  bool is_answer;
+  std::optional<Command> (*read)(const InputStream&, Wire, const Received&, const OrderContext&);
+};
+
+constexpr Reader kReaders[] = {
+    {"position",
+     true,
+     [](const InputStream& stream, Wire wire, const Received& in, const OrderContext&) {
+       const auto m = position_of(stream, wire, in);
+       return m ? std::optional<Command>(*m) : std::nullopt;
+     }},
+    {"goal",
+     false,
+     [](const InputStream&, Wire wire, const Received& in, const OrderContext& context) {
+       const auto m = decoded<msg::PoseStamped>(wire, in);
+       return m ? goal_from(*m, context) : std::nullopt;
+     }},
+    {"velocity",
+     true,
+     [](const InputStream& stream, Wire wire, const Received& in, const OrderContext& context) {
+       const auto m = decoded<msg::TwistStamped>(wire, in);
+       return m ? std::optional(velocity_from(*m, stream, context)) : std::nullopt;
+     }},
+    {"attitude",
+     true,
+     [](const InputStream&, Wire wire, const Received& in, const OrderContext& context) {
+       const auto m = decoded<msg::AttitudeTarget>(wire, in);
+       return m ? std::optional(attitude_from_target(*m, context)) : std::nullopt;
+     }},
+    {"rotors",
+     true,
+     [](const InputStream& stream, Wire wire, const Received& in, const OrderContext&) {
+       const auto m = decoded<msg::Float32MultiArray>(wire, in);
+       return m ? std::optional(rotors_from(*m, stream)) : std::nullopt;
+     }},
+    {"joy",
+     false,
+     [](const InputStream&, Wire wire, const Received& in, const OrderContext& context) {
+       const auto m = decoded<msg::Joy>(wire, in);
+       return m ? std::optional(stick_command(*m, context)) : std::nullopt;
+     }},
+    {"take_off_land",
+     false,
+     [](const InputStream&, Wire wire, const Received& in, const OrderContext&) {
+       const auto m = decoded<msg::TakeoffLand>(wire, in);
+       if (!m) return std::optional<Command>();
+       const bool up = m->takeoff_land_cmd == msg::TakeoffLand::kTakeoff;
+       return std::optional(up ? Command{TakeOffCommand{}} : Command{LandCommand{}});
+     }},
+    {"hover",
+     false,
+     [](const InputStream&, Wire wire, const Received& in, const OrderContext&) {
+       const auto m = decoded<msg::Empty>(wire, in);
+       return m ? std::optional<Command>(HoverCommand{}) : std::nullopt;
+     }},
+    {"arm",
+     false,
+     [](const InputStream&, Wire wire, const Received& in, const OrderContext&) {
+       const auto m = decoded<msg::Empty>(wire, in);
+       return m ? std::optional<Command>(ArmCommand{}) : std::nullopt;
+     }},
+};
+
+/// What is about the run and not about a vehicle.
+std::optional<Order> run_order_of(const std::string& kind, Wire wire, const Received& received) {
+  if (kind == "pause") {
+    const auto m = decoded<msg::Bool>(wire, received);
+    return m ? std::optional<Order>(PauseOrder{m->data}) : std::nullopt;
+  }
+  if (!decoded<msg::Empty>(wire, received)) return std::nullopt;
+  if (kind == "step") return StepOrder{};
+  if (kind == "reset") return ResetOrder{};
+  return std::nullopt;
+}
+
 }  // namespace
 
 std::optional<Order> order_of(const InputStream& stream,
@@ -143,53 +228,22 @@ std::optional<Order> order_of(const InputStream& stream,
                               const OrderContext& context,
                               std::string& reason) {
   const std::string& kind = stream.settings.kind;
-  std::optional<Command> command;
-  bool is_answer = false;
-  if (kind == "position") {
-    is_answer = true;
-    if (const auto m = position_of(stream, wire, received)) command = *m;
-  } else if (kind == "goal") {
-    if (const auto m = decoded<msg::PoseStamped>(wire, received)) command = goal_from(*m, context);
-  } else if (kind == "velocity") {
-    is_answer = true;
-    if (const auto m = decoded<msg::TwistStamped>(wire, received)) {
-      command = velocity_from(*m, stream, context);
-    }
-  } else if (kind == "attitude") {
-    is_answer = true;
-    if (const auto m = decoded<msg::AttitudeTarget>(wire, received)) {
-      command = attitude_from_target(*m, context);
-    }
-  } else if (kind == "rotors") {
-    is_answer = true;
-    if (const auto m = decoded<msg::Float32MultiArray>(wire, received)) {
-      RotorSpeedCommand rotors;
-      const double unit = stream.settings.unit == "rpm" ? kRadPerSecond : 1.0;
-      for (const float w : m->data) rotors.speeds.push_back(unit * static_cast<double>(w));
-      command = rotors;
-    }
-  } else if (kind == "joy") {
-    if (const auto m = decoded<msg::Joy>(wire, received)) command = stick_command(*m, context);
-  } else if (kind == "take_off_land") {
-    if (const auto m = decoded<msg::TakeoffLand>(wire, received)) {
-      command = m->takeoff_land_cmd == msg::TakeoffLand::kTakeoff ? Command{TakeOffCommand{}}
-                                                                  : Command{LandCommand{}};
-    }
-  } else if (kind == "pause") {
-    if (const auto m = decoded<msg::Bool>(wire, received)) return PauseOrder{m->data};
-  } else if (decoded<msg::Empty>(wire, received)) {
-    if (kind == "step") return StepOrder{};
-    if (kind == "reset") return ResetOrder{};
-    if (kind == "hover") command = HoverCommand{};
-    if (kind == "arm") command = ArmCommand{};
+  const auto reader = std::find_if(
+      std::begin(kReaders), std::end(kReaders), [&](const Reader& r) { return kind == r.kind; });
+  std::optional<Order> order;
+  if (reader == std::end(kReaders)) {
+    order = run_order_of(kind, wire, received);
+  } else if (const auto command = reader->read(stream, wire, received, context)) {
+    order = VehicleOrder{stream.vehicle, *command, reader->is_answer};
   }
-  if (command) return VehicleOrder{stream.vehicle, *command, is_answer};
-  reason = fmt::format("{}: a message of {} bytes that is no {}{}",
-                       stream.topic.name,
-                       received.size,
-                       stream.topic.type.ros1_name(),
-                       wire == Wire::kRos1 ? fmt::format(" (its md5 is {})", received.md5) : "");
-  return std::nullopt;
+  if (!order) {
+    reason = fmt::format("{}: a message of {} bytes that is no {}{}",
+                         stream.topic.name,
+                         received.size,
+                         stream.topic.type.ros1_name(),
+                         wire == Wire::kRos1 ? fmt::format(" (its md5 is {})", received.md5) : "");
+  }
+  return order;
 }
 
 namespace {
