@@ -161,6 +161,24 @@ bool RosSession::start() {
     if (interrupted()) return false;
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
+  return flags_.lockstep <= 0.0 || wait_for_planner();
+}
+
+/// So that the first scan has its answer already.
+bool RosSession::wait_for_planner() {
+  const auto is_there = [&] {
+    return bridge_->has_scan_readers() &&
+           std::any_of(transports_.begin(), transports_.end(), [](const auto& transport) {
+             return transport->has_senders();
+           });
+  };
+  if (transports_.empty() || is_there()) return true;
+  log("lockstep: waiting for somebody who reads scans and sends commands");
+  while (!is_there()) {
+    if (interrupted()) return false;
+    bridge_->repeat_clock();
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
   return true;
 }
 

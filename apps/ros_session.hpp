@@ -59,6 +59,7 @@ class RosSession {
 
  private:
   class ScanCount;
+  bool wait_for_planner();
   void take_orders();
   void wait_for_answer();
   void say_troubles();

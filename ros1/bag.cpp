@@ -12,7 +12,7 @@
 namespace pointflight {
 namespace {
 
-constexpr std::uint32_t kChunkSize = 4u << 20;  // bytes
+constexpr std::uint32_t kChunkSize = 1u << 20;  // bytes; what a kill can cost
 
 class BagWriter : public Outlet {
  public:

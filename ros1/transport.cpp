@@ -4,6 +4,7 @@
 #include <ros/network.h>
 #include <ros/ros.h>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <mutex>
@@ -50,6 +51,14 @@ class Ros1Transport : public Transport {
   }
 
   bool is_connected() const override { return connected_; }
+
+  bool has_senders() const override {
+    if (!connected_) return false;
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return std::any_of(subscribers_.begin(), subscribers_.end(), [](const ros::Subscriber& s) {
+      return s.getNumPublishers() > 0;
+    });
+  }
 
   bool has_readers(int topic) const override {
     if (topics_[static_cast<std::size_t>(topic)]->latched) return true;
@@ -98,15 +107,35 @@ class Ros1Transport : public Transport {
           " runs already and is shut down by this one; give --node another name");
     }
     node_ = std::make_unique<ros::NodeHandle>();
-    const std::lock_guard<std::mutex> lock(mutex_);
+    std::unique_lock<std::mutex> lock(mutex_);
     for (const auto& topic : topics_) publishers_.push_back(advertised(*topic));
     for (const Input& input : inputs_) subscribers_.push_back(subscribed(input));
+    had_sender_.assign(inputs_.size(), false);
     for (std::size_t i = 0; i < topics_.size(); ++i) {
       if (latched_[i]) publishers_[i].publish(RawMessage{topics_[i].get(), latched_[i]});
     }
     spinner_ = std::make_unique<ros::AsyncSpinner>(1);
     spinner_->start();
     connected_ = true;
+    lock.unlock();
+    while (!stop_) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(50));
+      welcome_other_definitions();
+    }
+  }
+
+  /// roscpp holds a topic to the md5 of its first sender. When all senders have gone it is read
+  /// anew, so that the next one may have another definition.
+  void welcome_other_definitions() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    for (std::size_t i = 0; i < subscribers_.size(); ++i) {
+      const bool has_sender = subscribers_[i].getNumPublishers() > 0;
+      if (had_sender_[i] && !has_sender) {
+        subscribers_[i].shutdown();
+        subscribers_[i] = subscribed(inputs_[i]);
+      }
+      had_sender_[i] = has_sender;
+    }
   }
 
   /// True where the master knows a living node of this name: it would be shut down by ours.
@@ -175,9 +204,10 @@ class Ros1Transport : public Transport {
   std::unique_ptr<ros::NodeHandle> node_;
   std::vector<ros::Publisher> publishers_;
   std::vector<ros::Subscriber> subscribers_;
+  std::vector<bool> had_sender_;  ///< Of each subscriber, when last looked at.
   std::unique_ptr<ros::AsyncSpinner> spinner_;
   std::thread connecting_;
-  std::mutex mutex_;
+  mutable std::mutex mutex_;
   std::atomic<bool> connected_{false};
   std::atomic<bool> stop_{false};
 };

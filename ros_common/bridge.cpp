@@ -89,6 +89,15 @@ std::vector<Topic> RosBridge::topics() const {
   return topics;
 }
 
+bool RosBridge::has_scan_readers() const {
+  return std::any_of(streams_.begin(), streams_.end(), [&](const auto& stream) {
+    const OutputKind kind = stream->type->kind;
+    const bool scan =
+        kind == OutputKind::kCloud || kind == OutputKind::kCloudWorld || kind == OutputKind::kDepth;
+    return scan && is_wanted(*stream);
+  });
+}
+
 bool RosBridge::is_wanted(const Stream& stream) const {
   for (std::size_t i = 0; i < outlets_.size(); ++i) {
     if (outlets_[i]->has_readers(stream.numbers[i])) return true;

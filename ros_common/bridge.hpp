@@ -43,6 +43,8 @@ class RosBridge : public SampleSink {
   /// How long the last scan took by the wall clock, s: for `scan_time`; recordings leave it at 0.
   void note_scan_time(double seconds);
 
+  /// True while somebody gets scans.
+  [[nodiscard]] bool has_scan_readers() const;
   /// What goes out.
   [[nodiscard]] std::vector<Topic> topics() const;
   /// The rate of odometry samples that the profile needs, Hz.

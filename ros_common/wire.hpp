@@ -82,6 +82,9 @@ class Transport : public Outlet {
   /// True once it has found the ROS it belongs to (ROS 1: a master).
   virtual bool is_connected() const = 0;
 
+  /// True while somebody sends on a topic that is read.
+  virtual bool has_senders() const = 0;
+
   /// Messages that were dropped because somebody was too slow to take them.
   virtual std::uint64_t dropped() const { return 0; }
 };

@@ -1,0 +1,564 @@
+#!/usr/bin/python3
+"""pointflight against a real rosmaster, rospy and rosbag: what others see and what they can do.
+
+ros1_test.py PROGRAM [unittest arguments]
+"""
+
+import os
+import signal
+import socket
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+PROGRAM = sys.argv.pop(1)
+
+try:
+    import rosbag  # noqa: F401
+    import rosgraph
+    import rospy
+except ImportError as error:
+    print(f"skipped: {error}")
+    sys.exit(77)
+
+POSITION_TAIL = """
+================================================================================
+MSG: std_msgs/Header
+uint32 seq
+time stamp
+string frame_id
+================================================================================
+MSG: geometry_msgs/Point
+float64 x
+float64 y
+float64 z
+================================================================================
+MSG: geometry_msgs/Vector3
+float64 x
+float64 y
+float64 z
+"""
+POSITION_START = """Header header
+geometry_msgs/Point position
+geometry_msgs/Vector3 velocity
+geometry_msgs/Vector3 acceleration
+"""
+SHORT = (
+    """uint8 TRAJECTORY_STATUS_EMPTY = 0
+uint8 TRAJECTORY_STATUS_READY = 1
+uint8 TRAJECTORY_STATUS_COMPLETED = 3
+uint8 TRAJECTROY_STATUS_ABORT = 4
+uint8 TRAJECTORY_STATUS_ILLEGAL_START = 5
+uint8 TRAJECTORY_STATUS_ILLEGAL_FINAL = 6
+uint8 TRAJECTORY_STATUS_IMPOSSIBLE = 7
+"""
+    + POSITION_START
+    + """float64 yaw
+float64 yaw_dot
+float64[3] kx
+float64[3] kv
+uint32 trajectory_id
+uint8 trajectory_flag"""
+    + POSITION_TAIL
+)
+LONG = (
+    """uint8 TRAJECTORY_STATUS_EMPTY = 0
+uint8 TRAJECTORY_STATUS_EMER = 2
+uint8 TRAJECTORY_STATUS_READY = 1
+uint8 TRAJECTORY_STATUS_COMPLETED = 3
+uint8 TRAJECTROY_STATUS_ABORT = 4
+uint8 TRAJECTORY_STATUS_ILLEGAL_START = 5
+uint8 TRAJECTORY_STATUS_ILLEGAL_FINAL = 6
+uint8 TRAJECTORY_STATUS_IMPOSSIBLE = 7
+uint32 ACTION_STOP = 8
+"""
+    + POSITION_START
+    + """geometry_msgs/Vector3 jerk
+geometry_msgs/Vector3 angular_velocity
+geometry_msgs/Vector3 attitude
+geometry_msgs/Vector3 thrust
+float64 yaw
+float64 yaw_dot
+float64 vel_norm
+float64 acc_norm
+float64[3] kx
+float64[3] kv
+uint32 trajectory_id
+uint8 trajectory_flag"""
+    + POSITION_TAIL
+)
+OLDEST = POSITION_START + "float64 yaw\nfloat64 yaw_dot\nfloat64[3] kx\nfloat64[3] kv" + POSITION_TAIL
+OWN = POSITION_START + "float64 yaw\nfloat64[] gains\nstring who" + POSITION_TAIL
+VARIANTS = {
+    "long": (LONG, "d008e86de36e11deb1e4033ac2c394a9"),
+    "short": (SHORT, "4712f0609ca29a79af79a35ca3e3967a"),
+    "oldest": (OLDEST, "835935bcd6f18632d9e26a3093237902"),
+    "own": (OWN, None),
+}
+
+
+def free_port():
+    with socket.socket() as s:
+        s.bind(("127.0.0.1", 0))
+        return s.getsockname()[1]
+
+
+def wait_for(condition, seconds=20.0, what="something"):
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        result = condition()
+        if result:
+            return result
+        time.sleep(0.02)
+    raise AssertionError(f"waited {seconds} s for {what}")
+
+
+class Ros1Test(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.TemporaryDirectory()
+        port = free_port()
+        os.environ.update(
+            ROS_MASTER_URI=f"http://127.0.0.1:{port}",
+            ROS_IP="127.0.0.1",
+            ROS_HOME=cls.folder.name + "/ros",
+        )
+        cls.master = subprocess.Popen(
+            ["/usr/bin/rosmaster", "--core", "-p", str(port)],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        wait_for(rosgraph.is_master_online, what="the master")
+        rospy.init_node("peer", disable_signals=True)
+        cls.map = cls.folder.name + "/forest.pfmap"
+        run = lambda *a: subprocess.run([PROGRAM, *a], check=True, capture_output=True)
+        run("map", "forest", "--size-x", "16", "--size-y", "16", "--density", "300", "--trees",
+            "300", "-o", cls.folder.name + "/f.pcd")
+        run("map", "import", cls.folder.name + "/f.pcd", "-o", cls.map, "--resolution", "0.1")
+
+    @classmethod
+    def tearDownClass(cls):
+        rospy.signal_shutdown("done")
+        cls.master.kill()
+        cls.master.wait()
+        cls.folder.cleanup()
+
+    def fly(self, *flags, scenario=None):
+        """Starts a flight; it is ended after the test. stderr is kept."""
+        self.log = open(self.folder.name + "/fly.log", "w+")
+        process = subprocess.Popen(
+            [PROGRAM, "fly", scenario or self.map, "--ros1", *flags],
+            stdout=self.log,
+            stderr=self.log,
+        )
+        self.addCleanup(self.stop, process, self.log)
+        return process
+
+    @staticmethod
+    def stop(process, log):
+        if process.poll() is None:
+            process.send_signal(signal.SIGINT)
+            process.wait(timeout=20)
+        log.close()
+
+    def collect(self, topic, kind, count, seconds=30.0):
+        got = []
+        subscriber = rospy.Subscriber(topic, kind, got.append, queue_size=1000)
+        try:
+            wait_for(lambda: len(got) >= count, seconds, f"{count} messages on {topic}")
+        finally:
+            subscriber.unregister()
+        return got[:count]
+
+    # -- out ---------------------------------------------------------------------------------
+
+    def test_rates_and_contents(self):
+        from nav_msgs.msg import Odometry
+        from rosgraph_msgs.msg import Clock
+        from sensor_msgs.msg import Imu, PointCloud2
+        import sensor_msgs.point_cloud2 as pc2
+
+        self.fly()
+        arrivals = {}
+        kinds = {"/clock": Clock, "/drone0/odom": Odometry, "/drone0/imu": Imu,
+                 "/drone0/mid360/points": PointCloud2}
+        kept = {topic: [] for topic in kinds}
+        for topic, kind in kinds.items():
+            arrivals[topic] = []
+
+            def callback(message, topic=topic):
+                arrivals[topic].append(time.monotonic())
+                kept[topic].append(message)
+
+            self.addCleanup(rospy.Subscriber(topic, kind, callback, queue_size=1000).unregister)
+        wait_for(lambda: len(kept["/drone0/mid360/points"]) >= 41, 60, "41 scans")
+        expected = {"/clock": 200, "/drone0/odom": 200, "/drone0/imu": 200,
+                    "/drone0/mid360/points": 10}
+        for topic, hertz in expected.items():
+            stamps = [
+                (m.clock if topic == "/clock" else m.header.stamp).to_nsec() for m in kept[topic]
+            ]
+            # none lost, in order
+            steps = [(b - a) * 1e-9 for a, b in zip(stamps, stamps[1:])]
+            self.assertGreater(min(steps), 0.0, topic)
+            self.assertLess(max(steps), 1.5 / hertz, topic)
+            times = arrivals[topic]
+            rate = (len(times) - 1) / (times[-1] - times[0])
+            self.assertAlmostEqual(rate / hertz, 1.0, delta=0.1, msg=topic)
+        imu = kept["/drone0/imu"][-1]
+        self.assertAlmostEqual(imu.linear_acceleration.z, 9.81, delta=0.2)
+        odometry = kept["/drone0/odom"][-1]
+        self.assertEqual(odometry.child_frame_id, "drone0/base_link")
+        cloud = kept["/drone0/mid360/points"][-1]
+        self.assertEqual(cloud.header.frame_id, "drone0/mid360")
+        points = list(pc2.read_points(cloud, ("x", "y", "z", "tag", "line", "timestamp")))
+        self.assertEqual(len(points), cloud.width)
+        times = [p[5] for p in points]
+        self.assertEqual(times, sorted(times))
+        self.assertAlmostEqual(times[0] * 1e-9, cloud.header.stamp.to_sec(), delta=1e-6)
+        self.assertLess(times[-1] - times[0], 1e8)
+        self.assertEqual({p[3] for p in points}, {16})
+
+    def test_livox_custom_messages(self):
+        """As a subscriber with Livox' definition gets them: type, md5 and bytes."""
+        self.fly("--profile", "livox")
+        message = self.collect("/livox/lidar", rospy.AnyMsg, 2)[-1]
+        self.assertEqual(message._connection_header["type"], "livox_ros_driver2/CustomMsg")
+        self.assertEqual(message._connection_header["md5sum"], "e4d6829bdfe657cb6c21a746c86b21a6")
+        data = message._buff
+        seq, sec, nsec, length = struct.unpack_from("<IIII", data, 0)
+        at = 16 + length
+        self.assertEqual(data[16:at], b"livox_frame")
+        timebase, number, lidar = struct.unpack_from("<QIB", data, at)
+        at += 8 + 4 + 1 + 3
+        (count,) = struct.unpack_from("<I", data, at)
+        at += 4
+        self.assertEqual(number, count)
+        self.assertEqual(timebase, sec * 10**9 + nsec)
+        self.assertGreater(sec, time.time() - 3600)  # this profile lives on the wall clock
+        self.assertEqual(len(data), at + 19 * count)
+        offset, x, y, z, reflectivity, tag, line = struct.unpack_from("<IfffBBB", data, at)
+        self.assertEqual(offset, 0)
+        self.assertEqual(tag, 16)
+        self.assertLess(line, 4)
+        from sensor_msgs.msg import Imu
+
+        self.assertEqual(self.collect("/livox/imu", Imu, 1)[0].header.frame_id, "livox_frame")
+
+    def test_whoever_comes_late_gets_the_map_and_the_transforms(self):
+        from sensor_msgs.msg import PointCloud2
+        from tf2_msgs.msg import TFMessage
+
+        self.fly()
+        self.collect("/clock", rospy.AnyMsg, 100)
+        cloud = self.collect("/map", PointCloud2, 1)[0]
+        self.assertGreater(cloud.width, 1000)
+        self.assertEqual(cloud.header.frame_id, "world")
+        fixed = self.collect("/tf_static", TFMessage, 1)[0]
+        self.assertEqual(fixed.transforms[0].child_frame_id, "drone0/mid360")
+
+    def test_marsims_graph(self):
+        """Topics and types as `rostopic list` shows them, and the frames in the messages."""
+        self.fly("--profile", "marsim")
+        self.collect("/quad_0/lidar_slam/odom", rospy.AnyMsg, 1)
+        master = rosgraph.Master("/peer")
+        types = dict(master.getTopicTypes())
+        published = dict(master.getPublishedTopics(""))
+        quad = "/quad0_pcl_render_node/"
+        shown = "/quad0_odom_visualization/"
+        expected = {
+            "/quad_0/lidar_slam/odom": "nav_msgs/Odometry",
+            "/quad_0/imu": "sensor_msgs/Imu",
+            "/quad_0/cmdRPM": "std_msgs/Float32MultiArray",
+            "/quad_0/planning/pos_cmd": "quadrotor_msgs/PositionCommand",
+            "/goal": "geometry_msgs/PoseStamped",
+            quad + "cloud": "sensor_msgs/PointCloud2",
+            quad + "sensor_cloud": "sensor_msgs/PointCloud2",
+            quad + "sensor_pose": "geometry_msgs/PoseStamped",
+            quad + "depth_img": "sensor_msgs/Image",
+            quad + "dyn_cloud": "sensor_msgs/PointCloud2",
+            quad + "uav_cloud": "sensor_msgs/PointCloud2",
+            quad + "simulator_compute_time": "geometry_msgs/PoseStamped",
+            "/map_generator/global_cloud": "sensor_msgs/PointCloud2",
+            "/tf": "tf2_msgs/TFMessage",
+            shown + "pose": "geometry_msgs/PoseStamped",
+            shown + "path": "nav_msgs/Path",
+            shown + "velocity": "visualization_msgs/Marker",
+            shown + "covariance": "visualization_msgs/Marker",
+            shown + "covariance_velocity": "visualization_msgs/Marker",
+            shown + "trajectory": "visualization_msgs/Marker",
+            shown + "sensor": "visualization_msgs/Marker",
+            shown + "robot": "visualization_msgs/Marker",
+            shown + "drone_id": "visualization_msgs/Marker",
+        }
+        self.assertEqual({t: types.get(t) for t in expected}, expected)
+        self.assertNotIn("/clock", published)
+        from sensor_msgs.msg import Image, PointCloud2
+
+        cloud = self.collect(quad + "sensor_cloud", PointCloud2, 1)[0]
+        self.assertEqual(cloud.header.frame_id, "sensor")
+        fields = [(f.name, f.offset, f.datatype, f.count) for f in cloud.fields]
+        self.assertEqual(
+            fields, [("x", 0, 7, 1), ("y", 4, 7, 1), ("z", 8, 7, 1), ("intensity", 16, 7, 1)]
+        )
+        self.assertEqual(cloud.point_step, 32)
+        image = self.collect(quad + "depth_img", Image, 1)[0]
+        self.assertEqual(image.encoding, "32FC1")
+        self.assertGreater(cloud.header.stamp.to_sec(), time.time() - 3600)
+
+    # -- in ----------------------------------------------------------------------------------
+
+    def test_every_position_command_flies_the_vehicle(self):
+        from nav_msgs.msg import Odometry
+        import genpy.dynamic
+
+        self.fly()
+        here = self.collect("/drone0/odom", Odometry, 1)[0].pose.pose.position
+        for number, (name, (definition, md5)) in enumerate(VARIANTS.items()):
+            classes = genpy.dynamic.generate_dynamic("quadrotor_msgs/PositionCommand", definition)
+            kind = classes["quadrotor_msgs/PositionCommand"]
+            if md5:
+                self.assertEqual(kind._md5sum, md5, name)
+            publisher = rospy.Publisher("/drone0/cmd/position", kind, queue_size=10)
+            target = here.z + 0.3 * (1 + number % 2)
+            try:
+                wait_for(publisher.get_num_connections, what=f"a subscriber of {name}")
+                latest = []
+                subscriber = rospy.Subscriber("/drone0/odom", Odometry, latest.append, queue_size=1)
+                message = kind()
+                message.position.x, message.position.y = here.x, here.y
+                message.position.z = target
+                message.yaw = 0.3 * number
+
+                def arrived():
+                    publisher.publish(message)
+                    if not latest:
+                        return False
+                    pose = latest[-1].pose.pose
+                    heading = 2.0 * pose.orientation.z
+                    return (abs(pose.position.z - target) < 0.05
+                            and abs(heading - 0.3 * number) < 0.1)
+
+                wait_for(arrived, 15, f"the vehicle to follow {name}")
+            finally:
+                subscriber.unregister()
+                publisher.unregister()
+
+    def test_goals_velocities_attitudes_and_rotors(self):
+        from geometry_msgs.msg import PoseStamped, TwistStamped
+        from nav_msgs.msg import Odometry
+        from std_msgs.msg import Float32MultiArray
+
+        self.fly()
+        here = self.collect("/drone0/odom", Odometry, 1)[0].pose.pose.position
+        latest = []
+        self.addCleanup(
+            rospy.Subscriber("/drone0/odom", Odometry, latest.append, queue_size=1).unregister
+        )
+
+        def publish_until(topic, message, condition, what, once=False):
+            publisher = rospy.Publisher(topic, type(message), queue_size=10)
+            wait_for(publisher.get_num_connections, what=topic)
+            if once:
+                publisher.publish(message)
+
+            def again():
+                if not once:
+                    publisher.publish(message)
+                return latest and condition(latest[-1])
+
+            wait_for(again, 20, what)
+            publisher.unregister()
+
+        goal = PoseStamped()
+        goal.header.frame_id = "world"
+        goal.pose.position.x, goal.pose.position.y = here.x + 0.3, here.y
+        goal.pose.orientation.w = 1.0
+        publish_until("/drone0/goal", goal,
+                      lambda o: abs(o.pose.pose.position.x - here.x - 0.3) < 0.03
+                      and abs(o.pose.pose.position.z - here.z) < 0.05, "the goal", once=True)
+        climb = TwistStamped()
+        climb.header.frame_id = "world"
+        climb.twist.linear.z = 0.5
+        publish_until("/drone0/cmd/velocity", climb,
+                      lambda o: o.pose.pose.position.z > here.z + 0.5, "a climb")
+        rotors = Float32MultiArray(data=[0.0] * 4)
+        publish_until("/drone0/cmd/rotors", rotors,
+                      lambda o: o.twist.twist.linear.z < -0.5, "rotors off")
+
+    def test_malformed_and_useless_commands_are_left_out(self):
+        from geometry_msgs.msg import PoseStamped, TwistStamped
+        from nav_msgs.msg import Odometry
+        from std_msgs.msg import String
+
+        process = self.fly()
+        before = self.collect("/drone0/odom", Odometry, 1)[0].pose.pose.position
+        wrong = rospy.Publisher("/drone0/goal", String, queue_size=10)  # a wrong type
+        nan = rospy.Publisher("/drone0/cmd/velocity", TwistStamped, queue_size=10)
+        wait_for(wrong.get_num_connections, what="the goal's subscriber")
+        wait_for(nan.get_num_connections, what="the velocity's subscriber")
+        message = TwistStamped()
+        message.twist.linear.x = float("nan")
+        for _ in range(20):
+            wrong.publish(String("to the left, please"))
+            nan.publish(message)
+            time.sleep(0.01)
+        wrong.unregister()
+        nan.unregister()
+        time.sleep(0.3)
+        after = self.collect("/drone0/odom", Odometry, 1)[0].pose.pose.position
+        self.assertLess(abs(after.x - before.x) + abs(after.z - before.z), 0.05)
+        self.assertIsNone(process.poll())
+        text = self.stop_and_read(process)
+        self.assertIn("that is no geometry_msgs/PoseStamped", text)
+        self.assertIn("20 malformed messages were left out", text)
+        self.assertIn("not finite", text)
+        self.assertIn("20 rejected", text)
+
+    def stop_and_read(self, process):
+        process.send_signal(signal.SIGINT)
+        process.wait(timeout=20)
+        self.log.seek(0)
+        return self.log.read()
+
+    def test_pause_step_and_reset(self):
+        from rosgraph_msgs.msg import Clock
+        from std_msgs.msg import Bool, Empty
+
+        process = self.fly()
+        clocks = []
+        self.addCleanup(rospy.Subscriber("/clock", Clock, clocks.append, queue_size=1).unregister)
+        pause = rospy.Publisher("/pointflight/pause", Bool, queue_size=10)
+        step = rospy.Publisher("/pointflight/step", Empty, queue_size=10)
+        reset = rospy.Publisher("/pointflight/reset", Empty, queue_size=10)
+        for publisher in (pause, step, reset):
+            wait_for(publisher.get_num_connections, what=publisher.name)
+            self.addCleanup(publisher.unregister)
+        now = lambda: clocks[-1].clock.to_nsec()
+        wait_for(lambda: len(clocks) > 100, what="the clock")
+        pause.publish(True)
+        time.sleep(0.5)
+        still, count = now(), len(clocks)
+        time.sleep(0.5)
+        self.assertEqual(now(), still)
+        self.assertGreater(len(clocks), count)  # goes on with the same time
+        step.publish()
+        wait_for(lambda: now() > still, what="a step")
+        time.sleep(0.5)
+        stepped = now()
+        self.assertLess(stepped - still, 0.15e9)  # to the next scan
+        pause.publish(False)
+        wait_for(lambda: now() > stepped + 1e8, what="going on")
+        reset.publish()
+        wait_for(lambda: "reset" in open(self.log.name).read(), what="the reset")
+        time.sleep(0.5)
+        times = [c.clock.to_nsec() for c in clocks]
+        self.assertEqual(times, sorted(times))  # no jump back
+        self.assertIsNone(process.poll())
+
+    # -- the rest ----------------------------------------------------------------------------
+
+    def test_without_a_master(self):
+        environment = dict(os.environ, ROS_MASTER_URI=f"http://127.0.0.1:{free_port()}")
+        waiting = subprocess.Popen(
+            [PROGRAM, "fly", self.map, "--ros1"], env=environment, stderr=subprocess.PIPE, text=True
+        )
+        lines = []
+        for line in waiting.stderr:
+            lines.append(line)
+            if "no master" in line:
+                break
+        self.assertIn("start roscore", lines[-1])
+        waiting.send_signal(signal.SIGINT)
+        self.assertEqual(waiting.wait(timeout=10), 130)
+        waiting.stderr.close()
+        # flies on if asked to
+        done = subprocess.run(
+            [PROGRAM, "fly", self.scenario(), "--ros1", "--no-wait", "--rate", "max"],
+            env=environment, capture_output=True, text=True, timeout=60,
+        )
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("completed", done.stdout)
+
+    def scenario(self):
+        """A flight of three metres."""
+        path = self.folder.name + "/s.yaml"
+        subprocess.run([PROGRAM, "scenario", "new", self.map, "-o", path, "--length", "3"],
+                       check=True, capture_output=True)
+        return path
+
+    def test_a_bag_is_read_and_played(self):
+        bag = self.folder.name + "/run.bag"
+        subprocess.run([PROGRAM, "fly", self.scenario(), "--record", bag, "--profile", "livox"],
+                       check=True, capture_output=True)
+        info = subprocess.run(["/usr/bin/rosbag", "info", "-y", bag], check=True,
+                              capture_output=True, text=True).stdout
+        self.assertIn("livox_ros_driver2/CustomMsg", info)
+        self.assertIn("e4d6829bdfe657cb6c21a746c86b21a6", info)
+        with rosbag.Bag(bag) as opened:
+            for topic, message, stamp in opened.read_messages(topics=["/livox/imu"]):
+                self.assertAlmostEqual(message.header.stamp.to_sec(), stamp.to_sec(), delta=1e-6)
+            clouds = [m for _, m, _ in opened.read_messages(topics=["/livox/lidar"])]
+        self.assertEqual(clouds[0].point_num, len(clouds[0].points))  # by the bag's own definition
+        got = []
+        subscriber = rospy.Subscriber("/livox/imu", rospy.AnyMsg, got.append, queue_size=1000)
+        subprocess.run(["/usr/bin/rosbag", "play", "-q", "-r", "5", bag], check=True,
+                       capture_output=True, timeout=60)
+        self.assertGreater(len(got), 100)
+        subscriber.unregister()
+        # cut short: said, and whole chunks come back
+        with open(bag, "rb") as source:
+            data = source.read()
+        cut = self.folder.name + "/cut.bag"
+        with open(cut, "wb") as target:
+            target.write(data[: len(data) * 3 // 4])
+        told = subprocess.run([PROGRAM, "bag", "info", cut], capture_output=True, text=True)
+        self.assertEqual(told.returncode, 2)
+        subprocess.run(["/usr/bin/rosbag", "reindex", "-q", cut], check=True, capture_output=True)
+        with rosbag.Bag(cut) as opened:
+            self.assertGreater(opened.get_message_count(), 100)
+
+    def test_lockstep_waits_for_the_planner(self):
+        """Two flights, one beside a slow planner, are the same to the last bit."""
+        from nav_msgs.msg import Odometry
+        from sensor_msgs.msg import PointCloud2
+        from geometry_msgs.msg import TwistStamped
+
+        flights = []
+        for delay in (0.0, 0.12):
+            poses = []
+            scans = []
+            publisher = rospy.Publisher("/drone0/cmd/velocity", TwistStamped, queue_size=10)
+
+            def plan(cloud):
+                time.sleep(delay)
+                scans.append(cloud.header.stamp.to_nsec())
+                command = TwistStamped()
+                command.header.frame_id = "world"
+                command.twist.linear.z = 0.3 if len(scans) % 3 else -0.2
+                publisher.publish(command)
+
+            planner = rospy.Subscriber("/drone0/mid360/points", PointCloud2, plan, queue_size=10)
+            recorder = rospy.Subscriber("/drone0/odom", Odometry, poses.append, queue_size=1000)
+            process = self.fly("--lockstep", "10")
+            wait_for(lambda: len(scans) > 30, 60, "three seconds of flight")
+            self.assertNotIn("no command within", self.stop_and_read(process))
+            for endpoint in (planner, recorder, publisher):
+                endpoint.unregister()
+            time.sleep(0.5)  # until the master has heard of it
+            flights.append(
+                (scans[:30], {p.header.stamp.to_nsec(): p.pose.pose.position.z for p in poses})
+            )
+        (first_scans, first), (second_scans, second) = flights
+        self.assertEqual(first_scans, second_scans)
+        common = [t for t in sorted(set(first) & set(second)) if t < first_scans[-1]]
+        self.assertGreater(len(common), 400)
+        self.assertEqual([first[t] for t in common], [second[t] for t in common])
+        self.assertGreater(max(first.values()) - min(first.values()), 0.1)
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2, warnings="ignore")
