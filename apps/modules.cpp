@@ -46,4 +46,10 @@ const Ros1Module& ros1_module() {
   return module;
 }
 
+const Ros2Module& ros2_module() {
+  static const Ros2Module& module =
+      load<Ros2Module>("pointflight_ros2", "ROS 2", "libfastrtps-dev and libfastcdr-dev");
+  return module;
+}
+
 }  // namespace pointflight::apps

@@ -7,5 +7,7 @@ namespace pointflight::apps {
 /// The library that speaks ROS 1, loaded when first asked for. Throws InputError that says what to
 /// install where this build has none.
 const Ros1Module& ros1_module();
+/// The same for ROS 2.
+const Ros2Module& ros2_module();
 
 }  // namespace pointflight::apps

@@ -70,6 +70,9 @@ class RosSession::ScanCount : public SampleSink {
 
 void add_ros_flags(CLI::App& app, RosFlags& flags) {
   app.add_flag("--ros1", flags.ros1, "Publish to ROS 1 and take commands from it, in real time");
+  app.add_flag("--ros2", flags.ros2, "The same with ROS 2, for which none has to be installed");
+  app.add_flag("--ros2-localhost", flags.localhost, "Let only this machine find the ROS 2 node");
+  app.add_flag("--shm", flags.shared_memory, "Offer ROS 2 messages in shared memory as well");
   app.add_option("--profile",
                  flags.profile,
                  "Names of messages: default, marsim, ego, livox, ... or a path (docs/ros.md)");
@@ -134,7 +137,10 @@ RosSession::RosSession(const RosFlags& flags, Simulation& simulation)
   TransportOptions options;
   options.node = flags.node;
   options.log = [](const std::string& text) { log(text); };
+  options.localhost_only = flags.localhost;
+  options.shared_memory = flags.shared_memory;
   if (flags.ros1) transports_.push_back(ros1_module().transport(options));
+  if (flags.ros2) transports_.push_back(ros2_module().transport(options));
   inbox_ = std::make_unique<Inbox>(simulation, profile);
   for (const auto& transport : transports_) {
     bridge_->add(*transport);

@@ -14,6 +14,9 @@ namespace pointflight::apps {
 /// Flags of `fly` for ROS and recordings.
 struct RosFlags {
   bool ros1 = false;
+  bool ros2 = false;
+  bool localhost = false;      ///< ROS 2: no other machine.
+  bool shared_memory = false;  ///< ROS 2.
   std::string node = "pointflight";
   bool no_wait = false;              ///< Fly on without a master.
   std::string profile;               ///< Empty: the scenario's.
@@ -23,7 +26,7 @@ struct RosFlags {
   std::string compression = "zstd";
 
   /// Somebody outside may listen and command.
-  [[nodiscard]] bool is_live() const { return ros1; }
+  [[nodiscard]] bool is_live() const { return ros1 || ros2; }
   [[nodiscard]] bool any() const { return is_live() || !records.empty(); }
 };
 
