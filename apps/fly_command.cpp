@@ -76,6 +76,13 @@ class Pace {
     from_ = time;
   }
 
+  /// How long ago an instant was due, s.
+  [[nodiscard]] std::optional<double> late(SimTime time) const {
+    if (rate_ <= 0.0) return std::nullopt;
+    const std::chrono::duration<double> since = Clock::now() - start_;
+    return since.count() - to_seconds(time - from_) / rate_;
+  }
+
   void wait_for(SimTime time) const {
     if (rate_ <= 0.0) return;
     const auto due = start_ + std::chrono::duration_cast<Clock::duration>(
@@ -280,6 +287,7 @@ int fly(const FlyFlags& flags) {
   const SimulationState at_start = simulation.state();
   if (!ros.start()) return kInterrupted;
   Pace pace(rate);
+  ros.measure_lateness([&](SimTime time) { return pace.late(time); });
   const auto start = Clock::now();
   for (bool running = true; running;) {
     SampleSplitter sink;

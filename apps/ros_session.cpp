@@ -63,9 +63,14 @@ std::string text_of(const Scenario& scenario) {
 /// Counts scans, for lockstep.
 class RosSession::ScanCount : public SampleSink {
  public:
-  void on_scan(const Scan& /*scan*/, const PoseAt& /*pose_at*/) override { ++scans; }
+  void on_scan(const Scan& scan, const PoseAt& /*pose_at*/) override {
+    ++scans;
+    if (const auto late = lateness ? lateness(scan.end) : std::nullopt) delays.push_back(*late);
+  }
   std::uint64_t scans = 0;
   std::uint64_t answered = 0;
+  Lateness lateness;
+  std::vector<double> delays;  ///< From a scan's end until it was handed over, s.
 };
 
 void add_ros_flags(CLI::App& app, RosFlags& flags) {
@@ -153,6 +158,10 @@ RosSession::RosSession(const RosFlags& flags, Simulation& simulation)
 }
 
 RosSession::~RosSession() = default;
+
+void RosSession::measure_lateness(Lateness lateness) {
+  if (scans_ && flags_.is_live()) scans_->lateness = std::move(lateness);
+}
 
 SampleSink* RosSession::sink() {
   return splitter_.get();
@@ -276,6 +285,13 @@ void RosSession::close() {
     if (transport->dropped() > 0) {
       log(fmt::format("{} messages were dropped for slow subscribers", transport->dropped()));
     }
+  }
+  if (scans_ && !scans_->delays.empty()) {
+    auto& delays = scans_->delays;
+    std::sort(delays.begin(), delays.end());
+    log(fmt::format("scans left {:.1f} ms after their end (median), {:.1f} ms at p99",
+                    1e3 * delays[delays.size() / 2],
+                    1e3 * delays[delays.size() * 99 / 100]));
   }
   if (inbox_ && inbox_->malformed() > 0) {
     log(fmt::format("{} malformed messages were left out", inbox_->malformed()));

@@ -1,8 +1,9 @@
 #pragma once
 
 #include <CLI/App.hpp>
-#include <chrono>
+#include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -45,6 +46,10 @@ class RosSession {
 
   /// Where samples go, or null where nothing was asked for.
   [[nodiscard]] SampleSink* sink();
+  /// How late an instant of the run is by the wall clock, s; nothing where it is not held to it.
+  using Lateness = std::function<std::optional<double>(SimTime time)>;
+  void measure_lateness(Lateness lateness);
+
   /// Connects; waits for a master where there is none yet. False where it was interrupted.
   bool start();
 
@@ -57,7 +62,7 @@ class RosSession {
   /// After the simulation was set back to its start.
   void was_reset(SimTime reached);
 
-  /// Recordings get their names; says what was recorded, and what went wrong.
+  /// Recordings get their names; says what was recorded, how late scans left, what went wrong.
   void close();
 
  private:

@@ -38,7 +38,6 @@ class Ros1Transport : public Transport {
 
   int advertise(const Topic& topic) override {
     topics_.push_back(std::make_unique<Topic>(topic));
-    latched_.emplace_back();
     return static_cast<int>(topics_.size()) - 1;
   }
 
@@ -61,7 +60,6 @@ class Ros1Transport : public Transport {
   }
 
   bool has_readers(int topic) const override {
-    if (topics_[static_cast<std::size_t>(topic)]->latched) return true;
     return connected_ && publishers_[static_cast<std::size_t>(topic)].getNumSubscribers() > 0;
   }
 
@@ -69,10 +67,7 @@ class Ros1Transport : public Transport {
     const auto i = static_cast<std::size_t>(topic);
     if (!connected_) {
       const std::lock_guard<std::mutex> lock(mutex_);
-      if (!connected_) {
-        if (topics_[i]->latched) latched_[i] = bytes;  // for when the master is there
-        return;
-      }
+      if (!connected_) return;
     }
     publishers_[i].publish(RawMessage{topics_[i].get(), bytes});
   }
@@ -111,9 +106,6 @@ class Ros1Transport : public Transport {
     for (const auto& topic : topics_) publishers_.push_back(advertised(*topic));
     for (const Input& input : inputs_) subscribers_.push_back(subscribed(input));
     had_sender_.assign(inputs_.size(), false);
-    for (std::size_t i = 0; i < topics_.size(); ++i) {
-      if (latched_[i]) publishers_[i].publish(RawMessage{topics_[i].get(), latched_[i]});
-    }
     spinner_ = std::make_unique<ros::AsyncSpinner>(1);
     spinner_->start();
     connected_ = true;
@@ -199,7 +191,6 @@ class Ros1Transport : public Transport {
 
   TransportOptions options_;
   std::vector<std::unique_ptr<Topic>> topics_;
-  std::vector<Bytes> latched_;  ///< Sent before there was a master.
   std::vector<Input> inputs_;
   std::unique_ptr<ros::NodeHandle> node_;
   std::vector<ros::Publisher> publishers_;

@@ -306,8 +306,7 @@ class Ros2Transport : public Transport {
   }
 
   bool has_readers(int topic) const override {
-    const Output& out = *outputs_[static_cast<std::size_t>(topic)];
-    return out.topic.latched || out.readers > 0;
+    return outputs_[static_cast<std::size_t>(topic)]->readers > 0;
   }
 
   void send(int topic, const Bytes& bytes, std::int64_t /*time*/) override {
@@ -321,7 +320,11 @@ class Ros2Transport : public Transport {
       if (oldest != queue_.end()) queue_.erase(oldest);
       ++dropped_;
     }
-    ready_.notify_one();
+  }
+
+  void flush() override {
+    const std::lock_guard lock(mutex_);
+    if (!queue_.empty()) ready_.notify_one();  // once for a step, not for each message
   }
 
   std::uint64_t dropped() const override { return dropped_; }

@@ -16,6 +16,7 @@ namespace {
 
 constexpr std::size_t kMapPointsMax = 1'000'000;
 constexpr std::size_t kPathPosesMax = 2000;
+constexpr Duration kLatchedPeriod = std::chrono::milliseconds(50);
 constexpr double kPathSpacing = 0.1;     // m between poses of a path
 constexpr double kSurfaceSpacing = 0.1;  // m between points on obstacles
 constexpr std::size_t kScanTimes = 21;   // that MARSIM takes the mean of
@@ -55,7 +56,10 @@ struct RosBridge::Stream : OutputStream {
 };
 
 RosBridge::RosBridge(const Simulation& simulation, const RosProfile& profile, Duration epoch)
-    : simulation_(simulation), profile_(profile), epoch_(epoch) {
+    : simulation_(simulation),
+      profile_(profile),
+      epoch_(epoch),
+      next_latched_(SimTime{} + kLatchedPeriod) {
   for (OutputStream& stream : output_streams(simulation, profile)) {
     streams_.push_back(std::make_unique<Stream>(std::move(stream)));
   }
@@ -138,14 +142,35 @@ void RosBridge::start() {
   for (Outlet* outlet : outlets_) outlet->start();
   on_time(SimTime{});  // the clock before anything with a stamp
   for (const auto& stream : streams_) {
-    if (stream->type->kind == OutputKind::kMap) send_map(*stream);
+    if (!is_wanted(*stream)) continue;
+    if (stream->type->kind == OutputKind::kMap) send(*stream, map_message(*stream), SimTime{});
     if (stream->type->kind == OutputKind::kTfStatic) send_static_transforms(*stream);
+  }
+  for (Outlet* outlet : outlets_) outlet->flush();
+}
+
+/// What is sent once, when the first reader is there; others get it from the transport.
+void RosBridge::send_latched() {
+  for (const auto& stream : streams_) {
+    if (!stream->type->latched || stream->sent > 0) continue;
+    if (stream->type->kind == OutputKind::kTfStatic && is_wanted(*stream)) {
+      send_static_transforms(*stream);
+    }
+    if (stream->type->kind != OutputKind::kMap) continue;
+    if (map_.valid()) {
+      if (map_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) continue;
+      send(*stream, map_.get(), latest_);
+    } else if (is_wanted(*stream)) {
+      // half a second of work for a large map: beside the flight
+      map_ = std::async(std::launch::async, [this, &s = *stream] { return map_message(s); });
+    }
   }
 }
 
 void RosBridge::shift_epoch(Duration by) {
   epoch_ += by;
   latest_ = SimTime{};
+  next_latched_ = SimTime{} + kLatchedPeriod;
   for (const auto& stream : streams_) {
     stream->next = 0;
     stream->first.reset();
@@ -159,12 +184,12 @@ void RosBridge::send_cloud(Stream& stream, const std::vector<Vector3f>& points, 
   send(stream, std::move(cloud), time);
 }
 
-void RosBridge::send_map(Stream& stream) {
+msg::PointCloud2 RosBridge::map_message(const Stream& stream) const {
   const MapCloud map = map_cloud(simulation_.map(), stream.settings.resolution, kMapPointsMax);
   msg::PointCloud2 cloud =
       cloud_of_points(map.points, map.intensities, layout_of(stream.settings, "xyzi"));
   cloud.header = header_of(SimTime{}, epoch_, stream.settings.frame);
-  send(stream, std::move(cloud), SimTime{});
+  return cloud;
 }
 
 void RosBridge::send_static_transforms(Stream& stream) {
@@ -212,6 +237,11 @@ void RosBridge::on_time(SimTime time) {
       send_diagnostics(*stream, time);
     }
   }
+  if (time >= next_latched_) {
+    next_latched_ = time + kLatchedPeriod;
+    send_latched();
+  }
+  for (Outlet* outlet : outlets_) outlet->flush();
 }
 
 void RosBridge::repeat_clock() {
@@ -219,6 +249,7 @@ void RosBridge::repeat_clock() {
     if (stream->type->kind != OutputKind::kClock || !is_wanted(*stream)) continue;
     send(*stream, msg::Clock{stamp_of(latest_, epoch_)}, latest_);
   }
+  for (Outlet* outlet : outlets_) outlet->flush();
 }
 
 void RosBridge::on_odometry(const OdometrySample& sample) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <future>
 #include <map>
 #include <memory>
 #include <vector>
@@ -23,7 +24,8 @@ class RosBridge : public SampleSink {
 
   /// Before `start`. The outlet must outlive the bridge.
   void add(Outlet& outlet);
-  /// Makes all topics known and sends what is latched: map, static transforms.
+  /// Makes all topics known and sends what is latched (map, static transforms) where somebody is
+  /// there; later to the first who comes.
   void start();
 
   /// The run has reached a time: sends what follows the clock. Call after each step.
@@ -58,7 +60,8 @@ class RosBridge : public SampleSink {
   template <class M>
   void send(Stream& stream, M message, SimTime leaves);
   void send_cloud(Stream& stream, const std::vector<Vector3f>& points, SimTime time);
-  void send_map(Stream& stream);
+  void send_latched();
+  [[nodiscard]] msg::PointCloud2 map_message(const Stream& stream) const;
   void send_static_transforms(Stream& stream);
   void send_path(Stream& stream, const OdometrySample& sample);
   void send_markers(Stream& stream, const OdometrySample& sample);
@@ -74,7 +77,9 @@ class RosBridge : public SampleSink {
   std::vector<ObstacleSample> obstacles_;  ///< Of one instant, not sent yet.
   std::int32_t collisions_ = 0;
   std::vector<double> scan_times_;
-  SimTime latest_;  ///< That anything left at.
+  std::future<msg::PointCloud2> map_;  ///< In the making, for a reader that came late.
+  SimTime next_latched_;               ///< When somebody is looked for who wants it.
+  SimTime latest_;                     ///< That anything left at.
 };
 
 }  // namespace pointflight

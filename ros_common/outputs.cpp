@@ -22,6 +22,7 @@ MessageType type_of() {
   return type;
 }
 
+// lockstep runs in bursts: what comes between two scans must fit
 constexpr std::size_t kImuDepth = 200;  // a second: those who integrate must not lose one
 
 constexpr OutputType kTypes[] = {
@@ -69,7 +70,10 @@ constexpr OutputType kTypes[] = {
      "odometry",
      Per::kVehicle,
      type_of<msg::Odometry>,
-     "true pose and velocities"},
+     "true pose and velocities",
+     false,
+     false,
+     100},
     {OutputKind::kPose, "pose", Per::kVehicle, type_of<msg::PoseStamped>, "true pose"},
     {OutputKind::kCameraPose,
      "camera_pose",

@@ -68,6 +68,9 @@ class Outlet {
   /// `time`: ns since the Unix epoch, when the message leaves; not before the last one's.
   virtual void send(int topic, const Bytes& bytes, std::int64_t time) = 0;
 
+  /// What was sent may leave now: called after each step.
+  virtual void flush() {}
+
   /// Ends what is open; nothing is sent after.
   virtual void close() {}
 };

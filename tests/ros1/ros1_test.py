@@ -195,7 +195,7 @@ class Ros1Test(unittest.TestCase):
 
             self.addCleanup(rospy.Subscriber(topic, kind, callback, queue_size=1000).unregister)
         wait_for(lambda: len(kept["/drone0/mid360/points"]) >= 41, 60, "41 scans")
-        expected = {"/clock": 200, "/drone0/odom": 200, "/drone0/imu": 200,
+        expected = {"/clock": 100, "/drone0/odom": 200, "/drone0/imu": 200,
                     "/drone0/mid360/points": 10}
         for topic, hertz in expected.items():
             stamps = [

@@ -114,7 +114,7 @@ TEST(RosBridge, SendsTheDefaultProfile) {
   EXPECT_EQ(clouds[0].point_step, 26u);
   EXPECT_GT(clouds[0].width, 10000u);
 
-  EXPECT_EQ(keeper.of<msg::Clock>("/clock").size(), 201u);
+  EXPECT_EQ(keeper.of<msg::Clock>("/clock").size(), 101u);
   EXPECT_EQ(keeper.of<msg::TFMessage>("/tf").size(), 101u);
   const auto fixed = keeper.of<msg::TFMessage>("/tf_static");
   ASSERT_EQ(fixed.size(), 1u);
