@@ -50,7 +50,8 @@ struct ParticipantEntitiesInfo {
   }
 };
 
-/// Of the 16-byte form.
+/// Of the 16-byte form, as Jazzy has it (its strings are bounded, which changes no byte on the
+/// wire).
 inline constexpr const char* kGraphTypeHash =
     "RIHS01_91a0593bacdcc50ea9bdcf849a938b128412cc1ea821245c663bcd26f83c295e";
 

@@ -5,6 +5,7 @@
 
 #include "pointflight/core/random.hpp"
 #include "ros_common/description.hpp"
+#include "tests/support.hpp"
 
 namespace pointflight {
 namespace {
@@ -144,6 +145,19 @@ TEST(MessageTypes, DefinitionsNameNestedTypesOnce) {
   EXPECT_NE(ros2.find("MSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n"),
             std::string::npos);
   EXPECT_EQ(ros2.find("seq"), std::string::npos);
+}
+
+TEST(MessageTypes, TheFilesForWorkspacesSayTheSame) {
+  const auto expect_file = [](const std::string& path, const TypeDescription& type) {
+    const std::string text = definition_text(type, 2);
+    EXPECT_EQ(testing::read_file(POINTFLIGHT_SOURCE "/ros/messages/" + path),
+              text.substr(0, text.find("====")))
+        << path;
+  };
+  expect_file("quadrotor_msgs/msg/PositionCommand.msg", describe_message<PositionCommandShort>(2));
+  expect_file("quadrotor_msgs/msg/TakeoffLand.msg", describe_message<TakeoffLand>(2));
+  expect_file("mars_quadrotor_msgs/msg/PositionCommand.msg",
+              describe_message<PositionCommandLong>(2));
 }
 
 std::string hex(std::span<const std::byte> bytes) {
