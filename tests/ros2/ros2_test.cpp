@@ -4,6 +4,8 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <ifaddrs.h>
+#include <net/if.h>
 #include <signal.h>
 #include <sys/resource.h>
 #include <sys/time.h>
@@ -46,8 +48,13 @@ bool eventually(const Condition& condition, double seconds = 20.0) {
 /// A participant of Cyclone DDS on this machine.
 class Peer {
  public:
-  Peer() {
-    setenv("CYCLONEDDS_URI", kConfiguration, 1);
+  /// `as_is`: with the defaults of its own, multicast among them.
+  explicit Peer(bool as_is = false) {
+    if (as_is) {
+      unsetenv("CYCLONEDDS_URI");
+    } else {
+      setenv("CYCLONEDDS_URI", kConfiguration, 1);
+    }
     participant_ = dds_create_participant(domain(), nullptr, nullptr);
     EXPECT_GT(participant_, 0) << dds_strretcode(-participant_);
   }
@@ -303,6 +310,35 @@ TEST_F(Ros2, ANodeOfThisNameWithItsEndpointsIsInTheGraph) {
             "typehash=RIHS01_10f3786d7d40fd2b54367835614bff85d4ad3b5dab62bf8bca0cc232d73b4cd8;");
   EXPECT_EQ(hashes["rt/tf"],
             "typehash=RIHS01_e369d0f05a23ae52508854b66f6aa0437f3449d652e8cbf22d5abe85d020f087;");
+}
+
+/// True where this machine is on a network whose nodes can be asked all at once.
+bool has_multicast() {
+  ifaddrs* all = nullptr;
+  if (getifaddrs(&all) != 0) return false;
+  bool found = false;
+  for (const ifaddrs* i = all; i != nullptr; i = i->ifa_next) {
+    const bool up = (i->ifa_flags & IFF_UP) != 0 && (i->ifa_flags & IFF_RUNNING) != 0;
+    const bool outside = (i->ifa_flags & IFF_LOOPBACK) == 0;
+    const bool v4 = i->ifa_addr != nullptr && i->ifa_addr->sa_family == AF_INET;
+    found = found || (up && outside && v4 && (i->ifa_flags & IFF_MULTICAST) != 0);
+  }
+  freeifaddrs(all);
+  return found;
+}
+
+TEST_F(Ros2, IsFoundByAPeerInTheDefaultEnvironment) {
+  if (!has_multicast()) GTEST_SKIP() << "no network with multicast here";
+  for (const char* variable : {"ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_LOCALHOST_ONLY"}) {
+    unsetenv(variable);
+  }
+  Flight flight({map(), "--ros2"}, *folder_ / "default.log");
+  Peer peer(true);
+  Reader<nav_msgs_msg_dds__Odometry_> odometry(
+      peer, "rt/drone0/odom", nav_msgs_msg_dds__Odometry__desc, true);
+  int count = 0;
+  EXPECT_TRUE(eventually([&] { return (count += odometry.take([](const auto&) {})) > 50; }))
+      << flight.stop();
 }
 
 TEST_F(Ros2, EveryTypeArrivesReliableAndBestEffort) {
