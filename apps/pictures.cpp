@@ -262,8 +262,7 @@ void RunPicture::on_scan(const Scan& scan, const PoseAt& pose_at) {
       ++seen_offered_;
       continue;
     }
-    const Vector3d p =
-        pose_at(scan.start + point.time_offset) * point.position_sensor.cast<double>();
+    const Vector3d p = pose_at(scan.seen_at(point)) * point.position_sensor.cast<double>();
     if (moving) {
       if (seen_moving.size() < 400000 && i % 4 == 0) seen_moving.push_back(p);
     } else {

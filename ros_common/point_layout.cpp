@@ -205,7 +205,7 @@ msg::Time stamp_of(SimTime time, Duration epoch) {
 }
 
 SimTime cloud_time(const Scan& scan, bool timed) {
-  if (!timed) return scan.start + (scan.end - scan.start) / 2;
+  if (!timed) return scan.middle;
   return scan.points.empty() ? scan.start : scan.start + scan.points.front().time_offset;
 }
 

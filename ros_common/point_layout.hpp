@@ -49,7 +49,7 @@ const PointLayout& point_layout(const std::string& name);
 std::span<const PointLayout> point_layouts();
 
 /// The instant that a cloud of this scan is stamped with: that of its first point where points have
-/// times (the scan's start without points), else the middle of the scan.
+/// times (the scan's start without points), else `Scan::middle`.
 SimTime cloud_time(const Scan& scan, bool timed);
 
 /// The scan as a cloud: height 1, no NaN, in firing order. Stamps count from `epoch`. Positions are

@@ -64,12 +64,12 @@ std::vector<Vector3f> world_points(const Scan& scan, const PoseAt& pose_at) {
   std::vector<Vector3f> points;
   points.reserve(scan.points.size());
   // several points leave at one time: their pose is worked out once
-  Duration known{-1};
+  SimTime known = SimTime::min();
   Pose pose;
   for (const ScanPoint& point : scan.points) {
-    if (point.time_offset != known) {
-      known = point.time_offset;
-      pose = pose_at(scan.start + known);
+    if (scan.seen_at(point) != known) {
+      known = scan.seen_at(point);
+      pose = pose_at(known);
     }
     points.emplace_back((pose * point.position_sensor.cast<double>()).cast<float>());
   }

@@ -42,7 +42,7 @@ class Eyes : public SampleSink {
   void on_scan(const Scan& scan, const PoseAt& pose_at) override {
     if (recorder_ != nullptr) recorder_->on_scan(scan, pose_at);
     for (const ScanPoint& point : scan.points) {
-      const Pose T_world_sensor = pose_at(scan.start + point.time_offset);
+      const Pose T_world_sensor = pose_at(scan.seen_at(point));
       seen.push_back(
           {T_world_sensor.translation, T_world_sensor * point.position_sensor.cast<double>()});
     }

@@ -66,6 +66,11 @@ Scan Lidar::take(const ScanRequest& request,
   // world rays, each from the pose at its own time
   const Pose middle = pose_at(request.start + period() / 2);
   const bool snapshot = request.snapshot || renderer.is_snapshot();
+  scan.snapshot = snapshot;
+  scan.middle = request.start + period() / 2;
+  if (!snapshot && !beams.empty()) {
+    scan.middle = request.start + (beams.front().time_offset + beams.back().time_offset) / 2;
+  }
   std::vector<Ray> rays(beams.size());
   std::vector<Duration> offsets(request.bodies.empty() || snapshot ? 0 : beams.size());
   const auto range_max = static_cast<float>(settings_.range_max);

@@ -29,7 +29,14 @@ struct Scan {
   SimTime start;
   SimTime end;
   std::size_t beams = 0;  ///< Fired, whether they returned or not.
+  bool snapshot = false;  ///< All beams left from the sensor's pose at `middle`.
+  SimTime middle;         ///< Between first and last beam (a camera's: its start).
   std::vector<ScanPoint> points;
+
+  /// When the sensor was where it saw a point from.
+  [[nodiscard]] SimTime seen_at(const ScanPoint& point) const {
+    return snapshot ? middle : start + point.time_offset;
+  }
 };
 
 /// Writes x y z intensity range time (float32; time in seconds after the scan's start), ring

@@ -145,10 +145,15 @@ TEST(RosBridge, ImuSamplesThatCoverAScanComeBeforeIt) {
   EXPECT_EQ(scans, 10);
 }
 
-TEST(RosBridge, WorldCloudsLieOnTheMap) {
+class WorldClouds : public ::testing::TestWithParam<bool> {};
+INSTANTIATE_TEST_SUITE_P(Snapshot, WorldClouds, ::testing::Bool());
+
+TEST_P(WorldClouds, LieOnTheMap) {
   Keeper keeper;
   Scenario scenario = flight();
   scenario.vehicles[0].lidars[0].noise = false;
+  scenario.vehicles[0].lidars[0].snapshot = GetParam();
+  scenario.vehicles[0].mission.motion = {6.0, 8.0, 40.0};  // fast enough to show
   fly(scenario, load_ros_profile("default"), keeper);
   const auto clouds = keeper.of<msg::PointCloud2>("/drone0/mid360/points_world");
   ASSERT_EQ(clouds.size(), 10u);

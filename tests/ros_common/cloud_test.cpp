@@ -22,6 +22,7 @@ Scan scan_of_three() {
   Scan scan;
   scan.start = SimTime(std::chrono::seconds(2));
   scan.end = scan.start + std::chrono::milliseconds(100);
+  scan.middle = scan.start + std::chrono::milliseconds(50);
   scan.beams = 4;
   for (int i = 0; i < 3; ++i) {
     ScanPoint p{};
