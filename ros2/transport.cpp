@@ -38,8 +38,10 @@ namespace rtps = eprosima::fastrtps::rtps;
 namespace transports = eprosima::fastdds::rtps;
 
 constexpr const char* kPacing = "pointflight_large";
-// a fragment of 64 kB each millisecond: stock receive buffers of 208 kB lose nothing
+// a fragment of 64 kB each millisecond, 59 MB/s: stock receive buffers of 208 kB lose nothing
 constexpr std::int32_t kBytesAPeriod = 65536;
+constexpr double kOneFragmentRate = 45e6;  // bytes a second up to which that is enough
+constexpr double kTwoFragmentsRate = 90e6;
 constexpr std::uint32_t kReceiveBuffer = 4u << 20;
 constexpr std::uint32_t kSharedSegment = 16u << 20;
 constexpr std::size_t kQueueMax = 2000;  // messages that wait to be written
@@ -69,8 +71,11 @@ std::optional<std::string> environment(const char* name) {
 /// A participant that other ROS 2 nodes see as a node of its name.
 class Node {
  public:
-  Node(const std::string& name, const DiscoverySettings& discovery, bool shared_memory)
-      : name_(name), discovery_(discovery), shared_memory_(shared_memory) {
+  Node(const std::string& name, const DiscoverySettings& discovery, const TransportOptions& options)
+      : name_(name),
+        discovery_(discovery),
+        shared_memory_(options.shared_memory),
+        fragments_(options.large_rate > kOneFragmentRate ? 2 : 1) {
     auto* factory = dds::DomainParticipantFactory::get_instance();
     participant_ = factory->create_participant(discovery_.domain, participant_qos());
     if (participant_ == nullptr) {
@@ -232,7 +237,7 @@ class Node {
     auto pacing = std::make_shared<transports::FlowControllerDescriptor>();
     pacing->name = kPacing;
     pacing->scheduler = transports::FlowControllerSchedulerPolicy::FIFO;
-    pacing->max_bytes_per_period = kBytesAPeriod;
+    pacing->max_bytes_per_period = fragments_ * kBytesAPeriod;
     pacing->period_ms = 1;
     qos.flow_controllers().push_back(pacing);
     return qos;
@@ -241,6 +246,7 @@ class Node {
   std::string name_;
   DiscoverySettings discovery_;
   bool shared_memory_;
+  std::int32_t fragments_;  ///< Of 64 kB that leave in a millisecond.
   dds::DomainParticipant* participant_ = nullptr;
   dds::Publisher* publisher_ = nullptr;
   dds::Subscriber* subscriber_ = nullptr;
@@ -255,6 +261,14 @@ class Ros2Transport : public Transport {
   explicit Ros2Transport(const TransportOptions& options)
       : options_(options), discovery_(discovery_from(environment)) {
     if (options.localhost_only) discovery_.range = DiscoverySettings::Range::kLocalhost;
+    if (options.log && options.large_rate > kOneFragmentRate) {
+      const std::string rate = std::to_string(static_cast<int>(1e-6 * options.large_rate));
+      options.log(options.large_rate > kTwoFragmentsRate
+                      ? "ROS 2: clouds of up to " + rate + " MB/s if all are read: more than UDP " +
+                            "carries here; read fewer, or lower their rates (ros.outputs)"
+                      : "ROS 2: clouds of up to " + rate + " MB/s if all are read: receive " +
+                            "buffers of stock size may lose some (net.core.rmem_max)");
+    }
     add_node();
   }
 
@@ -387,8 +401,7 @@ class Ros2Transport : public Transport {
 
   void add_node() {
     const std::string number = nodes_.empty() ? "" : "_" + std::to_string(nodes_.size() + 1);
-    nodes_.push_back(
-        std::make_unique<Node>(options_.node + number, discovery_, options_.shared_memory));
+    nodes_.push_back(std::make_unique<Node>(options_.node + number, discovery_, options_));
   }
 
   bool is_own(const rtps::GuidPrefix_t& prefix) const {

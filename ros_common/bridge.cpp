@@ -77,6 +77,29 @@ double RosBridge::odometry_rate(const RosProfile& profile) {
   return rate;
 }
 
+double RosBridge::large_rate() const {
+  const Executor executor(1);
+  double rate = 0.0;
+  for (const auto& stream : streams_) {
+    const OutputKind kind = stream->type->kind;
+    const bool cloud = kind == OutputKind::kCloud || kind == OutputKind::kCloudWorld;
+    if (!cloud && kind != OutputKind::kDepth) continue;
+    const Lidar& lidar = *simulation_.vehicle(stream->vehicle).lidars()[stream->lidar].lidar;
+    double step = 4.0;  // a pixel
+    if (cloud) {
+      constexpr double kCustomPoint = 20.0;
+      step = stream->settings.layout == "livox_custom"
+                 ? kCustomPoint
+                 : layout_of(stream->settings, kind == OutputKind::kCloud ? "xyzit" : "xyzi").step;
+    }
+    const double scans = lidar.settings().rate;
+    const double sent =
+        stream->settings.rate > 0.0 ? std::min(scans, stream->settings.rate) : scans;
+    rate += sent * step * static_cast<double>(lidar.beams(0, executor).size());
+  }
+  return rate;
+}
+
 void RosBridge::add(Outlet& outlet) {
   outlets_.push_back(&outlet);
   std::map<std::string, int> known;  // several streams may share a topic

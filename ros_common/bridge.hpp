@@ -49,6 +49,8 @@ class RosBridge : public SampleSink {
   [[nodiscard]] bool has_scan_readers() const;
   /// What goes out.
   [[nodiscard]] std::vector<Topic> topics() const;
+  /// Bytes a second of clouds and pictures if all are read and every beam returns.
+  [[nodiscard]] double large_rate() const;
   /// The rate of odometry samples that the profile needs, Hz.
   [[nodiscard]] static double odometry_rate(const RosProfile& profile);
 

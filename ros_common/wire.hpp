@@ -94,8 +94,9 @@ class Transport : public Outlet {
 
 struct TransportOptions {
   std::string node = "pointflight";
-  bool localhost_only = false;                  ///< ROS 2.
-  bool shared_memory = false;                   ///< ROS 2.
+  bool localhost_only = false;  ///< ROS 2.
+  bool shared_memory = false;   ///< ROS 2.
+  double large_rate = 0.0;      ///< Bytes a second of clouds and pictures, all read: for ROS 2.
   std::function<void(const std::string&)> log;  ///< Lines for the user, from any thread.
 };
 

@@ -473,7 +473,7 @@ TEST_F(Ros2, CloudsArriveAtTheirRate) {
                 if (count++ == 0) first = last;
                 width = m.width;
               });
-              return count >= 41;
+              return count >= 26;
             },
             15.0);
         rate = (count - 1) / std::chrono::duration<double>(last - first).count();
