@@ -294,8 +294,10 @@ int fly(const FlyFlags& flags) {
     sink.add(files.sink());
     sink.add(collisions);
     if (ros.sink() != nullptr) sink.add(*ros.sink());
+    const auto began = Clock::now();
     running = simulation.step(sink);
-    RosSession::Next next = ros.after_step();
+    const std::chrono::duration<double> took = Clock::now() - began;
+    RosSession::Next next = ros.after_step(took.count());
     while (next == RosSession::Next::kWait && !interrupted()) {
       next = ros.after_step();
       pace.restart_at(simulation.time());

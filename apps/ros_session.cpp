@@ -198,9 +198,14 @@ bool RosSession::wait_for_planner() {
   return true;
 }
 
-RosSession::Next RosSession::after_step() {
+RosSession::Next RosSession::after_step(double took) {
   if (!bridge_) return Next::kStep;
   if (!paused_ || step_once_) {
+    const std::uint64_t taken = scans_->scans - scans_->answered;
+    // recordings know no wall clock
+    if (taken > 0 && flags_.is_live() && recordings_.empty()) {
+      bridge_->note_scan_time(took / static_cast<double>(taken));
+    }
     bridge_->on_time(simulation_.time());
     if (flags_.lockstep > 0.0 && scans_->scans > scans_->answered) wait_for_answer();
     if (step_once_ && scans_->scans > scans_->answered) step_once_ = false;

@@ -55,9 +55,9 @@ class RosSession {
 
   /// What has to be done before the next step.
   enum class Next { kStep, kWait, kReset };
-  /// Call after each step: sends what follows the clock, gives commands to the vehicles, waits for
-  /// a planner in lockstep. `kWait`: paused; ask again.
-  Next after_step();
+  /// Call after each step, which `took` so many seconds: sends what follows the clock, gives
+  /// commands to the vehicles, waits for a planner in lockstep. `kWait`: paused; ask again.
+  Next after_step(double took = 0.0);
 
   /// After the simulation was set back to its start.
   void was_reset(SimTime reached);

@@ -270,6 +270,7 @@ class Ros2Transport : public Transport {
                             "buffers of stock size may lose some (net.core.rmem_max)");
     }
     add_node();
+    own_ = nodes_.front()->prefix();
   }
 
   ~Ros2Transport() override {
@@ -383,7 +384,7 @@ class Ros2Transport : public Transport {
       while (from->take_next_sample(&sample, &info) == ReturnCode_t::RETCODE_OK) {
         rtps::GUID_t sender;
         rtps::iHandle2GUID(sender, info.publication_handle);
-        if (!info.valid_data || transport.is_own(sender.guidPrefix)) {
+        if (!info.valid_data || sender.guidPrefix == transport.own_) {
           continue;
         }
         Received received;
@@ -402,11 +403,6 @@ class Ros2Transport : public Transport {
   void add_node() {
     const std::string number = nodes_.empty() ? "" : "_" + std::to_string(nodes_.size() + 1);
     nodes_.push_back(std::make_unique<Node>(options_.node + number, discovery_, options_));
-  }
-
-  bool is_own(const rtps::GuidPrefix_t& prefix) const {
-    return std::any_of(
-        nodes_.begin(), nodes_.end(), [&](const auto& node) { return node->prefix() == prefix; });
   }
 
   void write(dds::DataWriter& writer, const std::vector<std::byte>& bytes) {
@@ -440,6 +436,7 @@ class Ros2Transport : public Transport {
   TransportOptions options_;
   DiscoverySettings discovery_;
   std::vector<std::unique_ptr<Node>> nodes_;
+  rtps::GuidPrefix_t own_;  ///< Of the first node, whose are all writers.
   std::vector<std::unique_ptr<Output>> outputs_;
   std::vector<std::unique_ptr<Input>> inputs_;
   std::thread worker_;

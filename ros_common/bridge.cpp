@@ -51,7 +51,8 @@ struct RosBridge::Stream : OutputStream {
   std::int64_t next = 0;         ///< Of the schedule.
   std::vector<int> numbers;      ///< At each outlet.
   std::uint32_t sent = 0;
-  msg::Path path;
+  msg::Path path;  ///< Of paths and trajectories.
+  void add_to_path(const msg::Header& header, const Pose& pose);
   double path_spacing = kPathSpacing;
 };
 
@@ -110,12 +111,6 @@ void RosBridge::add(Outlet& outlet) {
   }
 }
 
-std::vector<Topic> RosBridge::topics() const {
-  std::vector<Topic> topics;
-  for (const auto& stream : streams_) topics.push_back(stream->topic);
-  return topics;
-}
-
 bool RosBridge::has_scan_readers() const {
   return std::any_of(streams_.begin(), streams_.end(), [&](const auto& stream) {
     const OutputKind kind = stream->type->kind;
@@ -166,7 +161,8 @@ void RosBridge::start() {
   on_time(SimTime{});  // the clock before anything with a stamp
   for (const auto& stream : streams_) {
     if (!is_wanted(*stream)) continue;
-    if (stream->type->kind == OutputKind::kMap) send(*stream, map_message(*stream), SimTime{});
+    if (stream->type->kind == OutputKind::kMap)
+      send(*stream, map_message(*stream, epoch_), SimTime{});
     if (stream->type->kind == OutputKind::kTfStatic) send_static_transforms(*stream);
   }
   for (Outlet* outlet : outlets_) outlet->flush();
@@ -185,7 +181,8 @@ void RosBridge::send_latched() {
       send(*stream, map_.get(), latest_);
     } else if (is_wanted(*stream)) {
       // half a second of work for a large map: beside the flight
-      map_ = std::async(std::launch::async, [this, &s = *stream] { return map_message(s); });
+      map_ = std::async(std::launch::async,
+                        [this, &s = *stream, epoch = epoch_] { return map_message(s, epoch); });
     }
   }
 }
@@ -207,11 +204,11 @@ void RosBridge::send_cloud(Stream& stream, const std::vector<Vector3f>& points, 
   send(stream, std::move(cloud), time);
 }
 
-msg::PointCloud2 RosBridge::map_message(const Stream& stream) const {
+msg::PointCloud2 RosBridge::map_message(const Stream& stream, Duration epoch) const {
   const MapCloud map = map_cloud(simulation_.map(), stream.settings.resolution, kMapPointsMax);
   msg::PointCloud2 cloud =
       cloud_of_points(map.points, map.intensities, layout_of(stream.settings, "xyzi"));
-  cloud.header = header_of(SimTime{}, epoch_, stream.settings.frame);
+  cloud.header = header_of(SimTime{}, epoch, stream.settings.frame);
   return cloud;
 }
 
@@ -347,22 +344,25 @@ void RosBridge::on_odometry(const OdometrySample& sample) {
   }
 }
 
+/// Notes where the vehicle is; a long path is thinned and stays a small message.
+void RosBridge::Stream::add_to_path(const msg::Header& header, const Pose& pose) {
+  auto& poses = path.poses;
+  path.header = header;
+  const bool is_near =
+      !poses.empty() &&
+      (vector_of(poses.back().pose.position) - pose.translation).norm() < path_spacing;
+  if (is_near) return;
+  poses.push_back({header, pose_of(pose)});
+  if (poses.size() <= kPathPosesMax) return;
+  for (std::size_t i = 0; 2 * i < poses.size(); ++i) poses[i] = poses[2 * i];
+  poses.resize((poses.size() + 1) / 2);
+  path_spacing *= 2.0;
+}
+
 void RosBridge::send_path(Stream& stream, const OdometrySample& sample) {
-  auto& poses = stream.path.poses;
-  const auto header = header_of(sample.time, epoch_, stream.settings.frame);
-  const Vector3d& p = sample.state.p_world;
-  if (poses.empty() || (vector_of(poses.back().pose.position) - p).norm() >= stream.path_spacing) {
-    poses.push_back({header, pose_of(sample.state.T_world_body())});
-  }
-  if (poses.size() > kPathPosesMax) {
-    // every second one goes: a long path stays a small message
-    for (std::size_t i = 0; 2 * i < poses.size(); ++i) poses[i] = poses[2 * i];
-    poses.resize((poses.size() + 1) / 2);
-    stream.path_spacing *= 2.0;
-  }
-  if (!is_due(stream, sample.delivered)) return;
-  stream.path.header = header;
-  send(stream, stream.path, sample.delivered);
+  stream.add_to_path(header_of(sample.time, epoch_, stream.settings.frame),
+                     sample.state.T_world_body());
+  if (is_due(stream, sample.delivered)) send(stream, stream.path, sample.delivered);
 }
 
 void RosBridge::send_markers(Stream& stream, const OdometrySample& sample) {
@@ -384,10 +384,8 @@ void RosBridge::send_markers(Stream& stream, const OdometrySample& sample) {
       marker.type = msg::Marker::kLineStrip;
       marker.pose = {};
       marker.scale = {0.05, 0.0, 0.0};
+      stream.add_to_path(header, pose);
       for (const auto& entry : stream.path.poses) marker.points.push_back(entry.pose.position);
-      stream.path.poses.push_back({header, pose_of(pose)});
-      if (stream.path.poses.size() > kPathPosesMax)
-        stream.path.poses.erase(stream.path.poses.begin());
       break;
     case OutputKind::kCovariance:
       marker.type = msg::Marker::kSphere;  // of the truth: a point

@@ -47,8 +47,6 @@ class RosBridge : public SampleSink {
 
   /// True while somebody gets scans.
   [[nodiscard]] bool has_scan_readers() const;
-  /// What goes out.
-  [[nodiscard]] std::vector<Topic> topics() const;
   /// Bytes a second of clouds and pictures if all are read and every beam returns.
   [[nodiscard]] double large_rate() const;
   /// The rate of odometry samples that the profile needs, Hz.
@@ -63,7 +61,7 @@ class RosBridge : public SampleSink {
   void send(Stream& stream, M message, SimTime leaves);
   void send_cloud(Stream& stream, const std::vector<Vector3f>& points, SimTime time);
   void send_latched();
-  [[nodiscard]] msg::PointCloud2 map_message(const Stream& stream) const;
+  [[nodiscard]] msg::PointCloud2 map_message(const Stream& stream, Duration epoch) const;
   void send_static_transforms(Stream& stream);
   void send_path(Stream& stream, const OdometrySample& sample);
   void send_markers(Stream& stream, const OdometrySample& sample);

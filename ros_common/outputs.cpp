@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cassert>
 #include <filesystem>
 #include <map>
 
@@ -186,13 +185,6 @@ std::size_t chosen_lidar(const VehicleAgent& vehicle, const OutputType& type) {
 
 std::span<const OutputType> output_types() {
   return kTypes;
-}
-
-const OutputType& output_type(std::string_view name) {
-  const auto found = std::find_if(
-      std::begin(kTypes), std::end(kTypes), [&](const OutputType& t) { return name == t.name; });
-  assert(found != std::end(kTypes));  // profiles are checked when they are read
-  return *found;
 }
 
 std::vector<std::string> lidar_names(const VehicleAgent& vehicle) {

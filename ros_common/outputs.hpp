@@ -62,9 +62,6 @@ inline constexpr const char* kOpticalSuffix = "_optical";
 /// All kinds, in the order in which they are sent at one instant.
 std::span<const OutputType> output_types();
 
-/// The kind of a name.
-const OutputType& output_type(std::string_view name);
-
 /// One message stream of a run: an output of the profile for one vehicle or LiDAR.
 struct OutputStream {
   const OutputType* type = nullptr;

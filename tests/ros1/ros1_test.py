@@ -305,6 +305,10 @@ class Ros1Test(unittest.TestCase):
             fields, [("x", 0, 7, 1), ("y", 4, 7, 1), ("z", 8, 7, 1), ("intensity", 16, 7, 1)]
         )
         self.assertEqual(cloud.point_step, 32)
+        from geometry_msgs.msg import PoseStamped
+
+        took = self.collect(quad + "simulator_compute_time", PoseStamped, 1)[0].pose.position.x
+        self.assertTrue(1e-4 < took < 0.1, took)
         image = self.collect(quad + "depth_img", Image, 1)[0]
         self.assertEqual(image.encoding, "32FC1")
         self.assertGreater(cloud.header.stamp.to_sec(), time.time() - 3600)
