@@ -262,7 +262,7 @@ class RunFiles {
 
 int fly(const FlyFlags& flags) {
   if (flags.output.empty() && !flags.ros.any()) {
-    throw InputError("give a folder for the results with -o, or --ros1 or --record");
+    throw InputError("give a folder for the results with -o, or --ros1, --ros2 or --record");
   }
   // others live on the wall clock
   const double rate =

@@ -144,7 +144,7 @@ RosSession::RosSession(const RosFlags& flags, Simulation& simulation)
   options.log = [](const std::string& text) { log(text); };
   options.localhost_only = flags.localhost;
   options.shared_memory = flags.shared_memory;
-  if (flags.ros2) options.large_rate = bridge_->large_rate();
+  if (flags.ros2) options.large_rate = large_rate(simulation, profile);
   if (flags.ros1) transports_.push_back(ros1_module().transport(options));
   if (flags.ros2) transports_.push_back(ros2_module().transport(options));
   inbox_ = std::make_unique<Inbox>(simulation, profile);

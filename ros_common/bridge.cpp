@@ -1,13 +1,12 @@
 #include "ros_common/bridge.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <numeric>
 
 #include "pointflight/core/constants.hpp"
 #include "pointflight/geometry/rotation.hpp"
 #include "ros_common/conversion.hpp"
+#include "ros_common/display.hpp"
 #include "ros_common/point_layout.hpp"
 #include "ros_common/scan_messages.hpp"
 
@@ -22,22 +21,12 @@ constexpr double kSurfaceSpacing = 0.1;  // m between points on obstacles
 constexpr std::size_t kScanTimes = 21;   // that MARSIM takes the mean of
 constexpr double kRpm = 30.0 / kPi;      // of a rad/s
 
-constexpr msg::ColorRGBA kVehicleColor{0.0f, 0.45f, 0.70f, 0.9f};
 constexpr msg::ColorRGBA kObstacleColor{0.55f, 0.25f, 0.65f, 0.8f};
 constexpr msg::ColorRGBA kCollisionColor{0.85f, 0.1f, 0.1f, 0.9f};
-
-/// Layout of clouds that the profile leaves open.
-const PointLayout& layout_of(const RosOutput& output, const char* otherwise) {
-  return point_layout(output.layout.empty() ? otherwise : output.layout);
-}
 
 Pose imu_mount(const ImuSettings& imu) {
   const Vector3d rpy = imu.rotation_rpy_deg * kDegree;
   return {quaternion_from_rpy(rpy.x(), rpy.y(), rpy.z()), imu.position};
-}
-
-msg::KeyValue key_value(const char* key, const std::string& value) {
-  return {key, value};
 }
 
 }  // namespace
@@ -74,29 +63,6 @@ double RosBridge::odometry_rate(const RosProfile& profile) {
     if (output.kind == "odometry" || output.kind == "tf" || output.kind == "pose") {
       rate = std::max(rate, output.rate);
     }
-  }
-  return rate;
-}
-
-double RosBridge::large_rate() const {
-  const Executor executor(1);
-  double rate = 0.0;
-  for (const auto& stream : streams_) {
-    const OutputKind kind = stream->type->kind;
-    const bool cloud = kind == OutputKind::kCloud || kind == OutputKind::kCloudWorld;
-    if (!cloud && kind != OutputKind::kDepth) continue;
-    const Lidar& lidar = *simulation_.vehicle(stream->vehicle).lidars()[stream->lidar].lidar;
-    double step = 4.0;  // a pixel
-    if (cloud) {
-      constexpr double kCustomPoint = 20.0;
-      step = stream->settings.layout == "livox_custom"
-                 ? kCustomPoint
-                 : layout_of(stream->settings, kind == OutputKind::kCloud ? "xyzit" : "xyzi").step;
-    }
-    const double scans = lidar.settings().rate;
-    const double sent =
-        stream->settings.rate > 0.0 ? std::min(scans, stream->settings.rate) : scans;
-    rate += sent * step * static_cast<double>(lidar.beams(0, executor).size());
   }
   return rate;
 }
@@ -199,7 +165,7 @@ void RosBridge::shift_epoch(Duration by) {
 }
 
 void RosBridge::send_cloud(Stream& stream, const std::vector<Vector3f>& points, SimTime time) {
-  msg::PointCloud2 cloud = cloud_of_points(points, {}, layout_of(stream.settings, "xyzi"));
+  msg::PointCloud2 cloud = cloud_of_points(points, {}, point_layout(stream.settings.layout));
   cloud.header = header_of(time, epoch_, stream.settings.frame);
   send(stream, std::move(cloud), time);
 }
@@ -207,7 +173,7 @@ void RosBridge::send_cloud(Stream& stream, const std::vector<Vector3f>& points, 
 msg::PointCloud2 RosBridge::map_message(const Stream& stream, Duration epoch) const {
   const MapCloud map = map_cloud(simulation_.map(), stream.settings.resolution, kMapPointsMax);
   msg::PointCloud2 cloud =
-      cloud_of_points(map.points, map.intensities, layout_of(stream.settings, "xyzi"));
+      cloud_of_points(map.points, map.intensities, point_layout(stream.settings.layout));
   cloud.header = header_of(SimTime{}, epoch, stream.settings.frame);
   return cloud;
 }
@@ -254,7 +220,7 @@ void RosBridge::on_time(SimTime time) {
       send(*stream, msg::Clock{stamp_of(time, epoch_)}, time);
     }
     if (kind == OutputKind::kDiagnostics && is_due(*stream, time)) {
-      send_diagnostics(*stream, time);
+      send(*stream, diagnostics_of(simulation_, time, header_of(time, epoch_, "")), time);
     }
   }
   if (time >= next_latched_) {
@@ -366,46 +332,19 @@ void RosBridge::send_path(Stream& stream, const OdometrySample& sample) {
 }
 
 void RosBridge::send_markers(Stream& stream, const OdometrySample& sample) {
-  if (!is_due(stream, sample.delivered)) return;
-  const VehicleAgent& agent = simulation_.vehicle(sample.vehicle);
   const auto header = header_of(sample.time, epoch_, stream.settings.frame);
-  const Pose pose = sample.state.T_world_body();
-  const auto id = static_cast<std::int32_t>(sample.vehicle);
-  msg::Marker marker = marker_of(agent.hull(), pose, header, stream.type->name, id, kVehicleColor);
-  switch (stream.type->kind) {
-    case OutputKind::kVelocity:
-      marker.type = msg::Marker::kArrow;
-      marker.pose = {};
-      marker.scale = {0.05, 0.1, 0.1};  // shaft, head, head's length
-      marker.points = {point_of(sample.state.p_world),
-                       point_of(Vector3d(sample.state.p_world + 0.5 * sample.state.v_world))};
-      break;
-    case OutputKind::kTrajectory:
-      marker.type = msg::Marker::kLineStrip;
-      marker.pose = {};
-      marker.scale = {0.05, 0.0, 0.0};
-      stream.add_to_path(header, pose);
-      for (const auto& entry : stream.path.poses) marker.points.push_back(entry.pose.position);
-      break;
-    case OutputKind::kCovariance:
-      marker.type = msg::Marker::kSphere;  // of the truth: a point
-      marker.scale = {1e-3, 1e-3, 1e-3};
-      break;
-    case OutputKind::kSensorModel:
-      marker.type = msg::Marker::kCylinder;
-      if (!agent.lidars().empty()) marker.pose = pose_of(pose * agent.lidars()[0].T_body_sensor);
-      marker.scale = {0.08, 0.08, 0.06};
-      break;
-    case OutputKind::kLabel:
-      marker.type = msg::Marker::kText;
-      marker.pose.position.z += 0.5;
-      marker.scale = {0.0, 0.0, 0.3};
-      marker.text = agent.setup().name;
-      break;
-    default:
-      break;
+  if (stream.type->kind == OutputKind::kTrajectory) {
+    stream.add_to_path(header, sample.state.T_world_body());
   }
-  send(stream, std::move(marker), sample.delivered);
+  if (!is_due(stream, sample.delivered)) return;
+  send(stream,
+       vehicle_marker(stream.type->kind,
+                      simulation_.vehicle(sample.vehicle),
+                      sample.state,
+                      header,
+                      stream.type->name,
+                      stream.path.poses),
+       sample.delivered);
 }
 
 void RosBridge::on_imu(std::uint32_t vehicle, const ImuSample& sample) {
@@ -447,12 +386,12 @@ void RosBridge::send_scan(Stream& stream, const Scan& scan, const PoseAt& pose_a
       if (s.layout == "livox_custom") {
         send(stream, custom_cloud_of(scan, s.frame, epoch_), scan.end);
       } else {
-        send(stream, cloud_of(scan, layout_of(s, "xyzit"), s.frame, epoch_), scan.end);
+        send(stream, cloud_of(scan, point_layout(s.layout), s.frame, epoch_), scan.end);
       }
       break;
     case OutputKind::kCloudWorld:
       send(stream,
-           cloud_of(scan, layout_of(s, "xyzi"), s.frame, epoch_, world_points(scan, pose_at)),
+           cloud_of(scan, point_layout(s.layout), s.frame, epoch_, world_points(scan, pose_at)),
            scan.end);
       break;
     case OutputKind::kDepth: {
@@ -546,41 +485,6 @@ void RosBridge::send_obstacles() {
 void RosBridge::note_scan_time(double seconds) {
   scan_times_.push_back(seconds);
   if (scan_times_.size() > kScanTimes) scan_times_.erase(scan_times_.begin());
-}
-
-void RosBridge::send_diagnostics(Stream& stream, SimTime time) {
-  msg::DiagnosticArray message;
-  message.header = header_of(time, epoch_, "");
-  for (std::size_t v = 0; v < simulation_.vehicle_count(); ++v) {
-    const VehicleStatus& s = simulation_.status(v);
-    msg::DiagnosticStatus status;
-    status.name = "pointflight: " + simulation_.vehicle(v).setup().name;
-    status.hardware_id = simulation_.vehicle(v).setup().model;
-    constexpr auto kWarn = msg::Octet{1};
-    constexpr auto kError = msg::Octet{2};
-    if (s.crashed) {
-      status.level = kError;
-      status.message = "crashed";
-    } else if (!s.proximity.touching.empty()) {
-      status.level = kWarn;
-      status.message = "in contact";
-    } else {
-      status.message = s.landed ? "on the ground" : name_of(s.autopilot.command);
-    }
-    status.values = {
-        key_value("time", fmt::format("{:.3f}", to_seconds(time))),
-        key_value("command", name_of(s.autopilot.command)),
-        key_value("armed", s.autopilot.armed ? "true" : "false"),
-        key_value("clearance",
-                  s.proximity.nearest ? fmt::format("{:.2f}", s.proximity.nearest->distance) : ""),
-        key_value("collisions", fmt::format("{}", s.summary.collisions)),
-        key_value("commands_rejected", fmt::format("{}", s.autopilot.rejected)),
-        key_value("last_rejection", s.autopilot.last_rejection),
-        key_value("command_timeouts", fmt::format("{}", s.autopilot.timeouts)),
-        key_value("scans", fmt::format("{}", s.summary.scans))};
-    message.status.push_back(std::move(status));
-  }
-  send(stream, std::move(message), time);
 }
 
 }  // namespace pointflight

@@ -47,8 +47,6 @@ class RosBridge : public SampleSink {
 
   /// True while somebody gets scans.
   [[nodiscard]] bool has_scan_readers() const;
-  /// Bytes a second of clouds and pictures if all are read and every beam returns.
-  [[nodiscard]] double large_rate() const;
   /// The rate of odometry samples that the profile needs, Hz.
   [[nodiscard]] static double odometry_rate(const RosProfile& profile);
 
@@ -65,7 +63,6 @@ class RosBridge : public SampleSink {
   void send_static_transforms(Stream& stream);
   void send_path(Stream& stream, const OdometrySample& sample);
   void send_markers(Stream& stream, const OdometrySample& sample);
-  void send_diagnostics(Stream& stream, SimTime time);
   void send_obstacles();
   void send_scan(Stream& stream, const Scan& scan, const PoseAt& pose_at);
 

@@ -8,6 +8,7 @@
 #include <map>
 
 #include "pointflight/core/input_error.hpp"
+#include "ros_common/point_layout.hpp"
 #include "ros_common/scan_messages.hpp"
 
 namespace pointflight {
@@ -274,6 +275,7 @@ class StreamMaker {
     s.child_frame = s.child_frame == "-" ? "" : with_names(s.child_frame, names);
     s.topic = with_names(s.topic, names);
     if (s.topic.front() != '/') s.topic.insert(0, "/");
+    if (s.layout.empty()) s.layout = type.kind == OutputKind::kCloud ? "xyzit" : "xyzi";
     MessageType message = type.type();
     if (s.layout == "livox_custom") {
       message = type_of<msg::CustomMsg>();
@@ -328,6 +330,27 @@ std::vector<OutputStream> output_streams(const Simulation& simulation, const Ros
     }
   }
   return maker.take();
+}
+
+double large_rate(const Simulation& simulation, const RosProfile& profile) {
+  const Executor executor(1);
+  double rate = 0.0;
+  for (const OutputStream& stream : output_streams(simulation, profile)) {
+    const OutputKind kind = stream.type->kind;
+    const bool cloud = kind == OutputKind::kCloud || kind == OutputKind::kCloudWorld;
+    if (!cloud && kind != OutputKind::kDepth) continue;
+    const RosOutput& s = stream.settings;
+    constexpr double kCustomPoint = 20.0;
+    constexpr double kPixel = 4.0;
+    const double bytes = !cloud                       ? kPixel
+                         : s.layout == "livox_custom" ? kCustomPoint
+                                                      : point_layout(s.layout).step;
+    const Lidar& lidar = *simulation.vehicle(stream.vehicle).lidars()[stream.lidar].lidar;
+    const double scans = lidar.settings().rate;
+    rate += (s.rate > 0.0 ? std::min(scans, s.rate) : scans) * bytes *
+            static_cast<double>(lidar.beams(0, executor).size());
+  }
+  return rate;
 }
 
 }  // namespace pointflight

@@ -79,4 +79,7 @@ std::vector<std::string> lidar_names(const VehicleAgent& vehicle);
 /// streams have one topic but different types.
 std::vector<OutputStream> output_streams(const Simulation& simulation, const RosProfile& profile);
 
+/// Bytes a second of clouds and pictures if all are read and every beam returns.
+double large_rate(const Simulation& simulation, const RosProfile& profile);
+
 }  // namespace pointflight
