@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cmath>
+#include <concepts>
 #include <type_traits>
 
 #include "pointflight/core/constants.hpp"
@@ -125,6 +126,22 @@ VelocityCommand in_world(const VelocityCommand& command,
   return world;
 }
 
+/// True for a take-off, landing or goal that is said again, as some programs do many times a
+/// second.
+bool is_under_way(const AutopilotState& state, const Command& command) {
+  if (!state.trajectory || command.index() != state.command.index()) return false;
+  return std::visit(
+      [&](const auto& c) {
+        using C = std::decay_t<decltype(c)>;
+        if constexpr (std::equality_comparable<C>) {
+          return c == std::get<C>(state.command);
+        } else {
+          return false;
+        }
+      },
+      command);
+}
+
 }  // namespace
 
 const char* name_of(const Command& command) {
@@ -181,6 +198,7 @@ std::optional<std::string> Autopilot::give(AutopilotState& state,
     state.last_rejection = *reason;
     return reason;
   }
+  if (is_under_way(state, command)) return std::nullopt;
   // moves start from where it was told to be, so that nothing jumps; from where it is, else
   const bool held = state.hold.has_value() || state.trajectory != nullptr;
   const Vector3d from = held ? state.reference.p_world : body.p_world;

@@ -57,15 +57,21 @@ struct TrajectoryCommand {
 struct WaypointCommand {
   MissionSettings mission;
   bool keep_height = false;  ///< Waypoints are at the present height, whatever their z.
+
+  bool operator==(const WaypointCommand&) const = default;
 };
 /// Rise by `height` (m) from the present place; arms.
 struct TakeOffCommand {
   double height = 1.5;
   double speed = 1.0;  ///< m/s
+
+  bool operator==(const TakeOffCommand&) const = default;
 };
 /// Come down until something carries the vehicle, then stop the rotors.
 struct LandCommand {
   double speed = 0.5;  ///< m/s
+
+  bool operator==(const LandCommand&) const = default;
 };
 /// Brake and stay.
 struct HoverCommand {};
@@ -75,7 +81,8 @@ struct ArmCommand {};
 struct DisarmCommand {};
 
 /// All that a vehicle can be told. The first six must be repeated (`Autopilot`'s watchdog); the
-/// others hold until the next command.
+/// others hold until the next command; take-offs, landings and waypoints are not begun anew when
+/// they are said again under way.
 using Command = std::variant<RotorSpeedCommand,
                              BodyRateCommand,
                              AttitudeCommand,

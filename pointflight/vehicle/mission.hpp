@@ -14,6 +14,8 @@ struct MotionLimits {
   double speed = 2.0;
   double acceleration = 2.0;
   double jerk = 4.0;
+
+  bool operator==(const MotionLimits&) const = default;
 };
 
 /// Rest-to-rest move over a distance with limited speed, acceleration and jerk: the double-S
@@ -47,6 +49,8 @@ struct MissionSettings {
   double hold = 0.0;               ///< Seconds at each waypoint.
   std::vector<Vector3d> waypoints;
   std::optional<double> final_yaw;  ///< Heading to turn to in the end, rad.
+
+  bool operator==(const MissionSettings&) const = default;
 };
 
 /// Flies straight legs between waypoints, smooth in time and at rest at each, turning towards the

@@ -256,11 +256,24 @@ TEST(Autopilot, TakesOffLandsArmsAndDisarms) {
   flight.give(ArmCommand{});
   on_floor(0.5);
   EXPECT_NEAR(flight.state.rotors[0].speed, settings.rotor.speed_min, 1.0);
-  flight.give(TakeOffCommand{2.0, 1.0});
-  on_floor(6.0);
+  // said again and again, as some programs do: it goes on with what it does
+  for (int i = 0; i < 60; ++i) {
+    flight.give(TakeOffCommand{2.0, 1.0});
+    on_floor(0.1);
+  }
   EXPECT_NEAR(flight.state.body.p_world.z(), 12.0, 0.05);
-  flight.give(LandCommand{0.5});
-  on_floor(8.0);
+  WaypointCommand goal;
+  goal.mission.waypoints = {{flight.state.body.p_world.x() + 1.0, 0.0, 0.0}};
+  goal.keep_height = true;
+  for (int i = 0; i < 40; ++i) {
+    flight.give(goal);
+    on_floor(0.1);
+  }
+  EXPECT_NEAR(flight.state.body.p_world.x(), goal.mission.waypoints[0].x(), 0.05);
+  for (int i = 0; i < 80; ++i) {
+    if (flight.pilot.armed) flight.give(LandCommand{0.5});
+    on_floor(0.1);
+  }
   EXPECT_TRUE(flight.landed);
   EXPECT_FALSE(flight.pilot.armed);
   EXPECT_LT(flight.state.rotors[0].speed, 1.0);
