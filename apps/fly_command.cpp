@@ -298,7 +298,7 @@ int fly(const FlyFlags& flags) {
     running = simulation.step(sink);
     const std::chrono::duration<double> took = Clock::now() - began;
     RosSession::Next next = ros.after_step(took.count());
-    while (next == RosSession::Next::kWait && !interrupted()) {
+    while (next == RosSession::Next::kWait && !ros.is_over()) {
       next = ros.after_step();
       pace.restart_at(simulation.time());
     }
@@ -310,7 +310,7 @@ int fly(const FlyFlags& flags) {
       pace.restart_at(simulation.time());
       running = true;
     }
-    if (interrupted()) simulation.interrupt();
+    if (ros.is_over()) simulation.interrupt();
     pace.wait_for(simulation.time());
     if (simulation.time().time_since_epoch() % std::chrono::milliseconds(100) == Duration{0}) {
       report(progress, "flying", to_seconds(simulation.time()) / to_seconds(simulation.end_time()));

@@ -168,13 +168,19 @@ SampleSink* RosSession::sink() {
   return splitter_.get();
 }
 
+bool RosSession::is_over() const {
+  return interrupted() || std::any_of(transports_.begin(), transports_.end(), [](const auto& t) {
+           return t->is_over();
+         });
+}
+
 bool RosSession::start() {
   if (!bridge_) return true;
   bridge_->start();
   while (!flags_.no_wait && std::any_of(transports_.begin(), transports_.end(), [](const auto& t) {
     return !t->is_connected();
   })) {
-    if (interrupted()) return false;
+    if (is_over()) return false;
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
   return flags_.lockstep <= 0.0 || wait_for_planner();
@@ -191,7 +197,7 @@ bool RosSession::wait_for_planner() {
   if (transports_.empty() || is_there()) return true;
   log("lockstep: waiting for somebody who reads scans and sends commands");
   while (!is_there()) {
-    if (interrupted()) return false;
+    if (is_over()) return false;
     bridge_->repeat_clock();
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }
@@ -240,7 +246,7 @@ void RosSession::wait_for_answer() {
   using Clock = std::chrono::steady_clock;
   const std::uint64_t before = answers_;
   const auto until = Clock::now() + std::chrono::duration<double>(flags_.lockstep);
-  while (answers_ == before && !paused_ && !reset_ && !interrupted()) {
+  while (answers_ == before && !paused_ && !reset_ && !is_over()) {
     if (Clock::now() > until) {
       if (late_answers_++ == 0) {
         log(fmt::format(

@@ -50,7 +50,7 @@ class RosSession {
   using Lateness = std::function<std::optional<double>(SimTime time)>;
   void measure_lateness(Lateness lateness);
 
-  /// Connects; waits for a master where there is none yet. False where it was interrupted.
+  /// Connects; waits for a master where there is none yet. False where the flight is over already.
   bool start();
 
   /// What has to be done before the next step.
@@ -58,6 +58,9 @@ class RosSession {
   /// Call after each step, which `took` so many seconds: sends what follows the clock, gives
   /// commands to the vehicles, waits for a planner in lockstep. `kWait`: paused; ask again.
   Next after_step(double took = 0.0);
+
+  /// True once the flight has to end: the user's interrupt, or a ROS that has ended the node.
+  [[nodiscard]] bool is_over() const;
 
   /// After the simulation was set back to its start.
   void was_reset(SimTime reached);

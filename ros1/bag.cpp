@@ -19,21 +19,21 @@ class BagWriter : public Outlet {
   BagWriter(const std::string& path, const std::string& compression)
       : path_(path), active_(path + ".active") {
     try {
-      bag_.open(active_, rosbag::bagmode::Write);
+      bag_->open(active_, rosbag::bagmode::Write);
     } catch (const rosbag::BagException& error) {
       throw std::runtime_error(active_ + ": cannot be written: " + error.what());
     }
-    bag_.setCompression(compression == "lz4"   ? rosbag::compression::LZ4
-                        : compression == "bz2" ? rosbag::compression::BZ2
-                                               : rosbag::compression::Uncompressed);
-    bag_.setChunkThreshold(kChunkSize);
+    bag_->setCompression(compression == "lz4"   ? rosbag::compression::LZ4
+                         : compression == "bz2" ? rosbag::compression::BZ2
+                                                : rosbag::compression::Uncompressed);
+    bag_->setChunkThreshold(kChunkSize);
   }
 
   ~BagWriter() override {
     try {
-      bag_.close();  // without `close` it keeps the name that says so
+      if (bag_) bag_->close();  // without `close` it keeps the name that says so
     } catch (const rosbag::BagException&) {
-      // the disk is full: what lies there is all there will be
+      give_up();  // the disk is full: what lies there is all there will be
     }
   }
 
@@ -55,31 +55,41 @@ class BagWriter : public Outlet {
 
   void send(int topic, const Bytes& bytes, std::int64_t time) override {
     const auto i = static_cast<std::size_t>(topic);
+    if (!bag_) return;
     constexpr std::int64_t kSecond = 1'000'000'000;
     const ros::Time stamp(static_cast<std::uint32_t>(time / kSecond),
                           static_cast<std::uint32_t>(time % kSecond));
     try {
-      bag_.write(topics_[i]->name, stamp, RawMessage{topics_[i].get(), bytes}, headers_[i]);
+      bag_->write(
+          topics_[i]->name, stamp, RawMessage{topics_[i].get(), bytes, nullptr}, headers_[i]);
     } catch (const rosbag::BagException& error) {
+      give_up();
       throw std::runtime_error(active_ + ": writing failed: " + error.what() +
                                "; what was recorded until then is in it (rosbag reindex)");
     }
   }
 
   void close() override {
+    if (!bag_) return;
     try {
-      bag_.close();
+      bag_->close();
     } catch (const rosbag::BagException& error) {
+      give_up();
       throw std::runtime_error(active_ + ": writing failed: " + error.what());
     }
+    bag_.reset();
     if (std::rename(active_.c_str(), path_.c_str()) != 0) {
       throw std::runtime_error(active_ + ": cannot be renamed to " + path_);
     }
   }
 
  private:
+  /// The destructor of a bag that cannot be written tries again and ends the program: it is never
+  /// called then.
+  void give_up() { static_cast<void>(bag_.release()); }
+
   std::string path_, active_;
-  rosbag::Bag bag_;
+  std::unique_ptr<rosbag::Bag> bag_ = std::make_unique<rosbag::Bag>();
   std::vector<std::unique_ptr<Topic>> topics_;
   std::vector<boost::shared_ptr<ros::M_string>> headers_;
 };

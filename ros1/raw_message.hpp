@@ -5,14 +5,28 @@
 #include <ros/message_traits.h>
 #include <ros/serialization.h>
 
+#include <atomic>
+#include <chrono>
+#include <cstring>
+
 #include "ros_common/wire.hpp"
 
 namespace pointflight {
+
+/// What became of a topic's messages. roscpp tells nobody when it throws the oldest one away
+/// because a subscriber's queue is full; but its buffer then ends with a queue of newer ones behind
+/// it.
+struct SentCount {
+  std::size_t depth = 0;  ///< Of the queues.
+  std::atomic<std::uint64_t> published{0};
+  std::atomic<std::uint64_t> dropped{0};
+};
 
 /// On its way out.
 struct RawMessage {
   const Topic* topic = nullptr;
   Bytes bytes;
+  std::shared_ptr<SentCount> count;  ///< None in a recording.
 };
 
 /// As it came in.
@@ -92,6 +106,28 @@ struct Serializer<pointflight::RawReceived> {
     m.bytes.assign(first, first + size);
   }
 };
+
+/// As roscpp's own, with a buffer that notices how it ends.
+template <>
+inline SerializedMessage serializeMessage(const pointflight::RawMessage& message) {
+  using Clock = std::chrono::steady_clock;
+  // a burst that waits for roscpp's thread is no slow subscriber
+  static constexpr std::chrono::milliseconds kStall(40);
+  const auto size = static_cast<uint32_t>(message.bytes->size());
+  SerializedMessage m;
+  m.num_bytes = size + sizeof(size);
+  m.buf.reset(new uint8_t[m.num_bytes],
+              [count = message.count, number = ++message.count->published, since = Clock::now()](
+                  const uint8_t* buffer) {
+                const bool full = count->depth > 1 && count->published - number >= count->depth;
+                if (full && Clock::now() - since > kStall) ++count->dropped;
+                delete[] buffer;
+              });
+  std::memcpy(m.buf.get(), &size, sizeof(size));  // of this machine: little-endian, as the wire
+  m.message_start = m.buf.get() + sizeof(size);
+  std::memcpy(m.message_start, message.bytes->data(), size);
+  return m;
+}
 
 }  // namespace serialization
 }  // namespace ros

@@ -2,7 +2,9 @@
 
 #include <XmlRpcClient.h>
 #include <ros/network.h>
+#include <ros/publication.h>
 #include <ros/ros.h>
+#include <ros/topic_manager.h>
 
 #include <algorithm>
 #include <atomic>
@@ -38,6 +40,8 @@ class Ros1Transport : public Transport {
 
   int advertise(const Topic& topic) override {
     topics_.push_back(std::make_unique<Topic>(topic));
+    counts_.push_back(std::make_shared<SentCount>());
+    counts_.back()->depth = topic.depth;
     return static_cast<int>(topics_.size()) - 1;
   }
 
@@ -69,8 +73,16 @@ class Ros1Transport : public Transport {
       const std::lock_guard<std::mutex> lock(mutex_);
       if (!connected_) return;
     }
-    publishers_[i].publish(RawMessage{topics_[i].get(), bytes});
+    publishers_[i].publish(RawMessage{topics_[i].get(), bytes, counts_[i]});
   }
+
+  std::uint64_t dropped() const override {
+    std::uint64_t sum = 0;
+    for (const auto& count : counts_) sum += count->dropped;
+    return sum;
+  }
+
+  bool is_over() const override { return over_; }
 
  private:
   struct Input {
@@ -102,6 +114,10 @@ class Ros1Transport : public Transport {
           " runs already and is shut down by this one; give --node another name");
     }
     node_ = std::make_unique<ros::NodeHandle>();
+    // roscpp asks for this at its first log line, which is when it is told to end because another
+    // node has its name; the master would take that for a third node and end the other as well
+    bool unused = false;
+    ros::param::getCached("/rosout_disable_topics_generation", unused);
     std::unique_lock<std::mutex> lock(mutex_);
     for (const auto& topic : topics_) publishers_.push_back(advertised(*topic));
     for (const Input& input : inputs_) subscribers_.push_back(subscribed(input));
@@ -112,7 +128,25 @@ class Ros1Transport : public Transport {
     lock.unlock();
     while (!stop_) {
       std::this_thread::sleep_for(std::chrono::milliseconds(50));
+      if (!ros::ok()) {
+        log("ROS 1: the node was ended from outside (rosnode kill, or another node of this name: " +
+            ros::this_node::getName() + "); the flight ends");
+        over_ = true;
+        return;
+      }
       welcome_other_definitions();
+      say_dropped();
+    }
+  }
+
+  void say_dropped() {
+    if (said_dropped_) return;
+    for (std::size_t i = 0; i < topics_.size(); ++i) {
+      if (counts_[i]->dropped == 0) continue;
+      log("ROS 1: a subscriber of " + topics_[i]->name +
+          " is too slow and loses messages (said once, counted)");
+      said_dropped_ = true;
+      return;
     }
   }
 
@@ -191,6 +225,8 @@ class Ros1Transport : public Transport {
 
   TransportOptions options_;
   std::vector<std::unique_ptr<Topic>> topics_;
+  std::vector<std::shared_ptr<SentCount>> counts_;
+  bool said_dropped_ = false;
   std::vector<Input> inputs_;
   std::unique_ptr<ros::NodeHandle> node_;
   std::vector<ros::Publisher> publishers_;
@@ -200,6 +236,7 @@ class Ros1Transport : public Transport {
   std::thread connecting_;
   mutable std::mutex mutex_;
   std::atomic<bool> connected_{false};
+  std::atomic<bool> over_{false};
   std::atomic<bool> stop_{false};
 };
 

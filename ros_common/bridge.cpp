@@ -183,12 +183,12 @@ void RosBridge::send_static_transforms(Stream& stream) {
   for (std::size_t v = 0; v < simulation_.vehicle_count(); ++v) {
     const VehicleAgent& agent = simulation_.vehicle(v);
     RosNames names{agent.setup().name, profile_.first_id + static_cast<std::int64_t>(v), ""};
-    const msg::Header header = header_of(SimTime{}, epoch_, with_names(profile_.body_frame, names));
+    const msg::Header header = header_of(SimTime{}, epoch_, body_frame_of(profile_, names, v));
     const auto lidars = lidar_names(agent);
     for (std::size_t l = 0; l < lidars.size(); ++l) {
       names.lidar = lidars[l];
       const MountedLidar& mounted = agent.lidars()[l];
-      const std::string frame = with_names(profile_.sensor_frame, names);
+      const std::string frame = sensor_frame_of(profile_, names, v, l);
       message.transforms.push_back(transform_of(mounted.T_body_sensor, header, frame));
       if (!is_camera(mounted.lidar->settings())) continue;
       msg::Header sensor = header;
@@ -203,7 +203,7 @@ void RosBridge::send_static_transforms(Stream& stream) {
     const VehicleAgent& agent = simulation_.vehicle(other->vehicle);
     const RosNames names{
         agent.setup().name, profile_.first_id + static_cast<std::int64_t>(other->vehicle), ""};
-    const std::string body = with_names(profile_.body_frame, names);
+    const std::string body = body_frame_of(profile_, names, other->vehicle);
     if (other->settings.frame == body) continue;
     message.transforms.push_back(transform_of(imu_mount(agent.settings().imu),
                                               header_of(SimTime{}, epoch_, body),
@@ -293,6 +293,14 @@ void RosBridge::on_odometry(const OdometrySample& sample) {
         send(stream, std::move(speeds), sample.delivered);
         break;
       }
+      case OutputKind::kCollisionCloud:
+        if (!is_due(stream, sample.delivered)) break;
+        send_cloud(stream,
+                   touched_points(simulation_.map(),
+                                  simulation_.vehicle(sample.vehicle).hull(),
+                                  sample.state.T_world_body()),
+                   sample.time);
+        break;
       case OutputKind::kPath:
         send_path(stream, sample);
         break;

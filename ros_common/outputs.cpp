@@ -100,6 +100,11 @@ constexpr OutputType kTypes[] = {
      false,
      true,
      5},
+    {OutputKind::kCollisionCloud,
+     "collision_cloud",
+     Per::kVehicle,
+     type_of<msg::PointCloud2>,
+     "points of the map that the vehicle's hull touches"},
     {OutputKind::kTfScan,
      "tf_scan",
      Per::kLidar,
@@ -201,6 +206,31 @@ std::vector<std::string> lidar_names(const VehicleAgent& vehicle) {
 
 namespace {
 
+bool has_vehicle(const std::string& pattern) {
+  return pattern.find("{id}") != std::string::npos ||
+         pattern.find("{vehicle}") != std::string::npos;
+}
+
+}  // namespace
+
+std::string body_frame_of(const RosProfile& profile, const RosNames& names, std::size_t vehicle) {
+  const bool apart = vehicle == 0 || has_vehicle(profile.body_frame);
+  return (apart ? "" : names.vehicle + "/") + with_names(profile.body_frame, names);
+}
+
+std::string sensor_frame_of(const RosProfile& profile,
+                            const RosNames& names,
+                            std::size_t vehicle,
+                            std::size_t lidar) {
+  const std::string& pattern = profile.sensor_frame;
+  const bool vehicles_apart = vehicle == 0 || has_vehicle(pattern);
+  const bool lidars_apart = lidar == 0 || pattern.find("{lidar}") != std::string::npos;
+  return (vehicles_apart ? "" : names.vehicle + "/") + with_names(pattern, names) +
+         (lidars_apart ? "" : "_" + names.lidar);
+}
+
+namespace {
+
 /// Writes an output of a profile out for the vehicles and LiDARs of a run.
 class StreamMaker {
  public:
@@ -212,8 +242,7 @@ class StreamMaker {
       add_stream(output, type, {}, 0, 0);
       return;
     }
-    const bool vehicles_apart = output.topic.find("{id}") != std::string::npos ||
-                                output.topic.find("{vehicle}") != std::string::npos;
+    const bool vehicles_apart = has_vehicle(output.topic);
     for (std::size_t v = 0; v < simulation_.vehicle_count(); ++v) {
       // one name for all can only be one vehicle's, but for transforms, which name their frames
       if (v > 0 && !vehicles_apart && !is_transform(type)) return;
@@ -271,8 +300,16 @@ class StreamMaker {
       s.child_frame =
           type.kind == OutputKind::kTfScan ? profile_.sensor_frame : profile_.body_frame;
     }
-    s.frame = with_names(s.frame, names);
-    s.child_frame = s.child_frame == "-" ? "" : with_names(s.child_frame, names);
+    const auto written_out = [&](const std::string& frame) {
+      const bool camera = frame == profile_.sensor_frame + kOpticalSuffix;
+      if (frame == profile_.sensor_frame || camera) {
+        return sensor_frame_of(profile_, names, vehicle, lidar) + (camera ? kOpticalSuffix : "");
+      }
+      return frame == profile_.body_frame ? body_frame_of(profile_, names, vehicle)
+                                          : with_names(frame, names);
+    };
+    s.frame = written_out(s.frame);
+    s.child_frame = s.child_frame == "-" ? "" : written_out(s.child_frame);
     s.topic = with_names(s.topic, names);
     if (s.topic.front() != '/') s.topic.insert(0, "/");
     if (s.layout.empty()) s.layout = type.kind == OutputKind::kCloud ? "xyzit" : "xyzi";

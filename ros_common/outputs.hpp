@@ -32,6 +32,7 @@ enum class OutputKind {
   kMap,
   kObstacles,
   kCollisions,
+  kCollisionCloud,  ///< Points of the map that the hull touches.
   kModel,
   kVelocity,
   kTrajectory,
@@ -73,6 +74,14 @@ struct OutputStream {
 
 /// Names of a vehicle's LiDARs: their model's, with a number where several are alike.
 std::vector<std::string> lidar_names(const VehicleAgent& vehicle);
+
+/// The frames of a vehicle and of its LiDAR. Where the profile's pattern does not tell them apart,
+/// the first keeps the name; others have their vehicle's in front and their LiDAR's behind.
+std::string body_frame_of(const RosProfile& profile, const RosNames& names, std::size_t vehicle);
+std::string sensor_frame_of(const RosProfile& profile,
+                            const RosNames& names,
+                            std::size_t vehicle,
+                            std::size_t lidar);
 
 /// The streams of a profile in a run. Outputs with `{lidar}` in their topic have one for each
 /// LiDAR; without it the first that fits (a camera for depth pictures). Throws InputError where two

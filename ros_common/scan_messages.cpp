@@ -7,6 +7,7 @@
 
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/math.hpp"
+#include "pointflight/map/near_surfels.hpp"
 
 namespace pointflight {
 namespace {
@@ -169,6 +170,22 @@ void append_surface(const BodyShape& shape,
     const Vector3d p = surface_point(*solid, (k + 0.5) / static_cast<double>(count), v);
     points.emplace_back((T_world_body * p).cast<float>());
   }
+}
+
+std::vector<Vector3f> touched_points(const SurfelMap& map,
+                                     const Solid& hull,
+                                     const Pose& T_world_hull) {
+  const Vector3d reach = Vector3d::Constant(bounding_radius(hull));
+  Aabb around;
+  around.add(T_world_hull.translation - reach);
+  around.add(T_world_hull.translation + reach);
+  std::vector<Vector3f> points;
+  visit_near(map, around, 0.0, [&](const SurfelBox& box) {
+    const Separation s = separation(hull, T_world_hull, Solid{Cuboid{box.half}}, box.T_world_box);
+    if (s.distance <= 0.0) points.emplace_back(box.T_world_box.translation.cast<float>());
+    return 0.0;
+  });
+  return points;
 }
 
 }  // namespace pointflight

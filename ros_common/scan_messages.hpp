@@ -42,4 +42,9 @@ void append_surface(const BodyShape& shape,
                     double spacing,
                     std::vector<Vector3f>& points);
 
+/// Centres of the map's surfels that a hull touches, in the world.
+std::vector<Vector3f> touched_points(const SurfelMap& map,
+                                     const Solid& hull,
+                                     const Pose& T_world_hull);
+
 }  // namespace pointflight

@@ -88,7 +88,11 @@ class Transport : public Outlet {
   /// True while somebody sends on a topic that is read.
   virtual bool has_senders() const = 0;
 
-  /// Messages that were dropped because somebody was too slow to take them.
+  /// True once somebody outside has ended the node (ROS 1: rosnode kill, another node of its name).
+  virtual bool is_over() const { return false; }
+
+  /// Messages that were dropped because somebody was too slow to take them. ROS 2: in the own
+  /// queue; what a DDS history lets go it does not tell.
   virtual std::uint64_t dropped() const { return 0; }
 };
 

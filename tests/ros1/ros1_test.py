@@ -5,6 +5,7 @@ ros1_test.py PROGRAM [unittest arguments]
 """
 
 import os
+import resource
 import signal
 import socket
 import struct
@@ -148,7 +149,8 @@ class Ros1Test(unittest.TestCase):
 
     def fly(self, *flags, scenario=None):
         """Starts a flight; it is ended after the test. stderr is kept."""
-        self.log = open(self.folder.name + "/fly.log", "w+")
+        self.flights = getattr(self, "flights", 0) + 1
+        self.log = open(f"{self.folder.name}/fly.{self.flights}.log", "w+")
         process = subprocess.Popen(
             [PROGRAM, "fly", scenario or self.map, "--ros1", *flags],
             stdout=self.log,
@@ -281,6 +283,7 @@ class Ros1Test(unittest.TestCase):
             quad + "depth_img": "sensor_msgs/Image",
             quad + "dyn_cloud": "sensor_msgs/PointCloud2",
             quad + "uav_cloud": "sensor_msgs/PointCloud2",
+            quad + "collision_cloud": "sensor_msgs/PointCloud2",
             quad + "simulator_compute_time": "geometry_msgs/PoseStamped",
             "/map_generator/global_cloud": "sensor_msgs/PointCloud2",
             "/tf": "tf2_msgs/TFMessage",
@@ -296,8 +299,45 @@ class Ros1Test(unittest.TestCase):
         }
         self.assertEqual({t: types.get(t) for t in expected}, expected)
         self.assertNotIn("/clock", published)
+        from roslib.message import get_message_class
         from sensor_msgs.msg import Image, PointCloud2
 
+        # md5 sums against the message classes of others, frames and rates
+        frames = {topic: "world" for topic in expected if topic.startswith(shown)}
+        frames.update({
+            "/quad_0/lidar_slam/odom": "world",
+            "/quad_0/imu": "quad_0",
+            quad + "cloud": "world",
+            quad + "sensor_cloud": "sensor",
+            quad + "sensor_pose": "map",
+            quad + "depth_img": "sensor",
+            quad + "collision_cloud": "world",
+            quad + "simulator_compute_time": "",
+        })
+        hertz = {topic: 10 if topic.startswith(quad) or topic == "/tf" else 200 for topic in frames}
+        hertz.update({"/quad_0/cmdRPM": 200, "/tf": 10, quad + "collision_cloud": 200})
+        got = {topic: [] for topic in hertz}
+        subscribers = [rospy.Subscriber(t, rospy.AnyMsg, got[t].append, queue_size=10000) for t in got]
+        wait_for(lambda: all(got.values()), 20, "every topic")
+        for messages in got.values():
+            messages.clear()
+        began = time.monotonic()
+        time.sleep(4.0)
+        took = time.monotonic() - began
+        counts = {topic: len(messages) for topic, messages in got.items()}
+        for subscriber in subscribers:
+            subscriber.unregister()
+        for topic, messages in got.items():
+            self.assertAlmostEqual(counts[topic] / took / hertz[topic], 1.0, delta=0.1, msg=topic)
+            kind = get_message_class(expected[topic])
+            self.assertEqual(messages[0]._connection_header["md5sum"], kind._md5sum, topic)
+            message = kind().deserialize(messages[0]._buff)
+            if topic in frames:
+                self.assertEqual(message.header.frame_id, frames[topic], topic)
+            elif topic == "/tf":
+                transform = message.transforms[0]
+                self.assertEqual((transform.header.frame_id, transform.child_frame_id),
+                                 ("world", "sensor"))
         cloud = self.collect(quad + "sensor_cloud", PointCloud2, 1)[0]
         self.assertEqual(cloud.header.frame_id, "sensor")
         fields = [(f.name, f.offset, f.datatype, f.count) for f in cloud.fields]
@@ -463,6 +503,60 @@ class Ros1Test(unittest.TestCase):
         self.assertEqual(times, sorted(times))  # no jump back
         self.assertIsNone(process.poll())
 
+    def test_a_subscriber_that_is_too_slow_is_said(self):
+        """A peer that takes nothing from its socket for a while."""
+        from xmlrpc.client import ServerProxy
+
+        process = self.fly()
+        self.collect("/drone0/mid360/points", rospy.AnyMsg, 1)
+        uri = rosgraph.Master("/peer").lookupNode("/pointflight")
+        code, _, where = ServerProxy(uri).requestTopic(
+            "/deaf", "/drone0/mid360/points", [["TCPROS"]])
+        self.assertEqual(code, 1)
+        fields = ["callerid=/deaf", "topic=/drone0/mid360/points", "type=*", "md5sum=*"]
+        header = b"".join(struct.pack("<I", len(f)) + f.encode() for f in fields)
+        with socket.socket() as deaf:
+            deaf.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+            deaf.connect((where[1], where[2]))
+            deaf.sendall(struct.pack("<I", len(header)) + header)
+            wait_for(lambda: "loses messages" in open(self.log.name).read(), 40, "the warning")
+            # nobody else loses any
+            stamps = [m.header.stamp.to_sec() for m in self.collect_clouds(15)]
+            self.assertLess(max(b - a for a, b in zip(stamps, stamps[1:])), 0.15)
+        text = self.stop_and_read(process)
+        self.assertIn("a subscriber of /drone0/mid360/points is too slow", text)
+        self.assertIn("messages were dropped for slow subscribers", text)
+
+    def collect_clouds(self, count):
+        from sensor_msgs.msg import PointCloud2
+
+        return self.collect("/drone0/mid360/points", PointCloud2, count)
+
+    def test_a_message_of_40_MB_is_left_out(self):
+        from std_msgs.msg import Float32MultiArray
+
+        process = self.fly()
+        publisher = rospy.Publisher("/drone0/cmd/rotors", Float32MultiArray, queue_size=1)
+        wait_for(publisher.get_num_connections, what="the rotors' subscriber")
+        publisher.publish(Float32MultiArray(data=[1.0] * 10_000_000))
+        wait_for(lambda: "not taken" in open(self.log.name).read(), 40, "its rejection")
+        publisher.unregister()
+        self.assertIsNone(process.poll())
+        self.assertIn("1 rejected", self.stop_and_read(process))
+
+    def test_another_node_of_its_name_takes_over(self):
+        first = self.fly("--no-wait")
+        self.collect("/clock", rospy.AnyMsg, 10)
+        first_log = self.log.name
+        second = self.fly("--no-wait")
+        first.wait(timeout=30)
+        with open(first_log) as log:
+            text = log.read()
+        self.assertIn("another node of this name", text)
+        self.assertEqual(first.returncode, 130)
+        self.collect("/clock", rospy.AnyMsg, 10)
+        self.assertIn("runs already", self.stop_and_read(second))
+
     # -- the rest ----------------------------------------------------------------------------
 
     def test_without_a_master(self):
@@ -523,6 +617,25 @@ class Ros1Test(unittest.TestCase):
         self.assertEqual(told.returncode, 2)
         subprocess.run(["/usr/bin/rosbag", "reindex", "-q", cut], check=True, capture_output=True)
         with rosbag.Bag(cut) as opened:
+            self.assertGreater(opened.get_message_count(), 100)
+
+    def test_a_full_disk_leaves_a_bag_that_reindexes(self):
+        bag = self.folder.name + "/full.bag"
+
+        def small_disk():
+            resource.setrlimit(resource.RLIMIT_FSIZE, (2 << 20, 2 << 20))
+            signal.signal(signal.SIGXFSZ, signal.SIG_IGN)  # as a disk: an error, no signal
+
+        done = subprocess.run([PROGRAM, "fly", self.scenario(), "--record", bag],
+                              preexec_fn=small_disk, capture_output=True, text=True)
+        self.assertEqual(done.returncode, 2, done.stderr)
+        said = [line for line in done.stderr.splitlines() if "full.bag" in line]
+        self.assertEqual(len(said), 1, done.stderr)
+        self.assertIn("full.bag.active: writing failed", said[0])
+        self.assertFalse(os.path.exists(bag))
+        os.rename(bag + ".active", bag)
+        subprocess.run(["/usr/bin/rosbag", "reindex", "-q", bag], check=True, capture_output=True)
+        with rosbag.Bag(bag) as opened:
             self.assertGreater(opened.get_message_count(), 100)
 
     def test_lockstep_waits_for_the_planner(self):

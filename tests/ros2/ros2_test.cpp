@@ -1,6 +1,10 @@
 // pointflight beside an independent DDS (Cyclone) with types of its own: what a ROS 2 node gets,
 // and what it can do. The peer has the receive buffers of a stock Linux.
+#include <atomic>
 #include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
 #include <map>
 #include <set>
 
@@ -35,23 +39,25 @@ class Ros2 : public Program {
     return std::make_unique<Flight>(arguments, *folder_ / "fly.log");
   }
 
-  /// A scenario that hovers where `scenario new` would start, with a LiDAR; `more` goes on top.
-  std::string hovering_with(const std::string& lidar,
+  /// A scenario that hovers where `scenario new` would start, with LiDARs; `more` goes on top.
+  std::string hovering_with(const std::vector<std::string>& lidars,
                             const std::string& map_file,
                             const std::string& more = "") {
-    const std::string path = *folder_ / (lidar + ".yaml");
-    const auto made =
-        run(fmt::format("scenario new {} -o {} --lidar {} --length 1", map_file, path, lidar));
+    const std::string path = *folder_ / (lidars.front() + ".yaml");
+    const auto made = run(
+        fmt::format("scenario new {} -o {} --lidar {} --length 1", map_file, path, lidars.front()));
     EXPECT_EQ(made.code, 0) << made.err;
+    std::string mounts;
+    for (const std::string& lidar : lidars) mounts += fmt::format("{{model: {}}}, ", lidar);
     const std::string text = read_file(path);
     const auto at = text.find("start: [") + 7;
     const std::string start = text.substr(at, text.find(']', at) + 1 - at);
     write_file(path,
-               fmt::format("map: {}\nvehicles:\n  - {{start: {}, lidars: [{{model: {}}}]}}\n"
+               fmt::format("map: {}\nvehicles:\n  - {{start: {}, lidars: [{}]}}\n"
                            "output: {{scans: false, imu: false}}\n{}",
                            map_file,
                            start,
-                           lidar,
+                           mounts,
                            more));
     return path;
   }
@@ -140,7 +146,7 @@ TEST_F(Ros2, IsFoundByAPeerInTheDefaultEnvironment) {
 
 TEST_F(Ros2, EveryTypeArrivesReliableAndBestEffort) {
   const std::string scenario =
-      hovering_with("mid360", map(), "obstacles:\n  - {count: 3, radius: 0.1, speed: 0.5}\n");
+      hovering_with({"mid360"}, map(), "obstacles:\n  - {count: 3, radius: 0.1, speed: 0.5}\n");
   for (const bool reliable : {true, false}) {
     Peer peer;
     Reader<nav_msgs_msg_dds__Odometry_> odometry(
@@ -163,7 +169,7 @@ TEST_F(Ros2, EveryTypeArrivesReliableAndBestEffort) {
         peer, "rt/obstacles", visualization_msgs_msg_dds__MarkerArray__desc, reliable);
     Reader<diagnostic_msgs_msg_dds__DiagnosticArray_> diagnostics(
         peer, "rt/diagnostics", diagnostic_msgs_msg_dds__DiagnosticArray__desc, reliable);
-    const auto flight = fly("", scenario);
+    const auto flight = fly(reliable ? "" : "--shm", scenario);  // offered beside UDP
     std::map<std::string, int> counts;
     double last = -1.0;
     const auto all_there = [&] {
@@ -209,6 +215,76 @@ TEST_F(Ros2, EveryTypeArrivesReliableAndBestEffort) {
   }
 }
 
+/// Pictures of a depth camera, and Livox' own message.
+TEST_F(Ros2, PicturesAndCustomMessagesArriveReliableAndBestEffort) {
+  const std::string scenario =
+      hovering_with({"mid360", "d455"},
+                    map(),
+                    "ros:\n  outputs:\n    - {kind: cloud, layout: livox_custom, "
+                    "topic: \"/{vehicle}/{lidar}/custom\"}\n");
+  const auto flight = fly("", scenario);
+  for (const bool reliable : {true, false}) {
+    Peer peer;
+    Reader<sensor_msgs_msg_dds__Image_> images(
+        peer, "rt/drone0/d455/depth", sensor_msgs_msg_dds__Image__desc, reliable);
+    Reader<sensor_msgs_msg_dds__CameraInfo_> infos(
+        peer, "rt/drone0/d455/camera_info", sensor_msgs_msg_dds__CameraInfo__desc, reliable);
+    Reader<livox_ros_driver2_msg_dds__CustomMsg_> clouds(
+        peer, "rt/drone0/mid360/custom", livox_ros_driver2_msg_dds__CustomMsg__desc, reliable);
+    std::uint32_t width = 0;
+    std::uint32_t height = 0;
+    int image_count = 0;
+    int info_count = 0;
+    int cloud_count = 0;
+    EXPECT_TRUE(eventually([&] {
+      image_count += images.take([&](const auto& m) {
+        width = m.width;
+        height = m.height;
+        EXPECT_STREQ(m.header.frame_id, "drone0/d455_optical");
+        EXPECT_STREQ(m.encoding, "32FC1");
+        EXPECT_EQ(m.step, 4 * m.width);
+        ASSERT_EQ(m.data._length, m.height * m.step);
+        std::vector<float> depths(std::size_t{m.width} * m.height);
+        std::memcpy(depths.data(), m.data._buffer, m.data._length);
+        std::size_t seen = 0;
+        for (const float depth : depths) {
+          ASSERT_TRUE(depth >= 0.0f && depth < 100.0f) << depth;
+          seen += depth > 0.0f ? 1 : 0;
+        }
+        EXPECT_GT(seen, depths.size() / 20);
+      });
+      info_count += infos.take([&](const auto& m) {
+        EXPECT_STREQ(m.header.frame_id, "drone0/d455_optical");
+        EXPECT_STREQ(m.distortion_model, "plumb_bob");
+        EXPECT_EQ(m.d._length, 5u);
+        EXPECT_GT(m.k[0], 0.0);
+        EXPECT_NEAR(m.k[2], 0.5 * m.width, 10.0);
+        EXPECT_EQ(m.p[0], m.k[0]);
+        EXPECT_EQ(m.r[0], 1.0);
+        EXPECT_TRUE(width == 0 || (m.width == width && m.height == height));
+      });
+      cloud_count += clouds.take([&](const auto& m) {
+        EXPECT_STREQ(m.header.frame_id, "drone0/mid360");
+        EXPECT_EQ(m.point_num, m.points._length);
+        ASSERT_GT(m.point_num, 1000u);
+        EXPECT_EQ(m.timebase, 1'000'000'000ull * m.header.stamp.sec + m.header.stamp.nanosec);
+        EXPECT_EQ(m.points._buffer[0].offset_time, 0u);
+        for (std::uint32_t i = 1; i < m.point_num; ++i) {
+          const auto& point = m.points._buffer[i];
+          ASSERT_GE(point.offset_time, m.points._buffer[i - 1].offset_time);
+          ASSERT_LT(point.offset_time, 100'000'000u);
+          ASSERT_LT(point.line, 4);
+          ASSERT_EQ(point.tag, 16);
+          ASSERT_LT(std::hypot(point.x, point.y, point.z), 70.0);
+        }
+      });
+      return image_count > 10 && info_count > 10 && cloud_count > 5;
+    })) << image_count
+        << " " << info_count << " " << cloud_count << "\n"
+        << flight->stop();
+  }
+}
+
 TEST_F(Ros2, ALateReaderGetsTheMap) {
   const auto flight = fly();
   Peer peer;
@@ -248,7 +324,7 @@ TEST_F(Ros2, CloudsArriveAtTheirRate) {
           .code,
       0);
   for (const char* lidar : {"mid360", "os1_128"}) {
-    const std::string scenario = hovering_with(lidar, room);
+    const std::string scenario = hovering_with({lidar}, room);
     for (const bool reliable : {false, true}) {
       double rate = 0.0;
       std::uint32_t width = 0;
@@ -290,7 +366,7 @@ TEST_F(Ros2, CloudsArriveAtTheirRate) {
 /// without ROS; how late its scans leave.
 TEST_F(Ros2, PublishingCostsLittleAndIsQuick) {
   // without ROS nothing is written but a trajectory
-  const std::string scenario = hovering_with("mid360", map(), "duration: 6\n");
+  const std::string scenario = hovering_with({"mid360"}, map(), "duration: 6\n");
   constexpr double kSeconds = 6.0;
   double cost = 0.0;
   std::string said;
@@ -431,6 +507,17 @@ TEST_F(Ros2, CommandsFlyTheVehicle) {
     EXPECT_TRUE(obeys(writer, m, [&] { return v.z() > 1.0; }));
   }
   {
+    Writer<quadrotor_msgs_msg_dds__TakeoffLand_> writer(
+        peer, "rt/drone0/cmd/takeoff_land", quadrotor_msgs_msg_dds__TakeoffLand__desc, true);
+    EXPECT_TRUE(obeys(writer, quadrotor_msgs_msg_dds__TakeoffLand_{2}, [&] {
+      return p.z() < start.z() - 0.2 && v.norm() < 0.02;  // it stands on the ground
+    })) << p.z();
+    const double ground = p.z();
+    EXPECT_TRUE(obeys(writer, quadrotor_msgs_msg_dds__TakeoffLand_{1}, [&] {
+      return p.z() > ground + 0.5;
+    })) << p.z();
+  }
+  {
     Writer<std_msgs_msg_dds__Float32MultiArray_> writer(
         peer, "rt/drone0/cmd/rotors", std_msgs_msg_dds__Float32MultiArray__desc, true);
     float speeds[4] = {0.0f, 0.0f, 0.0f, 0.0f};
@@ -447,6 +534,8 @@ TEST_F(Ros2, PauseStepAndReset) {
       peer, "rt/clock", rosgraph_msgs_msg_dds__Clock__desc, true);
   Writer<std_msgs_msg_dds__Bool_> pause(
       peer, "rt/pointflight/pause", std_msgs_msg_dds__Bool__desc, true);
+  Writer<std_msgs_msg_dds__Empty_> step(
+      peer, "rt/pointflight/step", std_msgs_msg_dds__Empty__desc, true);
   Writer<std_msgs_msg_dds__Empty_> reset(
       peer, "rt/pointflight/reset", std_msgs_msg_dds__Empty__desc, true);
   double now = -1.0;
@@ -460,7 +549,7 @@ TEST_F(Ros2, PauseStepAndReset) {
   };
   ASSERT_TRUE(eventually([&] {
     look();
-    return now > 0.5 && pause.matched() && reset.matched();
+    return now > 0.5 && pause.matched() && step.matched() && reset.matched();
   })) << flight->stop();
   pause.write({true});
   std::this_thread::sleep_for(std::chrono::milliseconds(500));
@@ -469,16 +558,94 @@ TEST_F(Ros2, PauseStepAndReset) {
   std::this_thread::sleep_for(std::chrono::milliseconds(300));
   EXPECT_GT(look(), 2);  // it goes on saying what time it is
   EXPECT_EQ(now, still);
+  step.write({0});
+  EXPECT_TRUE(eventually([&] {
+    look();
+    return now > still;
+  }));
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  look();
+  EXPECT_LT(now, still + 0.15);  // to the next scan, and no further
   pause.write({false});
   EXPECT_TRUE(eventually([&] {
     look();
-    return now > still + 0.2;
+    return now > still + 0.4;
   }));
   reset.write({0});
   std::this_thread::sleep_for(std::chrono::milliseconds(500));
   look();
   EXPECT_FALSE(back);  // stamps go on
   testing::expect_contains(flight->stop(), "reset: at the start again");
+}
+
+/// One program, both ROSes: what a peer of each gets is the same.
+TEST_F(Ros2, BothRosesAtOnceSayTheSame) {
+  if (std::system("/usr/bin/python3 -c 'import rospy' 2>/dev/null") != 0 ||
+      !std::filesystem::exists("/usr/bin/rosmaster")) {
+    GTEST_SKIP() << "no rosmaster and rospy here";
+  }
+  const std::string port = std::to_string(20000 + getpid() % 20000);
+  const std::string home = *folder_ / "ros";
+  setenv("ROS_MASTER_URI", ("http://127.0.0.1:" + port).c_str(), 1);
+  setenv("ROS_IP", "127.0.0.1", 1);
+  setenv("ROS_HOME", home.c_str(), 1);
+  const pid_t master = fork();
+  if (master == 0) {
+    const int nothing = open("/dev/null", O_WRONLY);
+    dup2(nothing, 1);
+    dup2(nothing, 2);
+    execl("/usr/bin/rosmaster", "rosmaster", "--core", "-p", port.c_str(), nullptr);
+    _exit(127);
+  }
+  const auto flight = fly("--ros1");
+  // 200 odometries as rospy reads them, written down
+  write_file(*folder_ / "read.py",
+             "import rospy\n"
+             "from nav_msgs.msg import Odometry\n"
+             "rospy.init_node('reader')\n"
+             "got = []\n"
+             "rospy.Subscriber('/drone0/odom', Odometry, got.append, queue_size=1000)\n"
+             "while len(got) < 200: rospy.rostime.wallsleep(0.05)\n"
+             "for m in got:\n"
+             "    p = m.pose.pose.position\n"
+             "    print(m.header.stamp.to_nsec(), p.x.hex(), p.y.hex(), p.z.hex())\n");
+  const std::string out = *folder_ / "ros1.txt";
+  std::atomic<bool> done{false};
+  std::thread ros1([&] {
+    const std::string script = *folder_ / "read.py";
+    EXPECT_EQ(std::system(("timeout 30 /usr/bin/python3 " + script + " > " + out).c_str()), 0);
+    done = true;
+  });
+  std::map<std::int64_t, Vector3d> seen;
+  {
+    Peer peer;
+    Reader<nav_msgs_msg_dds__Odometry_> odometry(
+        peer, "rt/drone0/odom", nav_msgs_msg_dds__Odometry__desc, true);
+    eventually(
+        [&] {
+          odometry.take([&](const auto& m) {
+            const auto& p = m.pose.pose.position;
+            seen[m.header.stamp.sec * 1'000'000'000ll + m.header.stamp.nanosec] = {p.x, p.y, p.z};
+          });
+          return done.load();
+        },
+        40.0);
+  }
+  ros1.join();
+  const std::string said = flight->stop();
+  kill(master, SIGKILL);
+  waitpid(master, nullptr, 0);
+  std::ifstream lines(out);
+  std::int64_t stamp = 0;
+  std::string x, y, z;
+  std::size_t common = 0;
+  while (lines >> stamp >> x >> y >> z) {
+    const auto found = seen.find(stamp);
+    if (found == seen.end()) continue;
+    ++common;
+    EXPECT_EQ(found->second, Vector3d(std::stod(x), std::stod(y), std::stod(z))) << stamp;
+  }
+  EXPECT_GT(common, 100u) << said;
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <map>
+#include <set>
 
 #include "pointflight/core/hash.hpp"
 #include "ros_common/conversion.hpp"
@@ -290,6 +291,47 @@ TEST(RosBridge, MarsimsGraph) {
   const auto cloud = keeper.of<msg::PointCloud2>("/quad0_pcl_render_node/cloud");
   EXPECT_EQ(cloud[0].point_step, 32u);
   EXPECT_EQ(cloud[0].point_fields[3].offset, 16u);
+}
+
+/// tf2 knows one parent and one place of each frame.
+TEST(RosBridge, SeveralVehiclesShareNoFrame) {
+  Scenario scenario = flight(0.3);
+  scenario.vehicles[0].lidars.push_back(LidarMount{"d455"});
+  scenario.vehicles.push_back(scenario.vehicles[0]);
+  scenario.vehicles[1].name = "drone1";
+  scenario.vehicles[1].start = {12, 3, 3};
+  scenario.vehicles[1].mission.waypoints = {};
+  Keeper marsim;
+  fly(scenario, load_ros_profile("marsim"), marsim);
+  const auto frames = [&](const Keeper& keeper, const std::string& topic) {
+    std::set<std::string> names;
+    for (const auto& m : keeper.of<msg::TFMessage>(topic)) {
+      for (const auto& transform : m.transforms) names.insert(transform.child_frame_id);
+    }
+    return names;
+  };
+  EXPECT_EQ(frames(marsim, "/tf"), (std::set<std::string>{"sensor", "drone1/sensor"}));
+  const auto clouds = marsim.of<msg::PointCloud2>("/quad1_pcl_render_node/sensor_cloud");
+  ASSERT_FALSE(clouds.empty());
+  EXPECT_EQ(clouds[0].header.frame_id, "drone1/sensor");
+  RosProfile profile = load_ros_profile("livox");
+  for (const char* kind : {"tf", "tf_static"}) {
+    profile.outputs.emplace_back();
+    profile.outputs.back().kind = kind;
+    profile.outputs.back().topic = std::string("/") + kind;
+  }
+  Keeper livox;
+  fly(scenario, profile, livox);
+  EXPECT_EQ(frames(livox, "/tf"), (std::set<std::string>{"base_link", "drone1/base_link"}));
+  const auto fixed = livox.of<msg::TFMessage>("/tf_static");
+  ASSERT_EQ(fixed.size(), 1u);
+  EXPECT_EQ(frames(livox, "/tf_static"),
+            (std::set<std::string>{"livox_frame",
+                                   "livox_frame_d455",
+                                   "livox_frame_d455_optical",
+                                   "drone1/livox_frame",
+                                   "drone1/livox_frame_d455",
+                                   "drone1/livox_frame_d455_optical"}));
 }
 
 TEST(RosBridge, SettingsOfAProfile) {
