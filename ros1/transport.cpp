@@ -2,9 +2,7 @@
 
 #include <XmlRpcClient.h>
 #include <ros/network.h>
-#include <ros/publication.h>
 #include <ros/ros.h>
-#include <ros/topic_manager.h>
 
 #include <algorithm>
 #include <atomic>

@@ -578,6 +578,53 @@ TEST_F(Ros2, PauseStepAndReset) {
   testing::expect_contains(flight->stop(), "reset: at the start again");
 }
 
+TEST_F(Ros2, WrongTypesNumbersAndSizesChangeNothing) {
+  const auto flight = fly();
+  Peer peer;
+  Reader<nav_msgs_msg_dds__Odometry_> odometry(
+      peer, "rt/drone0/odom", nav_msgs_msg_dds__Odometry__desc, true);
+  Vector3d p = Vector3d::Zero();
+  int seen = 0;
+  const auto look = [&] {
+    return odometry.take([&](const auto& m) {
+      p = {m.pose.pose.position.x, m.pose.pose.position.y, m.pose.pose.position.z};
+      ++seen;
+    });
+  };
+  ASSERT_TRUE(eventually([&] { return look() > 0; })) << flight->stop();
+  const Vector3d start = p;
+  char text[] = "to the left, please";
+  char frame[] = "world";
+  Writer<std_msgs_msg_dds__String_> string(
+      peer, "rt/drone0/goal", std_msgs_msg_dds__String__desc, true);
+  string.write({text});  // of no type that is read there
+  Writer<geometry_msgs_msg_dds__TwistStamped_> twist(
+      peer, "rt/drone0/cmd/velocity", geometry_msgs_msg_dds__TwistStamped__desc, true);
+  Writer<std_msgs_msg_dds__Float32MultiArray_> rotors(
+      peer, "rt/drone0/cmd/rotors", std_msgs_msg_dds__Float32MultiArray__desc, true);
+  ASSERT_TRUE(eventually([&] { return twist.matched() && rotors.matched(); }));
+  geometry_msgs_msg_dds__TwistStamped_ nan{};
+  nan.header.frame_id = frame;
+  nan.twist.linear.x = std::nan("");
+  std::vector<float> speeds(5'000'000, 1.0f);  // 20 MB
+  std_msgs_msg_dds__Float32MultiArray_ large{};
+  large.data = {5'000'000, 5'000'000, speeds.data(), false};
+  for (int i = 0; i < 10; ++i) {
+    twist.write(nan);
+    if (i < 2) rotors.write(large);
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+  seen = 0;
+  EXPECT_TRUE(eventually([&] {
+    look();
+    return seen > 200;
+  }));
+  EXPECT_LT((p - start).norm(), 0.05);
+  const std::string said = flight->stop();
+  testing::expect_contains(said, "not finite");
+  testing::expect_contains(said, "interrupted");
+}
+
 /// One program, both ROSes: what a peer of each gets is the same.
 TEST_F(Ros2, BothRosesAtOnceSayTheSame) {
   if (std::system("/usr/bin/python3 -c 'import rospy' 2>/dev/null") != 0 ||

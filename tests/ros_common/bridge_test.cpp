@@ -8,6 +8,7 @@
 
 #include "pointflight/core/hash.hpp"
 #include "ros_common/conversion.hpp"
+#include "ros_common/scan_messages.hpp"
 #include "tests/sim/runs.hpp"
 
 namespace pointflight {
@@ -332,6 +333,20 @@ TEST(RosBridge, SeveralVehiclesShareNoFrame) {
                                    "drone1/livox_frame",
                                    "drone1/livox_frame_d455",
                                    "drone1/livox_frame_d455_optical"}));
+}
+
+TEST(ScanMessages, PointsThatAHullTouchesLieAroundIt) {
+  const auto map = hall();
+  const Solid hull{Ball{0.3}};
+  Pose pose;
+  pose.translation = {6, 6, 3};
+  EXPECT_TRUE(touched_points(*map, hull, pose).empty());
+  pose.translation.z() = 0.1;  // in the floor
+  const auto points = touched_points(*map, hull, pose);
+  EXPECT_GT(points.size(), 3u);
+  for (const Vector3f& p : points) {
+    EXPECT_LT((p.cast<double>() - pose.translation).norm(), 0.3 + 2.0 * map->resolution());
+  }
 }
 
 TEST(RosBridge, SettingsOfAProfile) {
