@@ -285,6 +285,40 @@ TEST_F(Ros2, PicturesAndCustomMessagesArriveReliableAndBestEffort) {
   }
 }
 
+/// Types that only other programs' profiles send.
+TEST_F(Ros2, PosesAndRotorSpeedsArriveReliableAndBestEffort) {
+  const auto flight = fly("--profile marsim");
+  for (const bool reliable : {true, false}) {
+    Peer peer;
+    Reader<geometry_msgs_msg_dds__PoseStamped_> poses(peer,
+                                                      "rt/quad0_pcl_render_node/sensor_pose",
+                                                      geometry_msgs_msg_dds__PoseStamped__desc,
+                                                      reliable);
+    Reader<std_msgs_msg_dds__Float32MultiArray_> rotors(
+        peer, "rt/quad_0/cmdRPM", std_msgs_msg_dds__Float32MultiArray__desc, reliable);
+    int pose_count = 0;
+    int rotor_count = 0;
+    EXPECT_TRUE(eventually([&] {
+      pose_count += poses.take([](const auto& m) {
+        EXPECT_STREQ(m.header.frame_id, "map");
+        const auto& q = m.pose.orientation;
+        EXPECT_NEAR(q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w, 1.0, 1e-9);
+        EXPECT_GT(m.pose.position.z, 0.0);
+      });
+      rotor_count += rotors.take([](const auto& m) {
+        ASSERT_EQ(m.data._length, 4u);
+        for (int i = 0; i < 4; ++i) {
+          EXPECT_TRUE(m.data._buffer[i] > 100.0f && m.data._buffer[i] < 40000.0f)
+              << m.data._buffer[i];
+        }
+      });
+      return pose_count > 5 && rotor_count > 100;
+    })) << pose_count
+        << " " << rotor_count << "\n"
+        << flight->stop();
+  }
+}
+
 TEST_F(Ros2, ALateReaderGetsTheMap) {
   const auto flight = fly();
   Peer peer;
@@ -418,7 +452,12 @@ TEST_F(Ros2, PublishingCostsLittleAndIsQuick) {
   EXPECT_LT(p99, 25.0);
 }
 
-TEST_F(Ros2, CommandsFlyTheVehicle) {
+/// What comes in, from reliable and from best-effort senders.
+class Ros2Inputs : public Ros2, public ::testing::WithParamInterface<bool> {};
+INSTANTIATE_TEST_SUITE_P(Reliable, Ros2Inputs, ::testing::Bool());
+
+TEST_P(Ros2Inputs, CommandsFlyTheVehicle) {
+  const bool reliable = GetParam();
   const auto flight = fly();
   Peer peer;
   Reader<nav_msgs_msg_dds__Odometry_> odometry(
@@ -449,17 +488,20 @@ TEST_F(Ros2, CommandsFlyTheVehicle) {
     });
   };
   char frame[] = "world";
-  for (const bool reliable : {true, false}) {
+  {
     Writer<quadrotor_msgs_msg_dds__PositionCommand_> writer(
         peer, "rt/drone0/cmd/position", quadrotor_msgs_msg_dds__PositionCommand__desc, reliable);
     quadrotor_msgs_msg_dds__PositionCommand_ m{};
     m.header.frame_id = frame;
-    m.position = {start.x(), start.y(), start.z() + (reliable ? 0.4 : 0.1)};
+    m.position = {start.x(), start.y(), start.z() + 0.1};
     EXPECT_TRUE(obeys(writer, m, [&] { return std::abs(p.z() - m.position.z) < 0.03; })) << p.z();
   }
   {
     Writer<mars_quadrotor_msgs_msg_dds__PositionCommand_> writer(
-        peer, "rt/drone0/cmd/position", mars_quadrotor_msgs_msg_dds__PositionCommand__desc, false);
+        peer,
+        "rt/drone0/cmd/position",
+        mars_quadrotor_msgs_msg_dds__PositionCommand__desc,
+        reliable);
     mars_quadrotor_msgs_msg_dds__PositionCommand_ m{};
     m.header.frame_id = frame;
     m.position = {start.x(), start.y(), start.z() + 0.4};
@@ -467,7 +509,7 @@ TEST_F(Ros2, CommandsFlyTheVehicle) {
   }
   {
     Writer<geometry_msgs_msg_dds__PoseStamped_> writer(
-        peer, "rt/drone0/goal", geometry_msgs_msg_dds__PoseStamped__desc, true);
+        peer, "rt/drone0/goal", geometry_msgs_msg_dds__PoseStamped__desc, reliable);
     geometry_msgs_msg_dds__PoseStamped_ m{};
     m.header.frame_id = frame;
     m.pose.position = {start.x(), start.y(), start.z()};
@@ -482,7 +524,7 @@ TEST_F(Ros2, CommandsFlyTheVehicle) {
   }
   {
     Writer<geometry_msgs_msg_dds__TwistStamped_> writer(
-        peer, "rt/drone0/cmd/velocity", geometry_msgs_msg_dds__TwistStamped__desc, false);
+        peer, "rt/drone0/cmd/velocity", geometry_msgs_msg_dds__TwistStamped__desc, reliable);
     geometry_msgs_msg_dds__TwistStamped_ m{};
     m.header.frame_id = frame;
     m.twist.linear.z = 0.5;
@@ -490,7 +532,7 @@ TEST_F(Ros2, CommandsFlyTheVehicle) {
   }
   {
     Writer<sensor_msgs_msg_dds__Joy_> writer(
-        peer, "rt/drone0/joy", sensor_msgs_msg_dds__Joy__desc, true);
+        peer, "rt/drone0/joy", sensor_msgs_msg_dds__Joy__desc, reliable);
     float axes[5] = {0.0f, -0.5f, 0.0f, 0.0f, 0.0f};
     sensor_msgs_msg_dds__Joy_ m{};
     m.header.frame_id = frame;
@@ -499,7 +541,7 @@ TEST_F(Ros2, CommandsFlyTheVehicle) {
   }
   {
     Writer<mavros_msgs_msg_dds__AttitudeTarget_> writer(
-        peer, "rt/drone0/cmd/attitude", mavros_msgs_msg_dds__AttitudeTarget__desc, true);
+        peer, "rt/drone0/cmd/attitude", mavros_msgs_msg_dds__AttitudeTarget__desc, reliable);
     mavros_msgs_msg_dds__AttitudeTarget_ m{};
     m.header.frame_id = frame;
     m.orientation.w = 1.0;
@@ -508,7 +550,7 @@ TEST_F(Ros2, CommandsFlyTheVehicle) {
   }
   {
     Writer<quadrotor_msgs_msg_dds__TakeoffLand_> writer(
-        peer, "rt/drone0/cmd/takeoff_land", quadrotor_msgs_msg_dds__TakeoffLand__desc, true);
+        peer, "rt/drone0/cmd/takeoff_land", quadrotor_msgs_msg_dds__TakeoffLand__desc, reliable);
     EXPECT_TRUE(obeys(writer, quadrotor_msgs_msg_dds__TakeoffLand_{2}, [&] {
       return p.z() < start.z() - 0.2 && v.norm() < 0.02;  // it stands on the ground
     })) << p.z();
@@ -519,7 +561,7 @@ TEST_F(Ros2, CommandsFlyTheVehicle) {
   }
   {
     Writer<std_msgs_msg_dds__Float32MultiArray_> writer(
-        peer, "rt/drone0/cmd/rotors", std_msgs_msg_dds__Float32MultiArray__desc, true);
+        peer, "rt/drone0/cmd/rotors", std_msgs_msg_dds__Float32MultiArray__desc, reliable);
     float speeds[4] = {0.0f, 0.0f, 0.0f, 0.0f};
     std_msgs_msg_dds__Float32MultiArray_ m{};
     m.data = {4, 4, speeds, false};
@@ -527,17 +569,18 @@ TEST_F(Ros2, CommandsFlyTheVehicle) {
   }
 }
 
-TEST_F(Ros2, PauseStepAndReset) {
+TEST_P(Ros2Inputs, PauseStepAndReset) {
+  const bool reliable = GetParam();
   const auto flight = fly();
   Peer peer;
   Reader<rosgraph_msgs_msg_dds__Clock_> clock(
       peer, "rt/clock", rosgraph_msgs_msg_dds__Clock__desc, true);
   Writer<std_msgs_msg_dds__Bool_> pause(
-      peer, "rt/pointflight/pause", std_msgs_msg_dds__Bool__desc, true);
+      peer, "rt/pointflight/pause", std_msgs_msg_dds__Bool__desc, reliable);
   Writer<std_msgs_msg_dds__Empty_> step(
-      peer, "rt/pointflight/step", std_msgs_msg_dds__Empty__desc, true);
+      peer, "rt/pointflight/step", std_msgs_msg_dds__Empty__desc, reliable);
   Writer<std_msgs_msg_dds__Empty_> reset(
-      peer, "rt/pointflight/reset", std_msgs_msg_dds__Empty__desc, true);
+      peer, "rt/pointflight/reset", std_msgs_msg_dds__Empty__desc, reliable);
   double now = -1.0;
   bool back = false;
   const auto look = [&] {
