@@ -231,9 +231,11 @@ void RosBridge::on_time(SimTime time) {
 }
 
 void RosBridge::repeat_clock() {
+  // where it stands, which is seldom where the clock's rate put its last message
+  const SimTime now = std::max(latest_, simulation_.time());
   for (const auto& stream : streams_) {
     if (stream->type->kind != OutputKind::kClock || !is_wanted(*stream)) continue;
-    send(*stream, msg::Clock{stamp_of(latest_, epoch_)}, latest_);
+    send(*stream, msg::Clock{stamp_of(now, epoch_)}, now);
   }
   for (Outlet* outlet : outlets_) outlet->flush();
 }

@@ -30,7 +30,7 @@ class RosBridge : public SampleSink {
 
   /// The run has reached a time: sends what follows the clock. Call after each step.
   void on_time(SimTime time);
-  /// The clock once more, for a run that is paused.
+  /// The clock once more, for a run that is paused: the time where it stands.
   void repeat_clock();
   void on_odometry(const OdometrySample& sample) override;
   void on_imu(std::uint32_t vehicle, const ImuSample& sample) override;

@@ -166,6 +166,13 @@ class Ros1Test(unittest.TestCase):
             process.wait(timeout=20)
         log.close()
 
+    def _callTestMethod(self, method):
+        try:
+            method()
+        except BaseException:
+            print("the flight said:\n" + open(self.log.name).read(), file=sys.stderr)
+            raise
+
     def collect(self, topic, kind, count, seconds=30.0):
         got = []
         subscriber = rospy.Subscriber(topic, kind, got.append, queue_size=1000)

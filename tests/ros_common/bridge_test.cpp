@@ -335,6 +335,22 @@ TEST(RosBridge, SeveralVehiclesShareNoFrame) {
                                    "drone1/livox_frame_d455_optical"}));
 }
 
+TEST(RosBridge, TheClockOfAPausedRunSaysWhereItStands) {
+  const Executor executor(1);
+  Simulation simulation(flight(), hall(), executor);
+  RosBridge bridge(simulation, load_ros_profile("default"), kEpoch);
+  Keeper keeper;
+  bridge.add(keeper);
+  bridge.start();
+  for (int i = 0; i < 13; ++i) {  // a step of the physics is a millisecond
+    simulation.step(bridge);
+    bridge.on_time(simulation.time());
+  }
+  EXPECT_NEAR(seconds_of(keeper.of<msg::Clock>("/clock").back().clock), 0.010, 1e-9);
+  bridge.repeat_clock();
+  EXPECT_NEAR(seconds_of(keeper.of<msg::Clock>("/clock").back().clock), 0.013, 1e-9);
+}
+
 TEST(ScanMessages, PointsThatAHullTouchesLieAroundIt) {
   const auto map = hall();
   const Solid hull{Ball{0.3}};
