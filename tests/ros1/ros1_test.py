@@ -170,7 +170,8 @@ class Ros1Test(unittest.TestCase):
         try:
             method()
         except BaseException:
-            print("the flight said:\n" + open(self.log.name).read(), file=sys.stderr)
+            if hasattr(self, "log"):
+                print("the flight said:\n" + open(self.log.name).read(), file=sys.stderr)
             raise
 
     def collect(self, topic, kind, count, seconds=30.0):
