@@ -701,28 +701,33 @@ TEST_F(Ros2, BothRosesAtOnceSayTheSame) {
              "    p = m.pose.pose.position\n"
              "    print(m.header.stamp.to_nsec(), p.x.hex(), p.y.hex(), p.z.hex())\n");
   const std::string out = *folder_ / "ros1.txt";
-  std::atomic<bool> done{false};
-  std::thread ros1([&] {
-    const std::string script = *folder_ / "read.py";
-    EXPECT_EQ(std::system(("timeout 30 /usr/bin/python3 " + script + " > " + out).c_str()), 0);
-    done = true;
-  });
   std::map<std::int64_t, Vector3d> seen;
   {
     Peer peer;
     Reader<nav_msgs_msg_dds__Odometry_> odometry(
         peer, "rt/drone0/odom", nav_msgs_msg_dds__Odometry__desc, true);
+    const auto look = [&] {
+      odometry.take([&](const auto& m) {
+        const auto& p = m.pose.pose.position;
+        seen[m.header.stamp.sec * 1'000'000'000ll + m.header.stamp.nanosec] = {p.x, p.y, p.z};
+      });
+      return !seen.empty();
+    };
+    EXPECT_TRUE(eventually(look));  // the two have found each other: now the other ROS
+    std::atomic<bool> done{false};
+    std::thread ros1([&] {
+      const std::string script = *folder_ / "read.py";
+      EXPECT_EQ(std::system(("timeout 30 /usr/bin/python3 " + script + " > " + out).c_str()), 0);
+      done = true;
+    });
     eventually(
         [&] {
-          odometry.take([&](const auto& m) {
-            const auto& p = m.pose.pose.position;
-            seen[m.header.stamp.sec * 1'000'000'000ll + m.header.stamp.nanosec] = {p.x, p.y, p.z};
-          });
+          look();
           return done.load();
         },
         40.0);
+    ros1.join();
   }
-  ros1.join();
   const std::string said = flight->stop();
   kill(master, SIGKILL);
   waitpid(master, nullptr, 0);
