@@ -277,9 +277,7 @@ std::vector<InputStream> input_streams(const Simulation& simulation,
   std::vector<InputStream> streams;
   for (const RosInput& input : profile.inputs) {
     if (input.topic.empty() || input.topic == "-") continue;
-    const bool vehicles_apart = input.topic.find("{id}") != std::string::npos ||
-                                input.topic.find("{vehicle}") != std::string::npos;
-    const bool once = is_of_run(input.kind) || !vehicles_apart;
+    const bool once = is_of_run(input.kind) || !names_vehicle(input.topic);
     const std::size_t vehicles = once ? 1 : simulation.vehicle_count();
     for (std::size_t v = 0; v < vehicles; ++v) {
       const RosNames names{

@@ -204,17 +204,8 @@ std::vector<std::string> lidar_names(const VehicleAgent& vehicle) {
   return names;
 }
 
-namespace {
-
-bool has_vehicle(const std::string& pattern) {
-  return pattern.find("{id}") != std::string::npos ||
-         pattern.find("{vehicle}") != std::string::npos;
-}
-
-}  // namespace
-
 std::string body_frame_of(const RosProfile& profile, const RosNames& names, std::size_t vehicle) {
-  const bool apart = vehicle == 0 || has_vehicle(profile.body_frame);
+  const bool apart = vehicle == 0 || names_vehicle(profile.body_frame);
   return (apart ? "" : names.vehicle + "/") + with_names(profile.body_frame, names);
 }
 
@@ -223,7 +214,7 @@ std::string sensor_frame_of(const RosProfile& profile,
                             std::size_t vehicle,
                             std::size_t lidar) {
   const std::string& pattern = profile.sensor_frame;
-  const bool vehicles_apart = vehicle == 0 || has_vehicle(pattern);
+  const bool vehicles_apart = vehicle == 0 || names_vehicle(pattern);
   const bool lidars_apart = lidar == 0 || pattern.find("{lidar}") != std::string::npos;
   return (vehicles_apart ? "" : names.vehicle + "/") + with_names(pattern, names) +
          (lidars_apart ? "" : "_" + names.lidar);
@@ -242,7 +233,7 @@ class StreamMaker {
       add_stream(output, type, {}, 0, 0);
       return;
     }
-    const bool vehicles_apart = has_vehicle(output.topic);
+    const bool vehicles_apart = names_vehicle(output.topic);
     for (std::size_t v = 0; v < simulation_.vehicle_count(); ++v) {
       // one name for all can only be one vehicle's, but for transforms, which name their frames
       if (v > 0 && !vehicles_apart && !is_transform(type)) return;

@@ -160,6 +160,11 @@ RosProfile profile_for(const Scenario& scenario, const std::string& name) {
   return profile;
 }
 
+bool names_vehicle(const std::string& pattern) {
+  return pattern.find("{id}") != std::string::npos ||
+         pattern.find("{vehicle}") != std::string::npos;
+}
+
 std::string with_names(const std::string& pattern, const RosNames& names) {
   std::string text;
   for (std::size_t i = 0; i < pattern.size();) {

@@ -47,6 +47,9 @@ struct RosNames {
   std::string lidar;
 };
 
+/// True where a topic or frame is another for each vehicle.
+bool names_vehicle(const std::string& pattern);
+
 /// A topic or frame with its names written out.
 std::string with_names(const std::string& pattern, const RosNames& names);
 
