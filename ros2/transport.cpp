@@ -190,6 +190,9 @@ class Node {
     dds::DomainParticipantQos qos = dds::PARTICIPANT_QOS_DEFAULT;
     qos.name("/");
     qos.user_data().setValue(octets("enclave=/;"));
+    // Debian's Fast DDS 2.9 aborts when it sends to a multicast locator of somebody's reader: its
+    // statistics know only the locators of its own. None are kept: all is sent to unicast ones.
+    qos.allocation().locators.max_multicast_locators = 0;
     auto& builtin = qos.wire_protocol().builtin;
     builtin.readerHistoryMemoryPolicy = rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
     builtin.writerHistoryMemoryPolicy = rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
