@@ -23,4 +23,8 @@ struct DiscoverySettings {
 DiscoverySettings discovery_from(
     const std::function<std::optional<std::string>(const char* name)>& get);
 
+/// Cyclone DDS' configuration for it. What `user` says (CYCLONEDDS_URI: files or XML, separated by
+/// commas) goes before ours, as with ROS 2's own nodes; its interfaces take the place of ours.
+std::string cyclone_configuration(const DiscoverySettings& settings, const std::string& user);
+
 }  // namespace pointflight

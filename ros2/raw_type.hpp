@@ -1,57 +1,59 @@
+// Messages of any type as Cyclone DDS takes them: CDR that is ready, by the name of its type.
 #pragma once
 
-#include <cstring>
-#include <fastdds/dds/topic/TopicDataType.hpp>
+#include <dds/dds.h>
+
+#include <chrono>
 #include <string>
+#include <vector>
 
 #include "ros_common/wire.hpp"
 
+struct ddsi_sertype;
+
 namespace pointflight {
 
-/// A sample of any type: CDR with its header of four bytes.
-struct RawSample {
-  const std::vector<std::byte>* out = nullptr;  ///< To be written.
-  std::vector<std::byte> in;                    ///< That was read.
+/// A topic of a participant whose samples are bytes: CDR with its header of four bytes.
+struct RawTopic {
+  dds_entity_t topic = 0;
+  const ddsi_sertype* type = nullptr;  ///< Of the topic, which keeps it.
 };
 
-/// A type by its DDS name; bytes go through as they are.
-class RawType : public eprosima::fastdds::dds::TopicDataType {
+/// Throws std::runtime_error with words for the user.
+RawTopic make_raw_topic(dds_entity_t participant, const std::string& name, const std::string& type);
+
+/// Hands a message to a writer of such a topic. False where it was not taken.
+bool write_raw(dds_entity_t writer, const ddsi_sertype* type, const Bytes& bytes);
+
+/// A message that was read.
+struct RawSample {
+  std::vector<std::byte> bytes;
+  dds_sample_info_t info;
+};
+
+/// The next message of a reader of such a topic; false where there is none. Samples without data
+/// (a writer has gone) are passed over.
+bool take_raw(dds_entity_t reader, RawSample& sample);
+
+/// While one exists, what its thread writes leaves no faster than `rate` bytes a second, fragment
+/// by fragment: a large message that leaves at once overruns the receive buffers of stock Linux
+/// (208 kB), and Cyclone DDS knows no pacing. It lets go of each fragment when that is sent, with
+/// no lock of the writer's held, so that is where the thread waits. Messages that are sent again
+/// leave from threads of DDS and are not held up.
+class Pacing {
  public:
-  using Payload = eprosima::fastrtps::rtps::SerializedPayload_t;
+  explicit Pacing(double rate);
+  ~Pacing();
+  Pacing(const Pacing&) = delete;
+  Pacing& operator=(const Pacing&) = delete;
 
-  explicit RawType(const std::string& name) {
-    setName(name.c_str());
-    m_typeSize = 1024;  // grows with what is written
-    m_isGetKeyDefined = false;
-    auto_fill_type_information(false);
-    auto_fill_type_object(false);
-  }
+  /// So many bytes have left: waits until the next may.
+  void sent(std::size_t bytes);
 
-  bool serialize(void* data, Payload* payload) override {
-    const auto& bytes = *static_cast<RawSample*>(data)->out;
-    if (bytes.size() > payload->max_size) return false;
-    std::memcpy(payload->data, bytes.data(), bytes.size());
-    payload->length = static_cast<std::uint32_t>(bytes.size());
-    payload->encapsulation = CDR_LE;
-    return true;
-  }
-  bool deserialize(Payload* payload, void* data) override {
-    const auto* first = reinterpret_cast<const std::byte*>(payload->data);
-    static_cast<RawSample*>(data)->in.assign(first, first + payload->length);
-    return true;
-  }
-  std::function<std::uint32_t()> getSerializedSizeProvider(void* data) override {
-    return
-        [data] { return static_cast<std::uint32_t>(static_cast<RawSample*>(data)->out->size()); };
-  }
-  void* createData() override { return new RawSample; }
-  void deleteData(void* data) override { delete static_cast<RawSample*>(data); }
-  bool getKey(void* /*data*/,
-              eprosima::fastrtps::rtps::InstanceHandle_t* /*handle*/,
-              bool /*force_md5*/) override {
-    return false;
-  }
-  [[nodiscard]] bool is_bounded() const override { return false; }
+ private:
+  using Clock = std::chrono::steady_clock;
+  double rate_;
+  Clock::time_point free_at_;  ///< When all that has left is paid for.
 };
 
 }  // namespace pointflight

@@ -1,354 +1,127 @@
 #include "ros2/transport.hpp"
 
-#include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
-#include <fastdds/rtps/transport/shared_mem/SharedMemTransportDescriptor.h>
-#include <fastrtps/utils/IPLocator.h>
+#include <dds/ddsrt/log.h>
 
 #include <algorithm>
 #include <atomic>
 #include <condition_variable>
 #include <cstdlib>
 #include <deque>
-#include <fastdds/dds/domain/DomainParticipant.hpp>
-#include <fastdds/dds/domain/DomainParticipantFactory.hpp>
-#include <fastdds/dds/publisher/DataWriter.hpp>
-#include <fastdds/dds/publisher/DataWriterListener.hpp>
-#include <fastdds/dds/publisher/Publisher.hpp>
-#include <fastdds/dds/subscriber/DataReader.hpp>
-#include <fastdds/dds/subscriber/DataReaderListener.hpp>
-#include <fastdds/dds/subscriber/SampleInfo.hpp>
-#include <fastdds/dds/subscriber/Subscriber.hpp>
-#include <fastdds/dds/topic/Topic.hpp>
-#include <fastdds/rtps/flowcontrol/FlowControllerDescriptor.hpp>
-#include <map>
 #include <mutex>
 #include <optional>
 #include <stdexcept>
 #include <thread>
 
-#include "ros2/discovery.hpp"
-#include "ros2/graph_message.hpp"
-#include "ros2/raw_type.hpp"
+#include "ros2/node.hpp"
+#include "ros_common/ros_names.hpp"
 
 namespace pointflight {
 namespace {
 
-namespace dds = eprosima::fastdds::dds;
-namespace rtps = eprosima::fastrtps::rtps;
-namespace transports = eprosima::fastdds::rtps;
-
-constexpr const char* kPacing = "pointflight_large";
-// a fragment of 64 kB each millisecond, 59 MB/s: stock receive buffers of 208 kB lose nothing
-constexpr std::int32_t kBytesAPeriod = 65536;
-constexpr double kOneFragmentRate = 45e6;  // bytes a second up to which that is enough
-constexpr double kTwoFragmentsRate = 90e6;
-constexpr std::uint32_t kReceiveBuffer = 4u << 20;
-constexpr std::uint32_t kSharedSegment = 16u << 20;
+// bytes a second that leave for readers with stock receive buffers, and where a message of 64 kB a
+// millisecond is not enough any more
+constexpr double kPace = 64e6;
+constexpr double kFastPace = 128e6;
+constexpr double kSlowRate = 45e6;
+constexpr double kFastRate = 90e6;
 constexpr std::size_t kQueueMax = 2000;  // messages that wait to be written
-const eprosima::fastrtps::Duration_t kHeartbeat{0, 200'000'000};
-
-RawGid raw_gid(const rtps::GUID_t& guid) {
-  RawGid raw{};
-  std::copy(guid.guidPrefix.value, guid.guidPrefix.value + 12, raw.begin());
-  std::copy(guid.entityId.value, guid.entityId.value + 4, raw.begin() + 12);
-  return raw;
-}
+constexpr std::size_t kRequests = 10;    // of a service that wait
+constexpr int kSaidMax = 3;              // of DDS' own warnings
 
 /// The DDS name of "sensor_msgs/msg/Imu".
 std::string dds_type_name(const MessageType& type) {
   return type.ros2_package + "::msg::dds_::" + type.name + "_";
 }
 
-std::vector<std::uint8_t> octets(const std::string& text) {
-  return {text.begin(), text.end()};
-}
-
 std::optional<std::string> environment(const char* name) {
-  const char* value = std::getenv(name);
+  const char* value = std::getenv(name);  // NOLINT(concurrency-mt-unsafe)
   return value == nullptr ? std::nullopt : std::optional<std::string>(value);
 }
 
-/// A participant that other ROS 2 nodes see as a node of its name.
-class Node {
+EndpointSettings endpoint_of(const Topic& topic) {
+  if (const std::string fault = topic_fault(topic.name, true); !fault.empty()) {
+    throw std::runtime_error("ROS 2: topic " + topic.name + " " + fault);
+  }
+  EndpointSettings settings;
+  settings.name = "rt" + topic.name;
+  settings.type = dds_type_name(topic.type);
+  settings.hash = topic.type.hash;
+  settings.depth = topic.depth;
+  settings.latched = topic.latched;
+  return settings;
+}
+
+/// What DDS says of packets that it cannot read and the like, to the user: a few lines of it.
+class DdsLog {
  public:
-  Node(const std::string& name, const DiscoverySettings& discovery, const TransportOptions& options)
-      : name_(name),
-        discovery_(discovery),
-        shared_memory_(options.shared_memory),
-        fragments_(options.large_rate > kOneFragmentRate ? 2 : 1) {
-    auto* factory = dds::DomainParticipantFactory::get_instance();
-    participant_ = factory->create_participant(discovery_.domain, participant_qos());
-    if (participant_ == nullptr) {
-      throw std::runtime_error("ROS 2: no DDS participant could be made in domain " +
-                               std::to_string(discovery_.domain) +
-                               "; are there network interfaces, and free ports from " +
-                               std::to_string(7400 + 250 * discovery_.domain) + " on?");
-    }
-    publisher_ = participant_->create_publisher(dds::PUBLISHER_QOS_DEFAULT);
-    subscriber_ = participant_->create_subscriber(dds::SUBSCRIBER_QOS_DEFAULT);
-    graph_ = make_writer("ros_discovery_info",
-                         "rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_",
-                         kGraphTypeHash,
-                         1,
-                         true,
-                         false,
-                         nullptr);
-    writers_.clear();  // the graph's own endpoint is no node's
+  explicit DdsLog(std::function<void(const std::string&)> log) : log_(std::move(log)) {
+    dds_set_log_sink(&DdsLog::take, this);
   }
-  ~Node() {
-    participant_->delete_contained_entities();
-    dds::DomainParticipantFactory::get_instance()->delete_participant(participant_);
-  }
-  Node(const Node&) = delete;
-  Node& operator=(const Node&) = delete;
-
-  /// Fast DDS has one type for a topic's name in a participant.
-  [[nodiscard]] bool can_have(const std::string& name, const std::string& type) const {
-    const auto known = types_.find(name);
-    return known == types_.end() || known->second == type;
-  }
-  [[nodiscard]] rtps::GuidPrefix_t prefix() const { return participant_->guid().guidPrefix; }
-
-  dds::DataWriter* make_writer(const std::string& name,
-                               const std::string& type,
-                               const std::string& hash,
-                               std::size_t depth,
-                               bool latched,
-                               bool large,
-                               dds::DataWriterListener* listener) {
-    dds::DataWriterQos qos = dds::DATAWRITER_QOS_DEFAULT;
-    // a reliable writer serves both kinds of readers
-    qos.reliability().kind = dds::RELIABLE_RELIABILITY_QOS;
-    qos.durability().kind =
-        latched ? dds::TRANSIENT_LOCAL_DURABILITY_QOS : dds::VOLATILE_DURABILITY_QOS;
-    qos.history().kind = dds::KEEP_LAST_HISTORY_QOS;
-    qos.history().depth = static_cast<std::int32_t>(depth);
-    qos.resource_limits().max_samples = static_cast<std::int32_t>(depth);
-    qos.resource_limits().max_instances = 1;
-    qos.resource_limits().max_samples_per_instance = static_cast<std::int32_t>(depth);
-    qos.resource_limits().allocated_samples = 1;
-    qos.endpoint().history_memory_policy = rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
-    qos.reliable_writer_qos().times.heartbeatPeriod = kHeartbeat;
-    qos.data_sharing().off();
-    if (large) {
-      qos.publish_mode().kind = dds::ASYNCHRONOUS_PUBLISH_MODE;
-      qos.publish_mode().flow_controller_name = kPacing;
-    }
-    if (!hash.empty()) qos.user_data().setValue(octets("typehash=" + hash + ";"));
-    dds::DataWriter* writer = publisher_->create_datawriter(topic_of(name, type), qos, listener);
-    if (writer == nullptr) throw std::runtime_error("ROS 2: cannot write " + name);
-    writers_.push_back(raw_gid(writer->guid()));
-    return writer;
-  }
-
-  /// Best effort: takes what both kinds of writers send.
-  dds::DataReader* make_reader(const std::string& name,
-                               const std::string& type,
-                               const std::string& hash,
-                               std::size_t depth,
-                               dds::DataReaderListener* listener) {
-    dds::DataReaderQos qos = dds::DATAREADER_QOS_DEFAULT;
-    qos.reliability().kind = dds::BEST_EFFORT_RELIABILITY_QOS;
-    qos.history().kind = dds::KEEP_LAST_HISTORY_QOS;
-    qos.history().depth = static_cast<std::int32_t>(depth);
-    qos.resource_limits().max_samples = static_cast<std::int32_t>(depth);
-    qos.resource_limits().max_instances = 1;
-    qos.resource_limits().max_samples_per_instance = static_cast<std::int32_t>(depth);
-    qos.resource_limits().allocated_samples = 1;
-    qos.endpoint().history_memory_policy = rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
-    qos.data_sharing().off();
-    qos.user_data().setValue(octets("typehash=" + hash + ";"));
-    dds::DataReader* reader = subscriber_->create_datareader(topic_of(name, type), qos, listener);
-    if (reader == nullptr) throw std::runtime_error("ROS 2: cannot read " + name);
-    readers_.push_back(raw_gid(reader->guid()));
-    return reader;
-  }
-
-  /// Says which endpoints belong to the node.
-  void send_graph() {
-    const RawGid own = raw_gid(participant_->guid());
-    const auto bytes = discovery_.old_gids ? graph_message<24>(own, name_, readers_, writers_)
-                                           : graph_message<16>(own, name_, readers_, writers_);
-    RawSample sample;
-    sample.out = &bytes;
-    graph_->write(&sample);
-  }
+  ~DdsLog() { dds_set_log_sink(nullptr, nullptr); }
+  DdsLog(const DdsLog&) = delete;
+  DdsLog& operator=(const DdsLog&) = delete;
 
  private:
-  dds::Topic* topic_of(const std::string& name, const std::string& type) {
-    auto& known = topics_[name];
-    if (known != nullptr) return known;
-    dds::TypeSupport support(new RawType(type));
-    support.register_type(participant_);
-    known = participant_->create_topic(name, type, dds::TOPIC_QOS_DEFAULT);
-    if (known == nullptr) throw std::runtime_error("ROS 2: topic " + name + " cannot be made");
-    types_[name] = type;
-    return known;
+  static void take(void* self, const dds_log_data_t* data) {
+    static_cast<DdsLog*>(self)->say({data->message, data->size});
   }
-
-  dds::DomainParticipantQos participant_qos() const {
-    dds::DomainParticipantQos qos = dds::PARTICIPANT_QOS_DEFAULT;
-    qos.name("/");
-    qos.user_data().setValue(octets("enclave=/;"));
-    // Debian's Fast DDS 2.9 aborts when it sends to a multicast locator of somebody's reader: its
-    // statistics know only the locators of its own. None are kept: all is sent to unicast ones.
-    qos.allocation().locators.max_multicast_locators = 0;
-    auto& builtin = qos.wire_protocol().builtin;
-    builtin.readerHistoryMemoryPolicy = rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
-    builtin.writerHistoryMemoryPolicy = rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
-    // found at once by who is there, and within a second by who comes
-    builtin.discovery_config.initial_announcements = {30, {0, 100'000'000}};
-    builtin.discovery_config.leaseDuration_announcementperiod = {1, 0};
-    auto udp = std::make_shared<transports::UDPv4TransportDescriptor>();
-    udp->receiveBufferSize = kReceiveBuffer;
-    udp->maxInitialPeersRange = 32;
-    const auto peer = [&](const std::string& address) {
-      rtps::Locator_t locator;
-      rtps::IPLocator::setIPv4(locator, address);
-      builtin.initialPeersList.push_back(locator);
-    };
-    switch (discovery_.range) {
-      case DiscoverySettings::Range::kOff:
-        builtin.discovery_config.discoveryProtocol = rtps::DiscoveryProtocol_t::NONE;
-        break;
-      case DiscoverySettings::Range::kLocalhost: {
-        udp->interfaceWhiteList = {"127.0.0.1"};
-        builtin.metatrafficMulticastLocatorList.clear();
-        builtin.avoid_builtin_multicast = true;
-        builtin.metatrafficUnicastLocatorList.push_back(rtps::Locator_t());  // no multicast
-        peer("127.0.0.1");
-        break;
-      }
-      case DiscoverySettings::Range::kSubnet:
-        if (discovery_.static_peers.empty()) break;  // the built-in behaviour
-        rtps::Locator_t multicast;
-        rtps::IPLocator::setIPv4(multicast, "239.255.0.1");
-        multicast.port = 7400 + 250 * discovery_.domain;
-        builtin.initialPeersList.push_back(multicast);
-        break;
-    }
-    if (discovery_.range != DiscoverySettings::Range::kOff) {
-      for (const std::string& address : discovery_.static_peers) peer(address);
-    }
-    qos.transport().use_builtin_transports = false;
-    qos.transport().user_transports.push_back(udp);
-    if (shared_memory_) {
-      auto shared = std::make_shared<transports::SharedMemTransportDescriptor>();
-      shared->segment_size(kSharedSegment);
-      qos.transport().user_transports.push_back(shared);
-    }
-    auto pacing = std::make_shared<transports::FlowControllerDescriptor>();
-    pacing->name = kPacing;
-    pacing->scheduler = transports::FlowControllerSchedulerPolicy::FIFO;
-    pacing->max_bytes_per_period = fragments_ * kBytesAPeriod;
-    pacing->period_ms = 1;
-    qos.flow_controllers().push_back(pacing);
-    return qos;
+  void say(std::string text) {
+    const int before = said_++;
+    if (!log_ || before >= kSaidMax) return;
+    while (!text.empty() && (text.back() == '\n' || text.back() == ' ')) text.pop_back();
+    constexpr std::size_t kLine = 160;
+    if (text.size() > kLine) text = text.substr(0, kLine) + " ...";
+    log_("ROS 2: DDS says: " + text + (before + 1 == kSaidMax ? " (more is not said)" : ""));
   }
-
-  std::string name_;
-  DiscoverySettings discovery_;
-  bool shared_memory_;
-  std::int32_t fragments_;  ///< Of 64 kB that leave in a millisecond.
-  dds::DomainParticipant* participant_ = nullptr;
-  dds::Publisher* publisher_ = nullptr;
-  dds::Subscriber* subscriber_ = nullptr;
-  dds::DataWriter* graph_ = nullptr;
-  std::map<std::string, dds::Topic*> topics_;
-  std::map<std::string, std::string> types_;  ///< Of each topic.
-  std::vector<RawGid> readers_, writers_;
+  std::function<void(const std::string&)> log_;
+  std::atomic<int> said_{0};
 };
 
-class Ros2Transport : public Transport {
+/// Messages on their way to the network, and the thread that writes them.
+class WriteQueue {
  public:
-  explicit Ros2Transport(const TransportOptions& options)
-      : options_(options), discovery_(discovery_from(environment)) {
-    if (options.localhost_only) discovery_.range = DiscoverySettings::Range::kLocalhost;
-    if (options.log && options.large_rate > kOneFragmentRate) {
-      const std::string rate = std::to_string(static_cast<int>(1e-6 * options.large_rate));
-      options.log(options.large_rate > kTwoFragmentsRate
-                      ? "ROS 2: clouds of up to " + rate + " MB/s if all are read: more than UDP " +
-                            "carries here; read fewer, or lower their rates (ros.outputs)"
-                      : "ROS 2: clouds of up to " + rate + " MB/s if all are read: receive " +
-                            "buffers of stock size may lose some (net.core.rmem_max)");
-    }
-    add_node();
-    own_ = nodes_.front()->prefix();
+  using Write = std::function<void(std::size_t output, const Bytes& bytes)>;
+
+  ~WriteQueue() { close(); }
+
+  /// `pace`: bytes a second at which messages leave; 0: at once.
+  void start(Write write, double pace) {
+    worker_ = std::thread([this, write = std::move(write), pace] {
+      std::optional<Pacing> pacing;
+      if (pace > 0.0) pacing.emplace(pace);
+      work(write);
+    });
   }
 
-  ~Ros2Transport() override {
-    close();
-    nodes_.clear();  // before the listeners that they call
-  }
-
-  Wire wire() const override { return Wire::kCdr; }
-
-  int advertise(const Topic& topic) override {
-    auto out = std::make_unique<Output>(*this, topic);
-    out->writer = nodes_.front()->make_writer("rt" + topic.name,
-                                              dds_type_name(topic.type),
-                                              topic.type.hash,
-                                              topic.depth,
-                                              topic.latched,
-                                              topic.large,
-                                              out.get());
-    outputs_.push_back(std::move(out));
-    return static_cast<int>(outputs_.size()) - 1;
-  }
-
-  void subscribe(const Topic& topic, std::function<void(const Received&)> on_message) override {
-    auto in = std::make_unique<Input>(*this, topic, std::move(on_message));
-    const std::string name = "rt" + topic.name;
-    const std::string type = dds_type_name(topic.type);
-    // a second type of one topic needs a second participant
-    auto node = std::find_if(
-        nodes_.begin(), nodes_.end(), [&](const auto& n) { return n->can_have(name, type); });
-    if (node == nodes_.end()) {
-      add_node();
-      node = nodes_.end() - 1;
-    }
-    in->reader = (*node)->make_reader(name, type, topic.type.hash, topic.depth, in.get());
-    inputs_.push_back(std::move(in));
-  }
-
-  void start() override {
-    for (const auto& node : nodes_) node->send_graph();
-    worker_ = std::thread([this] { work(); });
-  }
-
-  bool is_connected() const override { return true; }
-
-  bool has_senders() const override {
-    return std::any_of(
-        inputs_.begin(), inputs_.end(), [](const auto& in) { return in->senders > 0; });
-  }
-
-  bool has_readers(int topic) const override {
-    return outputs_[static_cast<std::size_t>(topic)]->readers > 0;
-  }
-
-  void send(int topic, const Bytes& bytes, std::int64_t /*time*/) override {
+  /// At most `own_max` of one output and kQueueMax in all wait. Returns how many older messages
+  /// had to go.
+  std::uint64_t push(std::size_t output, const Bytes& bytes, bool latched, std::size_t own_max) {
     const std::lock_guard lock(mutex_);
-    queue_.emplace_back(topic, bytes);
-    if (queue_.size() > kQueueMax) {
+    const auto is_own = [&](const Entry& e) { return e.output == output; };
+    std::uint64_t dropped = 0;
+    const auto own = std::count_if(queue_.begin(), queue_.end(), is_own);
+    if (static_cast<std::size_t>(own) >= own_max) {
+      queue_.erase(std::find_if(queue_.begin(), queue_.end(), is_own));
+      ++dropped;
+    } else if (queue_.size() >= kQueueMax) {
       // the oldest that is not all that a latecomer would ever get
-      const auto oldest = std::find_if(queue_.begin(), queue_.end(), [&](const auto& entry) {
-        return !outputs_[static_cast<std::size_t>(entry.first)]->topic.latched;
-      });
-      if (oldest != queue_.end()) queue_.erase(oldest);
-      ++dropped_;
+      const auto oldest =
+          std::find_if(queue_.begin(), queue_.end(), [](const Entry& e) { return !e.latched; });
+      if (oldest == queue_.end()) return 1;
+      queue_.erase(oldest);
+      ++dropped;
     }
+    queue_.push_back({output, bytes, latched});
+    return dropped;
   }
 
-  void flush() override {
+  void wake() {
     const std::lock_guard lock(mutex_);
-    if (!queue_.empty()) ready_.notify_one();  // once for a step, not for each message
+    if (!queue_.empty()) ready_.notify_one();
   }
 
-  std::uint64_t dropped() const override { return dropped_; }
-
-  /// Writes what waits, then ends the thread that writes.
-  void close() override {
+  /// Writes what waits, then ends the thread.
+  void close() {
     {
       const std::lock_guard lock(mutex_);
       stop_ = true;
@@ -358,96 +131,275 @@ class Ros2Transport : public Transport {
   }
 
  private:
-  struct Output : dds::DataWriterListener {
-    Output(Ros2Transport& t, Topic to) : transport(t), topic(std::move(to)) {}
-    void on_publication_matched(dds::DataWriter* /*writer*/,
-                                const dds::PublicationMatchedStatus& status) override {
-      readers = status.current_count;
-    }
-    void on_offered_incompatible_qos(dds::DataWriter* /*writer*/,
-                                     const dds::OfferedIncompatibleQosStatus& status) override {
-      transport.say_incompatible(topic, status.last_policy_id);
-    }
-    Ros2Transport& transport;
-    Topic topic;
-    dds::DataWriter* writer = nullptr;
-    std::atomic<int> readers{0};
+  struct Entry {
+    std::size_t output = 0;
+    Bytes bytes;
+    bool latched = false;
   };
 
-  struct Input : dds::DataReaderListener {
-    Input(Ros2Transport& t, Topic from, std::function<void(const Received&)> call)
-        : transport(t), topic(std::move(from)), on_message(std::move(call)) {}
-    void on_subscription_matched(dds::DataReader* /*reader*/,
-                                 const dds::SubscriptionMatchedStatus& status) override {
-      senders = status.current_count;
-    }
-    void on_data_available(dds::DataReader* from) override {
-      RawSample sample;
-      dds::SampleInfo info;
-      while (from->take_next_sample(&sample, &info) == ReturnCode_t::RETCODE_OK) {
-        rtps::GUID_t sender;
-        rtps::iHandle2GUID(sender, info.publication_handle);
-        if (!info.valid_data || sender.guidPrefix == transport.own_) {
-          continue;
-        }
-        Received received;
-        received.data = sample.in.data();
-        received.size = sample.in.size();
-        on_message(received);
-      }
-    }
-    Ros2Transport& transport;
-    Topic topic;
-    std::function<void(const Received&)> on_message;
-    dds::DataReader* reader = nullptr;
-    std::atomic<int> senders{0};
-  };
-
-  void add_node() {
-    const std::string number = nodes_.empty() ? "" : "_" + std::to_string(nodes_.size() + 1);
-    nodes_.push_back(std::make_unique<Node>(options_.node + number, discovery_, options_));
-  }
-
-  void write(dds::DataWriter& writer, const std::vector<std::byte>& bytes) {
-    RawSample sample;
-    sample.out = &bytes;
-    if (!writer.write(&sample)) ++dropped_;
-  }
-
-  void work() {
+  void work(const Write& write) {
     std::unique_lock lock(mutex_);
     for (;;) {
       ready_.wait(lock, [&] { return stop_ || !queue_.empty(); });
       if (queue_.empty()) return;
-      const auto [topic, bytes] = std::move(queue_.front());
+      const Entry entry = std::move(queue_.front());
       queue_.pop_front();
       lock.unlock();
-      write(*outputs_[static_cast<std::size_t>(topic)]->writer, *bytes);
+      write(entry.output, entry.bytes);
       lock.lock();
     }
   }
 
-  void say_incompatible(const Topic& topic, dds::QosPolicyId_t policy) const {
+  std::thread worker_;
+  std::mutex mutex_;
+  std::condition_variable ready_;
+  std::deque<Entry> queue_;
+  bool stop_ = false;
+};
+
+class Ros2Transport : public Transport {
+ public:
+  explicit Ros2Transport(const TransportOptions& options) : options_(options), dds_(options.log) {
+    DiscoverySettings discovery = discovery_from(environment);
+    if (options.localhost_only) discovery.range = DiscoverySettings::Range::kLocalhost;
+    if (options.log && options.large_rate > kSlowRate) {
+      const std::string rate = std::to_string(static_cast<int>(1e-6 * options.large_rate));
+      options.log(options.large_rate > kFastRate
+                      ? "ROS 2: clouds of up to " + rate + " MB/s if all are read: more than UDP " +
+                            "carries here; read fewer, or lower their rates (ros.outputs)"
+                      : "ROS 2: clouds of up to " + rate + " MB/s if all are read: receive " +
+                            "buffers of stock size may lose some (net.core.rmem_max)");
+    }
+    node_ = std::make_unique<Node>(options_.node, discovery);
+  }
+
+  ~Ros2Transport() override { close(); }
+
+  Wire wire() const override { return Wire::kCdr; }
+
+  int advertise(const Topic& topic) override {
+    auto out = std::make_unique<Output>(*this, topic);
+    const Listener listener(dds_create_listener(out.get()));
+    dds_lset_publication_matched(listener.get(), &Output::on_matched);
+    dds_lset_offered_incompatible_qos(listener.get(), &Output::on_incompatible);
+    out->writer = node_->make_writer(endpoint_of(topic), listener.get());
+    outputs_.push_back(std::move(out));
+    return static_cast<int>(outputs_.size()) - 1;
+  }
+
+  void subscribe(const Topic& topic, std::function<void(const Received&)> on_message) override {
+    // best effort takes what both kinds of writers send
+    add_reader(topic, on_message, false);
+    if (topic.reliable) add_reader(topic, on_message, true);
+  }
+
+  void serve(const Service& service, Answer answer) override {
+    auto served = std::make_unique<Served>(*this, service, std::move(answer));
+    const std::string type = service.package + "::srv::dds_::" + service.type;
+    EndpointSettings reply;
+    reply.name = "rr" + service.name + "Reply";
+    reply.type = type + "_Response_";
+    reply.hash = service.response_hash;
+    reply.depth = kRequests;
+    auto out = std::make_unique<Output>(*this, Topic{});
+    out->topic.name = service.name;
+    out->writer = node_->make_writer(reply, nullptr);
+    served->output = outputs_.size();
+    outputs_.push_back(std::move(out));
+    EndpointSettings request;
+    request.name = "rq" + service.name + "Request";
+    request.type = type + "_Request_";
+    request.hash = service.request_hash;
+    request.depth = kRequests;
+    const Listener listener(dds_create_listener(served.get()));
+    dds_lset_data_available(listener.get(), &Served::on_request);
+    served_.push_back(std::move(served));
+    node_->make_reader(request, listener.get());
+  }
+
+  void start() override {
+    node_->send_graph();
+    const auto write = [this](std::size_t output, const Bytes& bytes) {
+      const RawWriter& writer = outputs_[output]->writer;
+      if (!write_raw(writer.entity, writer.type, bytes)) ++dropped_;
+    };
+    small_.start(write, 0.0);
+    large_.start(write, options_.large_rate > kSlowRate ? kFastPace : kPace);
+  }
+
+  bool is_connected() const override { return true; }
+
+  bool has_senders() const override {
+    return std::any_of(inputs_.begin(), inputs_.end(), [](const auto& in) {
+      return in->answers && in->senders > 0;
+    });
+  }
+
+  bool has_readers(int topic) const override { return reader_count(topic) > 0; }
+
+  int reader_count(int topic) const override {
+    return outputs_[static_cast<std::size_t>(topic)]->readers;
+  }
+
+  void send(int topic, const Bytes& bytes, std::int64_t /*time*/) override {
+    const auto output = static_cast<std::size_t>(topic);
+    const Topic& t = outputs_[output]->topic;
+    dropped_ += t.large ? large_.push(output, bytes, t.latched, t.depth)
+                        : small_.push(output, bytes, t.latched, kQueueMax);
+  }
+
+  void flush() override {
+    small_.wake();  // once for a step, not for each message
+    large_.wake();
+  }
+
+  std::uint64_t dropped() const override { return dropped_; }
+
+  void close() override {
+    small_.close();
+    large_.close();
+    node_.reset();
+  }
+
+ private:
+  struct Output {
+    Output(Ros2Transport& t, Topic to) : transport(t), topic(std::move(to)) {}
+    static void on_matched(dds_entity_t /*writer*/,
+                           const dds_publication_matched_status_t status,
+                           void* self) {
+      static_cast<Output*>(self)->readers = static_cast<int>(status.current_count);
+    }
+    static void on_incompatible(dds_entity_t /*writer*/,
+                                const dds_offered_incompatible_qos_status_t status,
+                                void* self) {
+      const auto& output = *static_cast<Output*>(self);
+      output.transport.say_incompatible(output.topic, status.last_policy_id);
+    }
+    Ros2Transport& transport;
+    Topic topic;
+    RawWriter writer;
+    std::atomic<int> readers{0};
+  };
+
+  struct Input {
+    explicit Input(std::function<void(const Received&)> call) : on_message(std::move(call)) {}
+    static void on_matched(dds_entity_t /*reader*/,
+                           const dds_subscription_matched_status_t status,
+                           void* self) {
+      static_cast<Input*>(self)->senders = static_cast<int>(status.current_count);
+    }
+    static void on_data(dds_entity_t reader, void* self) {
+      auto& input = *static_cast<Input*>(self);
+      RawSample sample;
+      while (take_raw(reader, sample)) {
+        if (input.has_reliable_twin && is_reliable(reader, sample.info.publication_handle)) {
+          continue;
+        }
+        Received received;
+        received.data = sample.bytes.data();
+        received.size = sample.bytes.size();
+        input.on_message(received);
+      }
+    }
+    std::function<void(const Received&)> on_message;
+    bool has_reliable_twin = false;  ///< Which takes what reliable writers send.
+    bool answers = false;            ///< A planner's.
+    std::atomic<int> senders{0};
+  };
+
+  /// A service. Requests of rmw_cyclonedds begin with 16 bytes (who asks, and the number of the
+  /// question) that its reply has to begin with as well. rmw_fastrtps carries the same beside the
+  /// bytes, in a form that Cyclone DDS does not have: ROS 2 has no common one.
+  struct Served {
+    Served(Ros2Transport& t, Service its_service, Answer its_answer)
+        : transport(t), service(std::move(its_service)), answer(std::move(its_answer)) {}
+    static void on_request(dds_entity_t reader, void* self) {
+      auto& served = *static_cast<Served*>(self);
+      RawSample sample;
+      while (take_raw(reader, sample)) served.reply_to(std::move(sample.bytes));
+    }
+    void reply_to(std::vector<std::byte> bytes) {
+      constexpr std::ptrdiff_t kCdrHeader = 4;
+      constexpr std::ptrdiff_t kWho = 16;
+      const bool has_header = bytes.size() > kCdrHeader + kWho;
+      std::vector<std::byte> who;
+      if (has_header) {
+        const auto first = bytes.begin() + kCdrHeader;
+        who.assign(first, first + kWho);
+        bytes.erase(first, first + kWho);
+      }
+      Received request;
+      request.data = bytes.data();
+      request.size = bytes.size();
+      std::vector<std::byte> reply = answer(request);
+      if (!has_header) {
+        transport.say_other_client(service);
+        return;
+      }
+      reply.insert(reply.begin() + kCdrHeader, who.begin(), who.end());
+      transport.small_.push(output,
+                            std::make_shared<const std::vector<std::byte>>(std::move(reply)),
+                            false,
+                            kQueueMax);
+      transport.small_.wake();
+    }
+    Ros2Transport& transport;
+    Service service;
+    Answer answer;
+    std::size_t output = 0;  ///< Where its replies leave.
+  };
+
+  void add_reader(const Topic& topic,
+                  const std::function<void(const Received&)>& on_message,
+                  bool reliable) {
+    auto in = std::make_unique<Input>(on_message);
+    in->has_reliable_twin = topic.reliable && !reliable;
+    in->answers = topic.answers;
+    EndpointSettings settings = endpoint_of(topic);
+    settings.reliable = reliable;
+    const Listener listener(dds_create_listener(in.get()));
+    dds_lset_subscription_matched(listener.get(), &Input::on_matched);
+    dds_lset_data_available(listener.get(), &Input::on_data);
+    inputs_.push_back(std::move(in));
+    node_->make_reader(settings, listener.get());
+  }
+
+  static bool is_reliable(dds_entity_t reader, dds_instance_handle_t writer) {
+    auto* endpoint = dds_get_matched_publication_data(reader, writer);
+    if (endpoint == nullptr) return false;  // has gone since
+    dds_reliability_kind_t kind = DDS_RELIABILITY_BEST_EFFORT;
+    dds_duration_t blocking = 0;
+    dds_qget_reliability(endpoint->qos, &kind, &blocking);
+    dds_builtintopic_free_endpoint(endpoint);
+    return kind == DDS_RELIABILITY_RELIABLE;
+  }
+
+  void say_other_client(const Service& service) {
+    if (options_.log && !said_other_client_.exchange(true)) {
+      options_.log("ROS 2: " + service.name + " was called by a client whose DDS is not Cyclone; " +
+                   "it is done, but the client gets no reply: with rmw_fastrtps use the topic of " +
+                   "this name (said once)");
+    }
+  }
+
+  void say_incompatible(const Topic& topic, std::uint32_t policy) const {
     if (!options_.log) return;
-    const char* what = policy == dds::RELIABILITY_QOS_POLICY_ID  ? "another reliability"
-                       : policy == dds::DURABILITY_QOS_POLICY_ID ? "transient-local durability"
-                                                                 : "another quality of service";
+    const char* what = policy == DDS_RELIABILITY_QOS_POLICY_ID  ? "another reliability"
+                       : policy == DDS_DURABILITY_QOS_POLICY_ID ? "transient-local durability"
+                                                                : "another quality of service";
     options_.log("ROS 2: a subscriber of " + topic.name + " asks for " + what +
                  " than is offered and gets nothing; make it volatile, reliable or best effort");
   }
 
   TransportOptions options_;
-  DiscoverySettings discovery_;
-  std::vector<std::unique_ptr<Node>> nodes_;
-  rtps::GuidPrefix_t own_;  ///< Of the first node, whose are all writers.
+  DdsLog dds_;
   std::vector<std::unique_ptr<Output>> outputs_;
   std::vector<std::unique_ptr<Input>> inputs_;
-  std::thread worker_;
-  std::mutex mutex_;
-  std::condition_variable ready_;
-  std::deque<std::pair<int, Bytes>> queue_;
-  bool stop_ = false;
+  std::vector<std::unique_ptr<Served>> served_;
+  WriteQueue small_, large_;    ///< Large messages are paced.
+  std::unique_ptr<Node> node_;  ///< Goes before what its listeners use.
   std::atomic<std::uint64_t> dropped_{0};
+  std::atomic<bool> said_other_client_{false};
 };
 
 }  // namespace

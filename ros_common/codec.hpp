@@ -212,7 +212,11 @@ class WireReader {
 template <Wire W, class M>
 std::vector<std::byte> encode(const M& message) {
   std::vector<std::byte> bytes;
-  if constexpr (W == Wire::kCdr) bytes = {std::byte{0}, std::byte{1}, std::byte{0}, std::byte{0}};
+  bytes.reserve(128);  // most fit; and gcc 12 warns of bounds that it guesses wrong without
+  if constexpr (W == Wire::kCdr) {
+    bytes.resize(4);
+    bytes[1] = std::byte{1};  // little-endian
+  }
   WireWriter<W> writer(bytes);
   writer.write(message);
   return bytes;

@@ -38,7 +38,19 @@ struct Topic {
   MessageType type;
   bool latched = false;  ///< Whoever comes late gets the last message.
   std::size_t depth = 10;
-  bool large = false;  ///< Clouds and images: paced on ROS 2.
+  bool large = false;     ///< Clouds and images: paced on ROS 2.
+  bool reliable = false;  ///< Comes in once and counts: read reliably on ROS 2.
+  bool answers = false;   ///< Comes in from a planner: what lockstep waits for.
+};
+
+/// A service that the node offers.
+struct Service {
+  std::string kind;                         ///< What it is for.
+  std::string name;                         ///< "/pointflight/reset"
+  std::string package;                      ///< "std_srvs"
+  std::string type;                         ///< "Trigger"
+  std::string md5;                          ///< ROS 1.
+  std::string request_hash, response_hash;  ///< ROS 2.
 };
 
 /// A message that came in, in the sender's own words.
@@ -65,6 +77,12 @@ class Outlet {
   /// False where nobody would get a message: it need not be made.
   virtual bool has_readers(int topic) const = 0;
 
+  /// How many would; at least one where there are readers.
+  virtual int reader_count(int topic) const { return has_readers(topic) ? 1 : 0; }
+
+  /// True where somebody reads now; false in a recording.
+  virtual bool is_live() const { return false; }
+
   /// `time`: ns since the Unix epoch, when the message leaves; not before the last one's.
   virtual void send(int topic, const Bytes& bytes, std::int64_t time) = 0;
 
@@ -78,6 +96,8 @@ class Outlet {
 /// A ROS: messages go out and come in.
 class Transport : public Outlet {
  public:
+  bool is_live() const override { return true; }
+
   /// Calls `on_message` for what is sent on a topic, from a thread of its own; what this transport
   /// sends itself is left out. ROS 1: of whatever definition the sender has (`Received`).
   virtual void subscribe(const Topic& topic, std::function<void(const Received&)> on_message) = 0;
@@ -85,11 +105,25 @@ class Transport : public Outlet {
   /// True once it has found the ROS it belongs to (ROS 1: a master).
   virtual bool is_connected() const = 0;
 
-  /// True while somebody sends on a topic that is read.
+  /// Answers requests of a service by `answer`, which is called from a thread of the transport's.
+  using Answer = std::function<std::vector<std::byte>(const Received& request)>;
+  virtual void serve(const Service& service, Answer answer) = 0;
+
+  /// Ends what is open, both ways: when it returns no message comes in any more.
+  void close() override = 0;
+
+  /// True while somebody sends on a topic of a planner's answers.
   virtual bool has_senders() const = 0;
 
   /// True once somebody outside has ended the node (ROS 1: rosnode kill, another node of its name).
   virtual bool is_over() const { return false; }
+
+  /// Why it had to end, in words for the user; empty where nothing is wrong.
+  virtual std::string failure() const { return {}; }
+
+  /// False where `close` had to leave threads behind (ROS 1: a master that does not answer): the
+  /// process must then end without the destructors of static objects.
+  virtual bool has_ended() const { return true; }
 
   /// Messages that were dropped because somebody was too slow to take them. ROS 2: in the own
   /// queue; what a DDS history lets go it does not tell.
@@ -99,7 +133,6 @@ class Transport : public Outlet {
 struct TransportOptions {
   std::string node = "pointflight";
   bool localhost_only = false;  ///< ROS 2.
-  bool shared_memory = false;   ///< ROS 2.
   double large_rate = 0.0;      ///< Bytes a second of clouds and pictures, all read: for ROS 2.
   std::function<void(const std::string&)> log;  ///< Lines for the user, from any thread.
 };

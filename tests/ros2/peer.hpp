@@ -165,6 +165,8 @@ class Writer {
     return dds_get_publication_matched_status(writer_, &status) == 0 && status.current_count > 0;
   }
   void write(const T& message) { EXPECT_EQ(dds_write(writer_, &message), 0); }
+  /// Whether somebody takes it or not.
+  void try_write(const T& message) { dds_write(writer_, &message); }
 
  private:
   dds_entity_t writer_ = 0;
@@ -179,6 +181,7 @@ class Flight {
     if (process_ == 0) {
       setenv("ROS_DOMAIN_ID", domain.c_str(), 1);
       unsetenv("ROS_DISTRO");
+      unsetenv("CYCLONEDDS_URI");  // is the peer's
       const int out = open(log.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
       dup2(out, 1);
       dup2(out, 2);
@@ -210,12 +213,17 @@ class Flight {
       int status = 0;
       waitpid(process_, &status, 0);
       process_ = 0;
+      exit_code_ = WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
     }
     return read_file(log_);
   }
 
+  /// Once it was stopped; of a signal its negative number.
+  [[nodiscard]] int exit_code() const { return exit_code_; }
+
  private:
   pid_t process_ = 0;
+  int exit_code_ = -1;
   std::string log_;
 };
 

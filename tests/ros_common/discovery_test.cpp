@@ -37,5 +37,35 @@ TEST(Discovery, FollowsRosEnvironment) {
   EXPECT_THROW(with({{"ROS_AUTOMATIC_DISCOVERY_RANGE", "NEAR"}}), std::runtime_error);
 }
 
+void expect_part(const std::string& text, const std::string& part, bool there = true) {
+  EXPECT_EQ(text.find(part) != std::string::npos, there) << part << " in " << text;
+}
+
+TEST(Discovery, BecomesCyclonesConfiguration) {
+  const std::string subnet = cyclone_configuration(with({}), "");
+  expect_part(subnet, "<AllowMulticast>", false);  // as it comes
+  expect_part(subnet, "<Peers>", false);
+  const std::string localhost =
+      cyclone_configuration(with({{"ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST"}}), "");
+  expect_part(localhost, "<NetworkInterface address=\"127.0.0.1\"/>");
+  expect_part(localhost, "<AllowMulticast>false</AllowMulticast>");
+  expect_part(localhost, "<Peer address=\"127.0.0.1\"/>");
+  const std::string off =
+      cyclone_configuration(with({{"ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF"}}), "");
+  expect_part(off, "<Tag>off_");
+  expect_part(off, "<Peers>", false);
+  const std::string peers =
+      cyclone_configuration(with({{"ROS_STATIC_PEERS", "192.168.1.7;a<b&\"c"}}), "");
+  expect_part(peers, "<Peer address=\"192.168.1.7\"/>");
+  expect_part(peers, "<Peer address=\"a&lt;b&amp;&quot;c\"/>");
+  // the user's own comes last, and its interfaces instead of ours
+  const std::string own =
+      "<General><Interfaces><NetworkInterface name='eth0'/></Interfaces></General>";
+  const std::string both =
+      cyclone_configuration(with({{"ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST"}}), own);
+  EXPECT_TRUE(both.ends_with("," + own));
+  expect_part(both, "<NetworkInterface address=", false);
+}
+
 }  // namespace
 }  // namespace pointflight
