@@ -5,6 +5,7 @@
 #include <CLI/Formatter.hpp>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
 #include <new>
 
@@ -45,9 +46,8 @@ int run(int argc, char** argv) {
   return exit_code;
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
+/// Runs the program; every error becomes a line and an exit code.
+int guarded_run(int argc, char** argv) {
   // a full file-size limit or a closed pipe is an error of a write, not the end of the process
   std::signal(SIGXFSZ, SIG_IGN);
   std::signal(SIGPIPE, SIG_IGN);
@@ -72,4 +72,12 @@ int main(int argc, char** argv) {
     say(fmt::format("pointflight: {}\n", error.what()));
   }
   return pointflight::apps::kWrongInput;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const int code = guarded_run(argc, argv);
+  if (pointflight::apps::must_leave_static_objects()) std::_Exit(code);
+  return code;
 }

@@ -14,6 +14,7 @@ namespace pointflight::apps {
 namespace {
 
 std::atomic<bool> progress_line_open{false};
+std::atomic<bool> leaves_static_objects{false};
 volatile std::sig_atomic_t interrupt_seen = 0;
 
 extern "C" void on_interrupt(int /*signal*/) {
@@ -85,6 +86,14 @@ void catch_interrupts() {
 
 bool interrupted() {
   return interrupt_seen != 0;
+}
+
+void leave_static_objects() {
+  leaves_static_objects = true;
+}
+
+bool must_leave_static_objects() {
+  return leaves_static_objects;
 }
 
 }  // namespace pointflight::apps

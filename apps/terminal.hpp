@@ -34,4 +34,9 @@ std::string short_count(double count);
 void catch_interrupts();
 bool interrupted();
 
+/// From now on the process has to end without the destructors of static objects: a library's thread
+/// that could not be ended may still use them.
+void leave_static_objects();
+[[nodiscard]] bool must_leave_static_objects();
+
 }  // namespace pointflight::apps

@@ -16,6 +16,8 @@ import time
 import unittest
 
 PROGRAM = sys.argv.pop(1)
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+from position_command import VARIANTS  # noqa: E402
 
 try:
     import rosbag  # noqa: F401
@@ -24,82 +26,6 @@ try:
 except ImportError as error:
     print(f"skipped: {error}")
     sys.exit(77)
-
-POSITION_TAIL = """
-================================================================================
-MSG: std_msgs/Header
-uint32 seq
-time stamp
-string frame_id
-================================================================================
-MSG: geometry_msgs/Point
-float64 x
-float64 y
-float64 z
-================================================================================
-MSG: geometry_msgs/Vector3
-float64 x
-float64 y
-float64 z
-"""
-POSITION_START = """Header header
-geometry_msgs/Point position
-geometry_msgs/Vector3 velocity
-geometry_msgs/Vector3 acceleration
-"""
-SHORT = (
-    """uint8 TRAJECTORY_STATUS_EMPTY = 0
-uint8 TRAJECTORY_STATUS_READY = 1
-uint8 TRAJECTORY_STATUS_COMPLETED = 3
-uint8 TRAJECTROY_STATUS_ABORT = 4
-uint8 TRAJECTORY_STATUS_ILLEGAL_START = 5
-uint8 TRAJECTORY_STATUS_ILLEGAL_FINAL = 6
-uint8 TRAJECTORY_STATUS_IMPOSSIBLE = 7
-"""
-    + POSITION_START
-    + """float64 yaw
-float64 yaw_dot
-float64[3] kx
-float64[3] kv
-uint32 trajectory_id
-uint8 trajectory_flag"""
-    + POSITION_TAIL
-)
-LONG = (
-    """uint8 TRAJECTORY_STATUS_EMPTY = 0
-uint8 TRAJECTORY_STATUS_EMER = 2
-uint8 TRAJECTORY_STATUS_READY = 1
-uint8 TRAJECTORY_STATUS_COMPLETED = 3
-uint8 TRAJECTROY_STATUS_ABORT = 4
-uint8 TRAJECTORY_STATUS_ILLEGAL_START = 5
-uint8 TRAJECTORY_STATUS_ILLEGAL_FINAL = 6
-uint8 TRAJECTORY_STATUS_IMPOSSIBLE = 7
-uint32 ACTION_STOP = 8
-"""
-    + POSITION_START
-    + """geometry_msgs/Vector3 jerk
-geometry_msgs/Vector3 angular_velocity
-geometry_msgs/Vector3 attitude
-geometry_msgs/Vector3 thrust
-float64 yaw
-float64 yaw_dot
-float64 vel_norm
-float64 acc_norm
-float64[3] kx
-float64[3] kv
-uint32 trajectory_id
-uint8 trajectory_flag"""
-    + POSITION_TAIL
-)
-OLDEST = POSITION_START + "float64 yaw\nfloat64 yaw_dot\nfloat64[3] kx\nfloat64[3] kv" + POSITION_TAIL
-OWN = POSITION_START + "float64 yaw\nfloat64[] gains\nstring who" + POSITION_TAIL
-VARIANTS = {
-    "long": (LONG, "d008e86de36e11deb1e4033ac2c394a9"),
-    "short": (SHORT, "4712f0609ca29a79af79a35ca3e3967a"),
-    "oldest": (OLDEST, "835935bcd6f18632d9e26a3093237902"),
-    "own": (OWN, None),
-}
-
 
 def free_port():
     with socket.socket() as s:
@@ -147,7 +73,7 @@ class Ros1Test(unittest.TestCase):
         cls.master.wait()
         cls.folder.cleanup()
 
-    def fly(self, *flags, scenario=None):
+    def fly(self, *flags, scenario=None, environment=None):
         """Starts a flight; it is ended after the test. stderr is kept."""
         self.flights = getattr(self, "flights", 0) + 1
         self.log = open(f"{self.folder.name}/fly.{self.flights}.log", "w+")
@@ -155,6 +81,7 @@ class Ros1Test(unittest.TestCase):
             [PROGRAM, "fly", scenario or self.map, "--ros1", *flags],
             stdout=self.log,
             stderr=self.log,
+            env={**os.environ, **(environment or {})},
         )
         self.addCleanup(self.stop, process, self.log)
         return process
@@ -466,7 +393,7 @@ class Ros1Test(unittest.TestCase):
         self.assertIsNone(process.poll())
         text = self.stop_and_read(process)
         self.assertIn("that is no geometry_msgs/PoseStamped", text)
-        self.assertIn("20 malformed messages were left out", text)
+        self.assertIn("20 messages were left out; the last: /drone0/goal", text)
         self.assertIn("not finite", text)
         self.assertIn("20 rejected", text)
 
@@ -566,6 +493,154 @@ class Ros1Test(unittest.TestCase):
         self.assertIn("runs already", self.stop_and_read(second))
 
     # -- the rest ----------------------------------------------------------------------------
+
+    def test_services_pause_step_and_reset(self):
+        from rosgraph_msgs.msg import Clock
+        from std_srvs.srv import SetBool, Trigger
+
+        self.fly()
+        latest = []
+        clock = rospy.Subscriber("/clock", Clock, latest.append, queue_size=1)
+        self.addCleanup(clock.unregister)
+        now = lambda: latest[-1].clock.to_sec() if latest else 0.0
+        services = {}
+        for name, kind in (("pause", SetBool), ("step", Trigger), ("reset", Trigger)):
+            rospy.wait_for_service("/pointflight/" + name, timeout=30)
+            services[name] = rospy.ServiceProxy("/pointflight/" + name, kind)
+        self.assertTrue(services["pause"](True).success)
+        wait_for(lambda: "paused" in self.said(), what="a pause")
+        time.sleep(0.2)
+        still = now()
+        self.assertTrue(services["step"]().success)
+        wait_for(lambda: now() > still, what="a step")
+        time.sleep(0.3)
+        self.assertLess(now(), still + 0.15)
+        self.assertTrue(services["pause"](False).success)
+        wait_for(lambda: now() > still + 0.3, what="the run to go on")
+        self.assertTrue(services["reset"]().success)
+        wait_for(lambda: "reset: at the start again" in self.said(), what="a reset")
+
+    # -- the end -------------------------------------------------------------------------------
+
+    def test_ctrl_c_while_commands_arrive(self):
+        """Many times (POINTFLIGHT_RUNS), each at another moment."""
+        import random
+        import threading
+        from geometry_msgs.msg import PoseStamped, TwistStamped
+        from nav_msgs.msg import Odometry
+
+        velocity = rospy.Publisher("/drone0/cmd/velocity", TwistStamped, queue_size=10)
+        goal = rospy.Publisher("/drone0/goal", PoseStamped, queue_size=10)
+        over = threading.Event()
+
+        def send():
+            command = TwistStamped()
+            command.header.frame_id = "world"
+            aim = PoseStamped()
+            aim.pose.orientation.w = 1.0
+            while not over.wait(0.001):
+                velocity.publish(command)
+                goal.publish(aim)
+
+        sender = threading.Thread(target=send)
+        sender.start()
+        seen = []
+        odometry = rospy.Subscriber("/drone0/odom", Odometry, seen.append, queue_size=10)
+        rng = random.Random(3)
+        try:
+            for _ in range(int(os.environ.get("POINTFLIGHT_RUNS", "5"))):
+                process = self.fly()
+                seen.clear()
+                wait_for(lambda: seen, 60, "a flight")
+                time.sleep(rng.uniform(0.0, 0.4))
+                process.send_signal(signal.SIGINT)
+                self.assertEqual(process.wait(timeout=60), 130, self.said())
+                self.assertIn("interrupted, after", self.said())
+        finally:
+            over.set()
+            sender.join()
+            odometry.unregister()
+            velocity.unregister()
+            goal.unregister()
+
+    # -- masters ------------------------------------------------------------------------------
+
+    def run_beside(self, uri, *flags):
+        """A flight that looks for another master; it is ended after the test."""
+        return self.fly(*flags, environment={"ROS_MASTER_URI": uri})
+
+    def said(self):
+        return open(self.log.name).read()
+
+    def test_a_master_uri_that_is_none_is_refused(self):
+        for uri in ("", "localhost", "http://localhost", "http://:11311", "http://localhost:0",
+                    "http://localhost:99999", "http://local host:11311", "junk:1", "http://a:b"):
+            process = self.run_beside(uri)
+            self.assertEqual(process.wait(timeout=30), 2, uri)
+            lines = [l for l in self.said().splitlines() if l.startswith("pointflight: ")]
+            self.assertEqual(len(lines), 1, self.said())
+            self.assertIn(f"ROS_MASTER_URI: '{uri}'", lines[0])
+
+    def test_ctrl_c_ends_beside_a_master_that_has_stopped(self):
+        """Before it was found, and while the flight goes on."""
+        from rosgraph_msgs.msg import Clock
+
+        for found in (True, False):
+            port = free_port()
+            uri = f"http://127.0.0.1:{port}"
+            master = subprocess.Popen(["/usr/bin/rosmaster", "--core", "-p", str(port)],
+                                      stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+            self.addCleanup(master.kill)
+            online = lambda: rosgraph.is_master_online(uri)
+            wait_for(online, what="a master")
+            if not found:
+                master.send_signal(signal.SIGSTOP)
+            process = self.run_beside(uri)
+            if found:
+                topics = rosgraph.Master("/peer", master_uri=uri)
+                wait_for(lambda: "/clock" in dict(topics.getTopicTypes()), what="the node")
+                time.sleep(0.5)
+                master.send_signal(signal.SIGSTOP)
+            else:
+                wait_for(lambda: "looking for" in self.said(), what="a start")
+            time.sleep(0.5)
+            began = time.monotonic()
+            process.send_signal(signal.SIGINT)
+            self.assertEqual(process.wait(timeout=60), 130, self.said())
+            print(f"ended {time.monotonic() - began:.2f} s after Ctrl-C", file=sys.stderr)
+            if found:
+                self.assertIn("interrupted, after", self.said())
+
+    def test_a_master_that_answers_nonsense(self):
+        """Of the right form at first, so that it is taken for one."""
+        import threading
+        import xmlrpc.server
+
+        class Server(xmlrpc.server.SimpleXMLRPCServer):
+            def _dispatch(self, method, params):
+                if method == "getPid":
+                    return [1, "", 1234]
+                if method == "lookupNode":
+                    return self.lookup
+                return self.answer
+
+        for lookup, answer in (([1, "", 5], [1, "", 0]),            # a number for a URI
+                               ([0, "", ""], [1, "", "nobody"]),    # a text for a list
+                               ([0, "", ""], [1, "", [1, 2, {}]]),  # a list of anything
+                               ([0, "", ""], "what?"),              # no answer at all
+                               ([1, "", {"a": 1}], [1])):
+            server = Server(("127.0.0.1", 0), logRequests=False, allow_none=True)
+            server.lookup, server.answer = lookup, answer
+            threading.Thread(target=server.serve_forever, daemon=True).start()
+            process = self.run_beside(f"http://127.0.0.1:{server.server_address[1]}")
+            try:
+                code = process.wait(timeout=8)  # refused ...
+            except subprocess.TimeoutExpired:
+                process.send_signal(signal.SIGINT)
+                code = process.wait(timeout=60)  # ... or taken as it is
+            self.assertIn(code, (2, 130), self.said())
+            server.shutdown()
+            server.server_close()
 
     def test_without_a_master(self):
         environment = dict(os.environ, ROS_MASTER_URI=f"http://127.0.0.1:{free_port()}")
