@@ -15,6 +15,7 @@
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/core/mapped_file.hpp"
 #include "recording/mcap_writer.hpp"
+#include "ros_common/ros_names.hpp"
 
 namespace pointflight::apps {
 namespace {
@@ -46,8 +47,10 @@ Duration epoch_of(const RosFlags& flags, const Scenario& scenario, const RosProf
   if (!scenario.ros.epoch.empty()) {
     return epoch_from(scenario.ros.epoch, scenario.place("ros.epoch"));
   }
-  // recordings by themselves are the same each time
-  return flags.is_live() && profile.epoch == "now" ? epoch_from("now", "") : kFixedEpoch;
+  // living nodes must not see time jump back after a restart; recordings by themselves and runs in
+  // lockstep are the same each time
+  const bool live = flags.is_live() && flags.lockstep <= 0.0;
+  return live && profile.epoch == "now" ? epoch_from("now", "") : kFixedEpoch;
 }
 
 /// The file that a scenario came from, or the scenario as a file.
@@ -77,13 +80,17 @@ void add_ros_flags(CLI::App& app, RosFlags& flags) {
   app.add_flag("--ros1", flags.ros1, "Publish to ROS 1 and take commands from it, in real time");
   app.add_flag("--ros2", flags.ros2, "The same with ROS 2, for which none has to be installed");
   app.add_flag("--ros2-localhost", flags.localhost, "Let only this machine find the ROS 2 node");
-  app.add_flag("--shm", flags.shared_memory, "Offer ROS 2 messages in shared memory as well");
   app.add_option("--profile",
                  flags.profile,
                  "Names of messages: default, marsim, ego, livox, ... or a path (docs/ros.md)");
   app.add_option("--epoch", flags.epoch, "Stamps start 'now', or at seconds since 1970");
   app.add_option("--node", flags.node, "Name of the ROS node")->capture_default_str();
   app.add_flag("--no-wait", flags.no_wait, "Fly even while there is no ROS 1 master yet");
+  auto* stay = app.add_flag("--stay",
+                            flags.stay,
+                            "Hover when the mission is flown, until interrupted (the default with "
+                            "ROS in real time, but with --lockstep or a duration)");
+  app.add_flag("--no-stay", flags.no_stay, "End when the mission is flown")->excludes(stay);
   app.add_option("--lockstep",
                  flags.lockstep,
                  "Wait after each scan for a command, so many seconds at most")
@@ -99,7 +106,7 @@ void add_ros_flags(CLI::App& app, RosFlags& flags) {
       ->capture_default_str();
 }
 
-void prepare_for_ros(const RosFlags& flags, Scenario& scenario) {
+void prepare_for_ros(const RosFlags& flags, double rate, Scenario& scenario) {
   if (!flags.any()) return;
   const RosProfile profile = profile_for(scenario, flags.profile);
   scenario.output.odometry_rate =
@@ -108,12 +115,20 @@ void prepare_for_ros(const RosFlags& flags, Scenario& scenario) {
       scenario.vehicles.begin(), scenario.vehicles.end(), [](const VehicleSetup& vehicle) {
         return !vehicle.mission.waypoints.empty() || !vehicle.commands.empty();
       });
-  if (flags.is_live() && !planned && scenario.duration <= 0.0) scenario.duration = kEndless;
+  if (!flags.is_live()) return;
+  const bool is_open = scenario.duration <= 0.0;
+  const bool stays = rate > 0.0 && flags.lockstep <= 0.0 && !flags.no_stay;
+  if (flags.stay || (is_open && (stays || !planned))) scenario.duration = kEndless;
 }
 
 RosSession::RosSession(const RosFlags& flags, Simulation& simulation)
     : flags_(flags), simulation_(simulation) {
   if (!flags.any()) return;
+  const bool digit = flags.node.find_first_of("0123456789") == 0;
+  if (!is_ros_word(flags.node) || digit) {
+    throw InputError(
+        fmt::format("--node: '{}'; letters, digits and _ only, and no digit at first", flags.node));
+  }
   const Scenario& scenario = simulation.scenario();
   const RosProfile profile = profile_for(scenario, flags.profile);
   const Duration epoch = epoch_of(flags, scenario, profile);
@@ -143,7 +158,6 @@ RosSession::RosSession(const RosFlags& flags, Simulation& simulation)
   options.node = flags.node;
   options.log = [](const std::string& text) { log(text); };
   options.localhost_only = flags.localhost;
-  options.shared_memory = flags.shared_memory;
   if (flags.ros2) options.large_rate = large_rate(simulation, profile);
   if (flags.ros1) transports_.push_back(ros1_module().transport(options));
   if (flags.ros2) transports_.push_back(ros2_module().transport(options));
@@ -152,13 +166,23 @@ RosSession::RosSession(const RosFlags& flags, Simulation& simulation)
     bridge_->add(*transport);
     inbox_->connect(*transport);
   }
+  if (flags.lockstep > 0.0) bridge_->keep_scans();
   scans_ = std::make_unique<ScanCount>();
   splitter_ = std::make_unique<SampleSplitter>();
   splitter_->add(*bridge_);
   splitter_->add(*scans_);
 }
 
-RosSession::~RosSession() = default;
+RosSession::~RosSession() {
+  close_transports();
+}
+
+void RosSession::close_transports() {
+  for (const auto& transport : transports_) {
+    transport->close();
+    if (!transport->has_ended()) leave_static_objects();
+  }
+}
 
 void RosSession::measure_lateness(Lateness lateness) {
   if (scans_ && flags_.is_live()) scans_->lateness = std::move(lateness);
@@ -180,27 +204,39 @@ bool RosSession::start() {
   while (!flags_.no_wait && std::any_of(transports_.begin(), transports_.end(), [](const auto& t) {
     return !t->is_connected();
   })) {
+    for (const auto& transport : transports_) {
+      if (const std::string why = transport->failure(); !why.empty()) throw InputError(why);
+    }
     if (is_over()) return false;
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
   return flags_.lockstep <= 0.0 || wait_for_planner();
 }
 
-/// So that the first scan has its answer already.
+/// So that the first scan reaches somebody who answers it. A reader that we know of may not know of
+/// us yet, so a moment more is waited.
 bool RosSession::wait_for_planner() {
+  constexpr std::chrono::milliseconds kLook(20);
+  constexpr std::chrono::milliseconds kSettled(500);
   const auto is_there = [&] {
     return bridge_->has_scan_readers() &&
            std::any_of(transports_.begin(), transports_.end(), [](const auto& transport) {
              return transport->has_senders();
            });
   };
-  if (transports_.empty() || is_there()) return true;
-  log("lockstep: waiting for somebody who reads scans and sends commands");
-  while (!is_there()) {
+  if (transports_.empty()) return true;
+  bool said = false;
+  std::chrono::milliseconds settled(0);
+  while (settled < kSettled) {
     if (is_over()) return false;
-    bridge_->repeat_clock();
-    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    settled = is_there() ? settled + kLook : std::chrono::milliseconds(0);
+    if (settled.count() == 0 && !std::exchange(said, true)) {
+      log("lockstep: waiting for somebody who reads scans and sends commands");
+    }
+    bridge_->repeat();
+    std::this_thread::sleep_for(kLook);
   }
+  if (said) log("lockstep: a planner is there");
   return true;
 }
 
@@ -220,7 +256,7 @@ RosSession::Next RosSession::after_step(double took) {
   take_orders();
   if (std::exchange(reset_, false)) return Next::kReset;
   if (!paused_ || step_once_) return Next::kStep;
-  bridge_->repeat_clock();
+  bridge_->repeat();
   std::this_thread::sleep_for(std::chrono::milliseconds(20));
   return Next::kWait;
 }
@@ -257,16 +293,19 @@ void RosSession::wait_for_answer() {
       return;
     }
     std::this_thread::sleep_for(std::chrono::microseconds(200));
+    bridge_->resend_scans();
     take_orders();
   }
 }
 
 /// The first of each kind at once, their number in the end.
 void RosSession::say_troubles() {
-  const std::uint64_t malformed = inbox_->malformed();
-  if (malformed > 0 && said_malformed_ == 0) {
-    said_malformed_ = malformed;
-    log(fmt::format("warning: {}; left out (said once, counted)", inbox_->last_reason()));
+  for (const std::string& reason : inbox_->take_new_reasons()) {
+    log(fmt::format("warning: {}; left out (said once, counted)", reason));
+  }
+  if (const Inbox::Refused refused = inbox_->refused(); refused.count != told_refused_) {
+    told_refused_ = refused.count;
+    bridge_->note_refused(refused.count, refused.last);
   }
   if (said_rejected_ > 0) return;
   for (std::size_t v = 0; v < simulation_.vehicle_count(); ++v) {
@@ -292,8 +331,9 @@ void RosSession::close() {
     log(fmt::format(
         "recorded {}, {:.1f} MB", paths_[i], 1e-6 * static_cast<double>(fs::file_size(paths_[i]))));
   }
+  close_transports();
   for (const auto& transport : transports_) {
-    transport->close();
+    if (const std::string why = transport->failure(); !why.empty()) log(why);
     if (transport->dropped() > 0) {
       log(fmt::format("{} messages were dropped for slow subscribers", transport->dropped()));
     }
@@ -305,8 +345,8 @@ void RosSession::close() {
                     1e3 * delays[delays.size() / 2],
                     1e3 * delays[delays.size() * 99 / 100]));
   }
-  if (inbox_ && inbox_->malformed() > 0) {
-    log(fmt::format("{} malformed messages were left out", inbox_->malformed()));
+  if (const auto count = inbox_ ? inbox_->refused().count : 0; count > 0) {
+    log(fmt::format("{} messages were left out; the last: {}", count, inbox_->refused().last));
   }
   if (late_answers_ > 0) {
     log(fmt::format("{} scans had no command within {} s", late_answers_, flags_.lockstep));

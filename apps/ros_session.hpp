@@ -16,12 +16,13 @@ namespace pointflight::apps {
 struct RosFlags {
   bool ros1 = false;
   bool ros2 = false;
-  bool localhost = false;      ///< ROS 2: no other machine.
-  bool shared_memory = false;  ///< ROS 2.
+  bool localhost = false;  ///< ROS 2: no other machine.
   std::string node = "pointflight";
   bool no_wait = false;              ///< Fly on without a master.
   std::string profile;               ///< Empty: the scenario's.
   std::string epoch;                 ///< Empty: the scenario's or profile's.
+  bool stay = false;                 ///< Hover when the mission is flown.
+  bool no_stay = false;              ///< End with the mission.
   double lockstep = 0.0;             ///< Wait so long for an answer to each scan, s; 0: not at all.
   std::vector<std::string> records;  ///< Files.
   std::string compression = "zstd";
@@ -33,9 +34,10 @@ struct RosFlags {
 
 void add_ros_flags(CLI::App& app, RosFlags& flags);
 
-/// What a profile needs of a scenario: samples as often as it sends them; a flight that nobody has
-/// planned goes on until it is interrupted. Throws InputError.
-void prepare_for_ros(const RosFlags& flags, Scenario& scenario);
+/// What a profile needs of a scenario: samples as often as it sends them. A live flight goes on
+/// until it is interrupted where nobody has planned it, and after its mission where it is flown in
+/// real time (`rate` > 0) and not told to end (--no-stay, a duration, lockstep). Throws InputError.
+void prepare_for_ros(const RosFlags& flags, double rate, Scenario& scenario);
 
 /// ROS and the recordings of a flight, the bridge that feeds them, and what they ask for.
 class RosSession {
@@ -51,6 +53,7 @@ class RosSession {
   void measure_lateness(Lateness lateness);
 
   /// Connects; waits for a master where there is none yet. False where the flight is over already.
+  /// Throws InputError where the master is none.
   bool start();
 
   /// What has to be done before the next step.
@@ -70,6 +73,7 @@ class RosSession {
 
  private:
   class ScanCount;
+  void close_transports();
   bool wait_for_planner();
   void take_orders();
   void wait_for_answer();
@@ -79,17 +83,17 @@ class RosSession {
   Simulation& simulation_;
   std::vector<std::string> paths_;
   std::vector<std::unique_ptr<Outlet>> recordings_;
+  std::unique_ptr<Inbox> inbox_;  ///< Outlives the transports, whose threads fill it.
   std::vector<std::unique_ptr<Transport>> transports_;
   std::unique_ptr<RosBridge> bridge_;
   std::unique_ptr<ScanCount> scans_;
   std::unique_ptr<SampleSplitter> splitter_;
-  std::unique_ptr<Inbox> inbox_;
   bool paused_ = false;
   bool step_once_ = false;
   bool reset_ = false;
   std::uint64_t answers_ = 0;
   std::uint64_t late_answers_ = 0;
-  std::uint64_t said_malformed_ = 0;
+  std::uint64_t told_refused_ = 0;
   std::uint64_t said_rejected_ = 0;
 };
 

@@ -40,7 +40,11 @@ struct RosBridge::Stream : OutputStream {
   std::int64_t next = 0;         ///< Of the schedule.
   std::vector<int> numbers;      ///< At each outlet.
   std::uint32_t sent = 0;
-  msg::Path path;  ///< Of paths and trajectories.
+  int served = 0;              ///< Readers that have got what there is.
+  int newcomer_calls = 0;      ///< Since there are more of them.
+  Bytes last_ros1, last_cdr;   ///< Of a scan, where it may have to be sent again.
+  std::int64_t last_time = 0;  ///< When it left.
+  msg::Path path;              ///< Of paths and trajectories.
   void add_to_path(const msg::Header& header, const Pose& pose);
   double path_spacing = kPathSpacing;
 };
@@ -49,6 +53,7 @@ RosBridge::RosBridge(const Simulation& simulation, const RosProfile& profile, Du
     : simulation_(simulation),
       profile_(profile),
       epoch_(epoch),
+      last_states_(simulation.vehicle_count()),
       next_latched_(SimTime{} + kLatchedPeriod) {
   for (OutputStream& stream : output_streams(simulation, profile)) {
     streams_.push_back(std::make_unique<Stream>(std::move(stream)));
@@ -93,6 +98,27 @@ bool RosBridge::is_wanted(const Stream& stream) const {
   return false;
 }
 
+int RosBridge::reader_count(const Stream& stream) const {
+  int count = 0;
+  for (std::size_t i = 0; i < outlets_.size(); ++i) {
+    count += outlets_[i]->reader_count(stream.numbers[i]);
+  }
+  return count;
+}
+
+bool RosBridge::has_newcomer(Stream& stream, int calls) const {
+  const int count = reader_count(stream);
+  if (count <= stream.served) {
+    stream.served = count;
+    stream.newcomer_calls = 0;
+    return false;
+  }
+  if (++stream.newcomer_calls < calls) return false;
+  stream.served = count;
+  stream.newcomer_calls = 0;
+  return true;
+}
+
 bool RosBridge::is_due(Stream& stream, SimTime time) const {
   if (stream.settings.rate <= 0.0) return is_wanted(stream);
   if (!stream.first) stream.first = time;
@@ -110,8 +136,10 @@ void RosBridge::send(Stream& stream, M message, SimTime leaves) {
   const std::int64_t time = (latest_.time_since_epoch() + epoch_).count();
   Bytes ros1;
   Bytes cdr;
+  // transports keep the latter for whoever comes
+  const bool always = stream.type->kind == OutputKind::kTfStatic;
   for (std::size_t i = 0; i < outlets_.size(); ++i) {
-    if (!outlets_[i]->has_readers(stream.numbers[i])) continue;
+    if (!always && !outlets_[i]->has_readers(stream.numbers[i])) continue;
     Bytes& bytes = outlets_[i]->wire() == Wire::kRos1 ? ros1 : cdr;
     if (!bytes) {
       bytes = std::make_shared<const std::vector<std::byte>>(outlets_[i]->wire() == Wire::kRos1
@@ -120,15 +148,22 @@ void RosBridge::send(Stream& stream, M message, SimTime leaves) {
     }
     outlets_[i]->send(stream.numbers[i], bytes, time);
   }
+  if (keeps_scans_ && stream.type->per == OutputType::Per::kLidar) {
+    stream.last_ros1 = ros1;
+    stream.last_cdr = cdr;
+    stream.last_time = time;
+    stream.served = reader_count(stream);
+  }
 }
 
 void RosBridge::start() {
   for (Outlet* outlet : outlets_) outlet->start();
   on_time(SimTime{});  // the clock before anything with a stamp
   for (const auto& stream : streams_) {
-    if (!is_wanted(*stream)) continue;
-    if (stream->type->kind == OutputKind::kMap)
+    if (stream->type->kind == OutputKind::kMap && is_wanted(*stream)) {
       send(*stream, map_message(*stream, epoch_), SimTime{});
+    }
+    // small, and asked for before anything else: there before the first who asks
     if (stream->type->kind == OutputKind::kTfStatic) send_static_transforms(*stream);
   }
   for (Outlet* outlet : outlets_) outlet->flush();
@@ -137,11 +172,10 @@ void RosBridge::start() {
 /// What is sent once, when the first reader is there; others get it from the transport.
 void RosBridge::send_latched() {
   for (const auto& stream : streams_) {
-    if (!stream->type->latched || stream->sent > 0) continue;
-    if (stream->type->kind == OutputKind::kTfStatic && is_wanted(*stream)) {
+    if (stream->type->kind == OutputKind::kTfStatic && has_newcomer(*stream, 1)) {
       send_static_transforms(*stream);
     }
-    if (stream->type->kind != OutputKind::kMap) continue;
+    if (stream->type->kind != OutputKind::kMap || stream->sent > 0) continue;
     if (map_.valid()) {
       if (map_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) continue;
       send(*stream, map_.get(), latest_);
@@ -157,6 +191,7 @@ void RosBridge::shift_epoch(Duration by) {
   epoch_ += by;
   latest_ = SimTime{};
   next_latched_ = SimTime{} + kLatchedPeriod;
+  last_states_.assign(last_states_.size(), std::nullopt);
   for (const auto& stream : streams_) {
     stream->next = 0;
     stream->first.reset();
@@ -179,6 +214,7 @@ msg::PointCloud2 RosBridge::map_message(const Stream& stream, Duration epoch) co
 }
 
 void RosBridge::send_static_transforms(Stream& stream) {
+  stream.served = reader_count(stream);
   msg::TFMessage message;
   for (std::size_t v = 0; v < simulation_.vehicle_count(); ++v) {
     const VehicleAgent& agent = simulation_.vehicle(v);
@@ -220,7 +256,9 @@ void RosBridge::on_time(SimTime time) {
       send(*stream, msg::Clock{stamp_of(time, epoch_)}, time);
     }
     if (kind == OutputKind::kDiagnostics && is_due(*stream, time)) {
-      send(*stream, diagnostics_of(simulation_, time, header_of(time, epoch_, "")), time);
+      send(*stream,
+           diagnostics_of(simulation_, time, header_of(time, epoch_, ""), refused_, last_refused_),
+           time);
     }
   }
   if (time >= next_latched_) {
@@ -230,17 +268,64 @@ void RosBridge::on_time(SimTime time) {
   for (Outlet* outlet : outlets_) outlet->flush();
 }
 
-void RosBridge::repeat_clock() {
+void RosBridge::repeat() {
   // where it stands, which is seldom where the clock's rate put its last message
   const SimTime now = std::max(latest_, simulation_.time());
   for (const auto& stream : streams_) {
-    if (stream->type->kind != OutputKind::kClock || !is_wanted(*stream)) continue;
-    send(*stream, msg::Clock{stamp_of(now, epoch_)}, now);
+    const OutputKind kind = stream->type->kind;
+    if (kind == OutputKind::kClock && is_wanted(*stream)) {
+      send(*stream, msg::Clock{stamp_of(now, epoch_)}, now);
+    }
+    constexpr int kCalls = 10;
+    if (kind == OutputKind::kTf && has_newcomer(*stream, kCalls)) {
+      send_transform(*stream, last_state_of(stream->vehicle));
+    }
   }
+  send_latched();
   for (Outlet* outlet : outlets_) outlet->flush();
 }
 
+void RosBridge::resend_scans() {
+  constexpr int kCalls = 2000;
+  for (const auto& stream : streams_) {
+    const bool kept = stream->last_ros1 || stream->last_cdr;
+    if (!kept || !has_newcomer(*stream, kCalls)) continue;
+    for (std::size_t i = 0; i < outlets_.size(); ++i) {
+      const Bytes& bytes =
+          outlets_[i]->wire() == Wire::kRos1 ? stream->last_ros1 : stream->last_cdr;
+      if (bytes && outlets_[i]->is_live()) {
+        outlets_[i]->send(stream->numbers[i], bytes, stream->last_time);
+        outlets_[i]->flush();
+      }
+    }
+  }
+}
+
+/// Of odometry; before the first of it, where the vehicle starts.
+OdometrySample RosBridge::last_state_of(std::size_t vehicle) const {
+  if (last_states_[vehicle]) return *last_states_[vehicle];
+  OdometrySample sample;
+  sample.vehicle = static_cast<std::uint32_t>(vehicle);
+  sample.state = simulation_.status(vehicle).state.body;
+  return sample;
+}
+
+void RosBridge::note_refused(std::uint64_t count, const std::string& last) {
+  refused_ = count;
+  last_refused_ = last;
+}
+
+void RosBridge::send_transform(Stream& stream, const OdometrySample& sample) {
+  const auto header = header_of(sample.time, epoch_, stream.settings.frame);
+  stream.served = reader_count(stream);
+  send(stream,
+       msg::TFMessage{
+           {transform_of(sample.state.T_world_body(), header, stream.settings.child_frame)}},
+       sample.delivered);
+}
+
 void RosBridge::on_odometry(const OdometrySample& sample) {
+  last_states_[sample.vehicle] = sample;
   for (const auto& s : streams_) {
     Stream& stream = *s;
     const OutputKind kind = stream.type->kind;
@@ -280,11 +365,7 @@ void RosBridge::on_odometry(const OdometrySample& sample) {
         break;
       }
       case OutputKind::kTf:
-        if (!is_due(stream, sample.delivered)) break;
-        send(stream,
-             msg::TFMessage{
-                 {transform_of(sample.state.T_world_body(), header, stream.settings.child_frame)}},
-             sample.delivered);
+        if (is_due(stream, sample.delivered)) send_transform(stream, sample);
         break;
       case OutputKind::kRotorSpeeds: {
         if (!is_due(stream, sample.delivered)) break;
@@ -391,19 +472,21 @@ void RosBridge::send_scan(Stream& stream, const Scan& scan, const PoseAt& pose_a
   const LidarSettings& lidar =
       simulation_.vehicle(scan.vehicle).lidars()[scan.sensor].lidar->settings();
   const RosOutput& s = stream.settings;
+  const float plain = simulation_.map().has_intensity() ? 0.0f : kPlainIntensity;
   switch (stream.type->kind) {
     case OutputKind::kCloud:
       if (s.layout == "livox_custom") {
-        send(stream, custom_cloud_of(scan, s.frame, epoch_), scan.end);
+        send(stream, custom_cloud_of(scan, s.frame, epoch_, plain), scan.end);
       } else {
-        send(stream, cloud_of(scan, point_layout(s.layout), s.frame, epoch_), scan.end);
+        send(stream, cloud_of(scan, point_layout(s.layout), s.frame, epoch_, {}, plain), scan.end);
       }
       break;
-    case OutputKind::kCloudWorld:
-      send(stream,
-           cloud_of(scan, point_layout(s.layout), s.frame, epoch_, world_points(scan, pose_at)),
-           scan.end);
+    case OutputKind::kCloudWorld: {
+      const auto points = world_points(scan, pose_at);
+      send(
+          stream, cloud_of(scan, point_layout(s.layout), s.frame, epoch_, points, plain), scan.end);
       break;
+    }
     case OutputKind::kDepth: {
       msg::Image image = depth_image_of(scan, lidar);
       image.header = header_of(cloud_time(scan, false), epoch_, s.frame);

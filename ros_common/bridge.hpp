@@ -4,6 +4,8 @@
 #include <future>
 #include <map>
 #include <memory>
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "pointflight/sim/simulation.hpp"
@@ -24,14 +26,20 @@ class RosBridge : public SampleSink {
 
   /// Before `start`. The outlet must outlive the bridge.
   void add(Outlet& outlet);
+  /// Before the first scan: `resend_scans` will be called.
+  void keep_scans() { keeps_scans_ = true; }
   /// Makes all topics known and sends what is latched (map, static transforms) where somebody is
   /// there; later to the first who comes.
   void start();
 
   /// The run has reached a time: sends what follows the clock. Call after each step.
   void on_time(SimTime time);
-  /// The clock once more, for a run that is paused: the time where it stands.
-  void repeat_clock();
+  /// For a run that waits: the clock where it stands, transforms for those who have come
+  /// meanwhile, what is latched.
+  void repeat();
+  /// For a run that waits for an answer: the last scans once more for readers that have come since
+  /// they were sent.
+  void resend_scans();
   void on_odometry(const OdometrySample& sample) override;
   void on_imu(std::uint32_t vehicle, const ImuSample& sample) override;
   void on_scan(const Scan& scan, const PoseAt& pose_at) override;
@@ -41,6 +49,9 @@ class RosBridge : public SampleSink {
   /// After a reset the run starts again at zero, but stamps go on.
   void shift_epoch(Duration by);
   [[nodiscard]] Duration epoch() const { return epoch_; }
+
+  /// So many messages from outside were left out, and why the last one was: for diagnostics.
+  void note_refused(std::uint64_t count, const std::string& last);
 
   /// How long the last scan took by the wall clock, s: for `scan_time`; recordings leave it at 0.
   void note_scan_time(double seconds);
@@ -54,6 +65,9 @@ class RosBridge : public SampleSink {
   struct Stream;
 
   [[nodiscard]] bool is_wanted(const Stream& stream) const;
+  [[nodiscard]] int reader_count(const Stream& stream) const;
+  /// True once, `calls` calls after a reader has come: it may not know of us at first.
+  [[nodiscard]] bool has_newcomer(Stream& stream, int calls) const;
   [[nodiscard]] bool is_due(Stream& stream, SimTime time) const;
   template <class M>
   void send(Stream& stream, M message, SimTime leaves);
@@ -61,6 +75,8 @@ class RosBridge : public SampleSink {
   void send_latched();
   [[nodiscard]] msg::PointCloud2 map_message(const Stream& stream, Duration epoch) const;
   void send_static_transforms(Stream& stream);
+  void send_transform(Stream& stream, const OdometrySample& sample);
+  [[nodiscard]] OdometrySample last_state_of(std::size_t vehicle) const;
   void send_path(Stream& stream, const OdometrySample& sample);
   void send_markers(Stream& stream, const OdometrySample& sample);
   void send_obstacles();
@@ -74,6 +90,10 @@ class RosBridge : public SampleSink {
   std::vector<ObstacleSample> obstacles_;  ///< Of one instant, not sent yet.
   std::int32_t collisions_ = 0;
   std::vector<double> scan_times_;
+  std::vector<std::optional<OdometrySample>> last_states_;  ///< Of each vehicle.
+  bool keeps_scans_ = false;
+  std::uint64_t refused_ = 0;
+  std::string last_refused_;
   std::future<msg::PointCloud2> map_;  ///< In the making, for a reader that came late.
   SimTime next_latched_;               ///< When somebody is looked for who wants it.
   SimTime latest_;                     ///< That anything left at.

@@ -61,7 +61,9 @@ msg::Marker vehicle_marker(OutputKind kind,
 
 msg::DiagnosticArray diagnostics_of(const Simulation& simulation,
                                     SimTime time,
-                                    const msg::Header& header) {
+                                    const msg::Header& header,
+                                    std::uint64_t refused,
+                                    const std::string& last_refused) {
   msg::DiagnosticArray message;
   message.header = header;
   for (std::size_t v = 0; v < simulation.vehicle_count(); ++v) {
@@ -89,6 +91,8 @@ msg::DiagnosticArray diagnostics_of(const Simulation& simulation,
         key_value("collisions", fmt::format("{}", s.summary.collisions)),
         key_value("commands_rejected", fmt::format("{}", s.autopilot.rejected)),
         key_value("last_rejection", s.autopilot.last_rejection),
+        key_value("messages_refused", fmt::format("{}", refused)),
+        key_value("last_message_refused", last_refused),
         key_value("command_timeouts", fmt::format("{}", s.autopilot.timeouts)),
         key_value("scans", fmt::format("{}", s.summary.scans))};
     message.status.push_back(std::move(status));

@@ -19,9 +19,12 @@ msg::Marker vehicle_marker(OutputKind kind,
                            const std::string& ns,
                            std::span<const msg::PoseStamped> flown);
 
-/// What each vehicle does, what it met, what was refused.
+/// What each vehicle does, what it met, what was refused; `refused` messages were left out before a
+/// vehicle saw them.
 msg::DiagnosticArray diagnostics_of(const Simulation& simulation,
                                     SimTime time,
-                                    const msg::Header& header);
+                                    const msg::Header& header,
+                                    std::uint64_t refused,
+                                    const std::string& last_refused);
 
 }  // namespace pointflight

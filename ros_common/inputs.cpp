@@ -8,7 +8,9 @@
 #include "pointflight/geometry/rotation.hpp"
 #include "ros_common/conversion.hpp"
 #include "ros_common/description.hpp"
+#include "ros_common/outputs.hpp"
 #include "ros_common/ros1_definition.hpp"
+#include "ros_common/services.hpp"
 
 namespace pointflight {
 namespace {
@@ -26,6 +28,31 @@ std::optional<M> decoded(Wire wire, const Received& received) {
   return decode<Wire::kRos1, M>(bytes);
 }
 
+/// As it is compared: tf of old wrote a leading /.
+std::string bare(const std::string& frame) {
+  return frame.starts_with('/') ? frame.substr(1) : frame;
+}
+
+/// Of a message's frame; none is the world's.
+bool is_world(const std::string& frame, const OrderContext& context) {
+  const std::string name = bare(frame);
+  return name.empty() || name == context.world_frame ||
+         (!context.world_alias.empty() && name == context.world_alias);
+}
+
+bool is_body(const std::string& frame, const OrderContext& context) {
+  const std::string name = bare(frame);
+  return name == context.body_frame || name == "base_link";
+}
+
+std::string unknown_frame(const std::string& frame, const OrderContext& context) {
+  return fmt::format(
+      "frame '{}' is not known; it is '{}' here (ros.world_alias gives that "
+      "another name)",
+      frame,
+      context.world_frame);
+}
+
 template <class M>
 PositionCommand position_from(const M& m) {
   PositionCommand command;
@@ -41,18 +68,27 @@ PositionCommand position_from(const M& m) {
 /// A PositionCommand of any definition: by md5, else by the names of its fields.
 std::optional<PositionCommand> position_of(const InputStream& stream,
                                            Wire wire,
-                                           const Received& received) {
+                                           const Received& received,
+                                           const OrderContext& context,
+                                           std::string& why) {
+  const auto taken = [&](const auto& m) -> std::optional<PositionCommand> {
+    if (!is_world(m.header.frame_id, context)) {
+      why = unknown_frame(m.header.frame_id, context);
+      return std::nullopt;
+    }
+    return position_from(m);
+  };
   if (wire == Wire::kCdr) {
     if (stream.topic.type.ros2_package == msg::PositionCommandLong::kType.ros2_package) {
       const auto m = decoded<msg::PositionCommandLong>(wire, received);
-      return m ? std::optional(position_from(*m)) : std::nullopt;
+      return m ? taken(*m) : std::nullopt;
     }
     const auto m = decoded<msg::PositionCommandShort>(wire, received);
-    return m ? std::optional(position_from(*m)) : std::nullopt;
+    return m ? taken(*m) : std::nullopt;
   }
-  if (const auto m = decoded<msg::PositionCommandLong>(wire, received)) return position_from(*m);
-  if (const auto m = decoded<msg::PositionCommandShort>(wire, received)) return position_from(*m);
-  if (const auto m = decoded<msg::PositionCommandOldest>(wire, received)) return position_from(*m);
+  if (const auto m = decoded<msg::PositionCommandLong>(wire, received)) return taken(*m);
+  if (const auto m = decoded<msg::PositionCommandShort>(wire, received)) return taken(*m);
+  if (const auto m = decoded<msg::PositionCommandOldest>(wire, received)) return taken(*m);
   const auto numbers = numbers_of(received.definition, std::span(received.data, received.size));
   if (!numbers) return std::nullopt;
   PositionCommand command;
@@ -75,15 +111,19 @@ std::optional<PositionCommand> position_of(const InputStream& stream,
   return all ? std::optional(command) : std::nullopt;
 }
 
-Command velocity_from(const msg::TwistStamped& m,
-                      const InputStream& stream,
-                      const OrderContext& context) {
+std::optional<Command> velocity_from(const msg::TwistStamped& m,
+                                     const InputStream& stream,
+                                     const OrderContext& context,
+                                     std::string& why) {
   VelocityCommand command;
   command.v_world = vector_of(m.twist.linear);
   command.yaw_rate = m.twist.angular.z;
   const std::string& frame = m.header.frame_id;
-  const bool in_world =
-      frame.empty() ? stream.settings.frame == "world" : frame == context.world_frame;
+  if (!is_world(frame, context) && !is_body(frame, context)) {
+    why = unknown_frame(frame, context);
+    return std::nullopt;
+  }
+  const bool in_world = frame.empty() ? stream.settings.frame == "world" : is_world(frame, context);
   command.in_body = !in_world;
   command.turn = true;
   return command;
@@ -123,7 +163,13 @@ Command stick_command(const msg::Joy& m, const OrderContext& context) {
   return command;
 }
 
-std::optional<Command> goal_from(const msg::PoseStamped& m, const OrderContext& context) {
+std::optional<Command> goal_from(const msg::PoseStamped& m,
+                                 const OrderContext& context,
+                                 std::string& why) {
+  if (!is_world(m.header.frame_id, context)) {
+    why = unknown_frame(m.header.frame_id, context);
+    return std::nullopt;
+  }
   const Vector3d p = vector_of(m.pose.position);
   if (!p.allFinite()) return std::nullopt;
   WaypointCommand command;
@@ -146,49 +192,75 @@ Command rotors_from(const msg::Float32MultiArray& m, const InputStream& stream) 
 struct Reader {
   const char* kind;
   bool is_answer;
-  std::optional<Command> (*read)(const InputStream&, Wire, const Received&, const OrderContext&);
+  /// `why`: in words, where it is refused for something else than its bytes.
+  std::optional<Command> (*read)(
+      const InputStream&, Wire, const Received&, const OrderContext&, std::string& why);
 };
 
 constexpr Reader kReaders[] = {
     {"position",
      true,
-     [](const InputStream& stream, Wire wire, const Received& in, const OrderContext&) {
-       const auto m = position_of(stream, wire, in);
+     [](const InputStream& stream,
+        Wire wire,
+        const Received& in,
+        const OrderContext& context,
+        std::string& why) {
+       const auto m = position_of(stream, wire, in, context, why);
        return m ? std::optional<Command>(*m) : std::nullopt;
      }},
     {"goal",
      false,
-     [](const InputStream&, Wire wire, const Received& in, const OrderContext& context) {
+     [](const InputStream&,
+        Wire wire,
+        const Received& in,
+        const OrderContext& context,
+        std::string& why) {
        const auto m = decoded<msg::PoseStamped>(wire, in);
-       return m ? goal_from(*m, context) : std::nullopt;
+       return m ? goal_from(*m, context, why) : std::nullopt;
      }},
     {"velocity",
      true,
-     [](const InputStream& stream, Wire wire, const Received& in, const OrderContext& context) {
+     [](const InputStream& stream,
+        Wire wire,
+        const Received& in,
+        const OrderContext& context,
+        std::string& why) {
        const auto m = decoded<msg::TwistStamped>(wire, in);
-       return m ? std::optional(velocity_from(*m, stream, context)) : std::nullopt;
+       return m ? velocity_from(*m, stream, context, why) : std::nullopt;
      }},
     {"attitude",
      true,
-     [](const InputStream&, Wire wire, const Received& in, const OrderContext& context) {
+     [](const InputStream&,
+        Wire wire,
+        const Received& in,
+        const OrderContext& context,
+        std::string&) {
        const auto m = decoded<msg::AttitudeTarget>(wire, in);
        return m ? std::optional(attitude_from_target(*m, context)) : std::nullopt;
      }},
     {"rotors",
      true,
-     [](const InputStream& stream, Wire wire, const Received& in, const OrderContext&) {
+     [](const InputStream& stream,
+        Wire wire,
+        const Received& in,
+        const OrderContext&,
+        std::string&) {
        const auto m = decoded<msg::Float32MultiArray>(wire, in);
        return m ? std::optional(rotors_from(*m, stream)) : std::nullopt;
      }},
     {"joy",
      false,
-     [](const InputStream&, Wire wire, const Received& in, const OrderContext& context) {
+     [](const InputStream&,
+        Wire wire,
+        const Received& in,
+        const OrderContext& context,
+        std::string&) {
        const auto m = decoded<msg::Joy>(wire, in);
        return m ? std::optional(stick_command(*m, context)) : std::nullopt;
      }},
     {"take_off_land",
      false,
-     [](const InputStream&, Wire wire, const Received& in, const OrderContext&) {
+     [](const InputStream&, Wire wire, const Received& in, const OrderContext&, std::string&) {
        const auto m = decoded<msg::TakeoffLand>(wire, in);
        if (!m) return std::optional<Command>();
        const bool up = m->takeoff_land_cmd == msg::TakeoffLand::kTakeoff;
@@ -196,13 +268,13 @@ constexpr Reader kReaders[] = {
      }},
     {"hover",
      false,
-     [](const InputStream&, Wire wire, const Received& in, const OrderContext&) {
+     [](const InputStream&, Wire wire, const Received& in, const OrderContext&, std::string&) {
        const auto m = decoded<msg::Empty>(wire, in);
        return m ? std::optional<Command>(HoverCommand{}) : std::nullopt;
      }},
     {"arm",
      false,
-     [](const InputStream&, Wire wire, const Received& in, const OrderContext&) {
+     [](const InputStream&, Wire wire, const Received& in, const OrderContext&, std::string&) {
        const auto m = decoded<msg::Empty>(wire, in);
        return m ? std::optional<Command>(ArmCommand{}) : std::nullopt;
      }},
@@ -231,12 +303,15 @@ std::optional<Order> order_of(const InputStream& stream,
   const auto reader = std::find_if(
       std::begin(kReaders), std::end(kReaders), [&](const Reader& r) { return kind == r.kind; });
   std::optional<Order> order;
+  std::string why;
   if (reader == std::end(kReaders)) {
     order = run_order_of(kind, wire, received);
-  } else if (const auto command = reader->read(stream, wire, received, context)) {
+  } else if (const auto command = reader->read(stream, wire, received, context, why)) {
     order = VehicleOrder{stream.vehicle, *command, reader->is_answer};
   }
-  if (!order) {
+  if (!order && !why.empty()) {
+    reason = fmt::format("{}: {}", stream.topic.name, why);
+  } else if (!order) {
     reason = fmt::format("{}: a message of {} bytes that is no {}{}",
                          stream.topic.name,
                          received.size,
@@ -248,32 +323,49 @@ std::optional<Order> order_of(const InputStream& stream,
 
 namespace {
 
-/// Types that a kind is read with.
-std::vector<MessageType> types_for(const std::string& kind, Wire wire) {
+/// The type that an input is read with. One topic has one type: ROS 2's tools take no other.
+MessageType type_for(const RosInput& input) {
+  const std::string& kind = input.kind;
   if (kind == "position") {
-    std::vector<MessageType> types = {message_type<msg::PositionCommandShort>()};
-    if (wire == Wire::kCdr) types.push_back(message_type<msg::PositionCommandLong>());
-    return types;
+    // ROS 1 names both "quadrotor_msgs" and reads each in its sender's own words
+    return input.package == "quadrotor_msgs" ? message_type<msg::PositionCommandShort>()
+                                             : message_type<msg::PositionCommandLong>();
   }
-  if (kind == "goal") return {message_type<msg::PoseStamped>()};
-  if (kind == "velocity") return {message_type<msg::TwistStamped>()};
-  if (kind == "attitude") return {message_type<msg::AttitudeTarget>()};
-  if (kind == "rotors") return {message_type<msg::Float32MultiArray>()};
-  if (kind == "joy") return {message_type<msg::Joy>()};
-  if (kind == "take_off_land") return {message_type<msg::TakeoffLand>()};
-  if (kind == "pause") return {message_type<msg::Bool>()};
-  return {message_type<msg::Empty>()};
+  if (kind == "goal") return message_type<msg::PoseStamped>();
+  if (kind == "velocity") return message_type<msg::TwistStamped>();
+  if (kind == "attitude") return message_type<msg::AttitudeTarget>();
+  if (kind == "rotors") return message_type<msg::Float32MultiArray>();
+  if (kind == "joy") return message_type<msg::Joy>();
+  if (kind == "take_off_land") return message_type<msg::TakeoffLand>();
+  if (kind == "pause") return message_type<msg::Bool>();
+  return message_type<msg::Empty>();
 }
 
 bool is_of_run(const std::string& kind) {
   return kind == "pause" || kind == "step" || kind == "reset";
 }
 
+/// What is sent once and counts; the others come in streams, whose next message makes up for a lost
+/// one.
+bool is_one_shot(const std::string& kind) {
+  return is_of_run(kind) || kind == "goal" || kind == "take_off_land" || kind == "hover" ||
+         kind == "arm";
+}
+
 }  // namespace
 
-std::vector<InputStream> input_streams(const Simulation& simulation,
-                                       const RosProfile& profile,
-                                       Wire wire) {
+namespace {
+
+/// True where lockstep takes such a message for a planner's answer to a scan.
+bool is_answer(const std::string& kind) {
+  return std::any_of(std::begin(kReaders), std::end(kReaders), [&](const Reader& r) {
+    return kind == r.kind && r.is_answer;
+  });
+}
+
+}  // namespace
+
+std::vector<InputStream> input_streams(const Simulation& simulation, const RosProfile& profile) {
   std::vector<InputStream> streams;
   for (const RosInput& input : profile.inputs) {
     if (input.topic.empty() || input.topic == "-") continue;
@@ -282,18 +374,18 @@ std::vector<InputStream> input_streams(const Simulation& simulation,
     for (std::size_t v = 0; v < vehicles; ++v) {
       const RosNames names{
           simulation.vehicle(v).setup().name, profile.first_id + static_cast<std::int64_t>(v), ""};
-      for (MessageType& type : types_for(input.kind, wire)) {
-        InputStream stream;
-        stream.settings = input;
-        stream.settings.topic = with_names(input.topic, names);
-        if (stream.settings.topic.front() != '/') stream.settings.topic.insert(0, "/");
-        stream.topic.name = stream.settings.topic;
-        stream.topic.type = std::move(type);
-        stream.topic.depth = 10;
-        stream.vehicle = v;
-        stream.for_all = once && !is_of_run(input.kind);
-        streams.push_back(std::move(stream));
-      }
+      InputStream stream;
+      stream.settings = input;
+      stream.settings.topic = with_names(input.topic, names);
+      if (stream.settings.topic.front() != '/') stream.settings.topic.insert(0, "/");
+      stream.topic.name = stream.settings.topic;
+      stream.topic.type = type_for(input);
+      stream.topic.depth = 10;
+      stream.topic.reliable = is_one_shot(input.kind);
+      stream.topic.answers = is_answer(input.kind);
+      stream.vehicle = v;
+      stream.for_all = once && !is_of_run(input.kind);
+      streams.push_back(std::move(stream));
     }
   }
   return streams;
@@ -307,18 +399,39 @@ Inbox::Inbox(const Simulation& simulation, const RosProfile& profile)
     context.mass = s.mass;
     context.thrust_max = s.thrust_to_weight() * s.mass * kGravity;
     context.motion = simulation.vehicle(v).setup().mission.motion;
-    context.world_frame = profile.world_frame;
+    context.world_frame = bare(profile.world_frame);
+    context.world_alias = bare(profile.world_alias);
+    context.body_frame = bare(body_frame_of(
+        profile,
+        {simulation.vehicle(v).setup().name, profile.first_id + static_cast<std::int64_t>(v), ""},
+        v));
     contexts_.push_back(context);
   }
 }
 
 void Inbox::connect(Transport& transport) {
   const Wire wire = transport.wire();
-  for (const InputStream& stream : input_streams(simulation_, profile_, wire)) {
+  for (const InputStream& stream : input_streams(simulation_, profile_)) {
     transport.subscribe(stream.topic, [this, stream, wire](const Received& received) {
       receive(stream, wire, received);
     });
   }
+  for (const Service& service : run_services(profile_)) serve(service, transport);
+}
+
+void Inbox::serve(const Service& service, Transport& transport) {
+  const Wire wire = transport.wire();
+  transport.serve(service, [this, service, wire](const Received& request) {
+    const auto order = order_in(service, wire, request);
+    if (order) push(*order);
+    return answer_to(order.has_value(), wire);
+  });
+}
+
+void Inbox::push(Order order) {
+  const std::lock_guard lock(mutex_);
+  if (orders_.size() >= kOrdersMax) orders_.erase(orders_.begin());
+  orders_.push_back(std::move(order));
 }
 
 void Inbox::receive(const InputStream& stream, Wire wire, const Received& received) {
@@ -328,14 +441,14 @@ void Inbox::receive(const InputStream& stream, Wire wire, const Received& receiv
     own.vehicle = v;
     std::string reason;
     auto order = order_of(own, wire, received, contexts_[v], reason);
-    const std::lock_guard lock(mutex_);
     if (!order) {
-      ++malformed_;
-      last_reason_ = reason;
+      const std::lock_guard lock(mutex_);
+      ++refused_.count;
+      refused_.last = reason;
+      if (refused_topics_.insert(stream.topic.name).second) new_reasons_.push_back(reason);
       return;
     }
-    if (orders_.size() >= kOrdersMax) orders_.erase(orders_.begin());
-    orders_.push_back(std::move(*order));
+    push(std::move(*order));
   }
 }
 
@@ -344,14 +457,14 @@ std::vector<Order> Inbox::take() {
   return std::exchange(orders_, {});
 }
 
-std::uint64_t Inbox::malformed() const {
+Inbox::Refused Inbox::refused() const {
   const std::lock_guard lock(mutex_);
-  return malformed_;
+  return refused_;
 }
 
-std::string Inbox::last_reason() const {
+std::vector<std::string> Inbox::take_new_reasons() {
   const std::lock_guard lock(mutex_);
-  return last_reason_;
+  return std::exchange(new_reasons_, {});
 }
 
 }  // namespace pointflight

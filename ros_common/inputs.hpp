@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <span>
 #include <string>
 #include <variant>
@@ -35,21 +36,19 @@ struct InputStream {
   bool for_all = false;  ///< A topic that all vehicles share.
 };
 
-/// The streams of a profile in a run. On ROS 2 a PositionCommand has a stream for each of its two
-/// definitions: readers of different types do not meet.
-std::vector<InputStream> input_streams(const Simulation& simulation,
-                                       const RosProfile& profile,
-                                       Wire wire);
+/// The streams of a profile in a run.
+std::vector<InputStream> input_streams(const Simulation& simulation, const RosProfile& profile);
 
 /// What a vehicle's orders are made with.
 struct OrderContext {
   double mass = 1.0;        ///< kg
   double thrust_max = 0.0;  ///< Of all rotors, N: what a thrust of 1 stands for.
   MotionLimits motion;      ///< Of goals.
-  std::string world_frame;  ///< Velocities in any other are the body's.
+  std::string world_frame, world_alias, body_frame;  ///< That what comes in may be in.
 };
 
-/// The order that a message stands for. Nothing, and the reason, where it is malformed.
+/// The order that a message stands for. Nothing, and the reason, where it is malformed or in a
+/// frame that is not known.
 std::optional<Order> order_of(const InputStream& stream,
                               Wire wire,
                               const Received& received,
@@ -61,25 +60,34 @@ class Inbox {
  public:
   Inbox(const Simulation& simulation, const RosProfile& profile);
 
-  /// Subscribes to everything that the profile reads.
+  /// Subscribes to everything that the profile reads, and answers the services of the run.
   void connect(Transport& transport);
 
   /// Orders in the order in which they came.
   std::vector<Order> take();
 
-  [[nodiscard]] std::uint64_t malformed() const;
-  [[nodiscard]] std::string last_reason() const;
+  /// Messages that were left out, and why the last one was.
+  struct Refused {
+    std::uint64_t count = 0;
+    std::string last;
+  };
+  [[nodiscard]] Refused refused() const;
+  /// Why the first message of each topic was left out; each is told once.
+  std::vector<std::string> take_new_reasons();
 
  private:
   void receive(const InputStream& stream, Wire wire, const Received& received);
+  void serve(const Service& service, Transport& transport);
+  void push(Order order);
 
   const Simulation& simulation_;
   RosProfile profile_;
   std::vector<OrderContext> contexts_;  ///< Of each vehicle.
   mutable std::mutex mutex_;
   std::vector<Order> orders_;
-  std::uint64_t malformed_ = 0;
-  std::string last_reason_;
+  Refused refused_;
+  std::set<std::string> refused_topics_;
+  std::vector<std::string> new_reasons_;
 };
 
 }  // namespace pointflight

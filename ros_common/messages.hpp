@@ -10,4 +10,5 @@
 #include "ros_common/messages/display.hpp"
 #include "ros_common/messages/geometry.hpp"
 #include "ros_common/messages/sensors.hpp"
+#include "ros_common/messages/services.hpp"
 #include "ros_common/messages/standard.hpp"

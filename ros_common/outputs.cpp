@@ -9,6 +9,7 @@
 
 #include "pointflight/core/input_error.hpp"
 #include "ros_common/point_layout.hpp"
+#include "ros_common/ros_names.hpp"
 #include "ros_common/scan_messages.hpp"
 
 namespace pointflight {
@@ -197,7 +198,7 @@ std::vector<std::string> lidar_names(const VehicleAgent& vehicle) {
   std::vector<std::string> names;
   std::map<std::string, int> seen;
   for (const LidarMount& mount : vehicle.setup().lidars) {
-    const std::string stem = std::filesystem::path(mount.model).stem().string();
+    const std::string stem = as_ros_word(std::filesystem::path(mount.model).stem().string());
     const int before = seen[stem]++;
     names.push_back(before == 0 ? stem : fmt::format("{}_{}", stem, before));
   }

@@ -72,7 +72,8 @@ struct OutputStream {
   std::size_t lidar = 0;
 };
 
-/// Names of a vehicle's LiDARs: their model's, with a number where several are alike.
+/// Names of a vehicle's LiDARs, as ROS takes them: their model's, with a number where several are
+/// alike.
 std::vector<std::string> lidar_names(const VehicleAgent& vehicle);
 
 /// The frames of a vehicle and of its LiDAR. Where the profile's pattern does not tell them apart,

@@ -213,7 +213,8 @@ msg::PointCloud2 cloud_of(const Scan& scan,
                           const PointLayout& layout,
                           const std::string& frame,
                           Duration epoch,
-                          std::span<const Vector3f> positions) {
+                          std::span<const Vector3f> positions,
+                          float plain) {
   msg::PointCloud2 cloud = empty_cloud(layout, scan.points.size());
   const SimTime time = cloud_time(scan, layout.timed);
   cloud.header.stamp = stamp_of(time, epoch);
@@ -222,7 +223,7 @@ msg::PointCloud2 cloud_of(const Scan& scan,
     const ScanPoint& point = scan.points[i];
     Values values;
     values.position = positions.empty() ? point.position_sensor : positions[i];
-    values.intensity = point.intensity;
+    values.intensity = point.intensity == 0.0f ? plain : point.intensity;
     values.ring = point.ring;
     values.range = point.range;
     const SimTime fired = scan.start + point.time_offset;
@@ -233,7 +234,10 @@ msg::PointCloud2 cloud_of(const Scan& scan,
   return cloud;
 }
 
-msg::CustomMsg custom_cloud_of(const Scan& scan, const std::string& frame, Duration epoch) {
+msg::CustomMsg custom_cloud_of(const Scan& scan,
+                               const std::string& frame,
+                               Duration epoch,
+                               float plain) {
   msg::CustomMsg cloud;
   const SimTime time = cloud_time(scan, true);
   cloud.header.stamp = stamp_of(time, epoch);
@@ -248,7 +252,7 @@ msg::CustomMsg custom_cloud_of(const Scan& scan, const std::string& frame, Durat
                             point.position_sensor.x(),
                             point.position_sensor.y(),
                             point.position_sensor.z(),
-                            as_byte(point.intensity),
+                            as_byte(point.intensity == 0.0f ? plain : point.intensity),
                             kLivoxTag,
                             static_cast<std::uint8_t>(point.ring)});
   }

@@ -52,16 +52,25 @@ std::span<const PointLayout> point_layouts();
 /// times (the scan's start without points), else `Scan::middle`.
 SimTime cloud_time(const Scan& scan, bool timed);
 
+/// What returns of a map without intensities are given, since programs drop points of none: a grey
+/// wall's 30 % in Livox' scale (0 to 150 is diffuse reflection of 0 to 100 %) is 45.
+inline constexpr float kPlainIntensity = 45.0f;
+
 /// The scan as a cloud: height 1, no NaN, in firing order. Stamps count from `epoch`. Positions are
 /// the sensor's at each point's own time, unless `positions` (one for each point) gives others.
+/// `plain` is the intensity of returns that have none.
 msg::PointCloud2 cloud_of(const Scan& scan,
                           const PointLayout& layout,
                           const std::string& frame,
                           Duration epoch,
-                          std::span<const Vector3f> positions = {});
+                          std::span<const Vector3f> positions = {},
+                          float plain = 0.0f);
 
 /// The same as Livox' CustomMsg: tag 0x10, line = ring.
-msg::CustomMsg custom_cloud_of(const Scan& scan, const std::string& frame, Duration epoch);
+msg::CustomMsg custom_cloud_of(const Scan& scan,
+                               const std::string& frame,
+                               Duration epoch,
+                               float plain = 0.0f);
 
 /// Bare points as a cloud of a layout without times.
 msg::PointCloud2 cloud_of_points(std::span<const Vector3f> points,

@@ -11,6 +11,7 @@
 #include "pointflight/core/resources.hpp"
 #include "ros_common/outputs.hpp"
 #include "ros_common/point_layout.hpp"
+#include "ros_common/ros_names.hpp"
 
 namespace pointflight {
 namespace {
@@ -33,21 +34,44 @@ constexpr std::array<std::string_view, 2> kImuUnits = {"mps2", "g"};
 constexpr std::array<std::string_view, 2> kGravities = {"up", "down"};
 constexpr std::array<std::string_view, 2> kLivoxPackages = {"livox_ros_driver2",
                                                             "livox_ros_driver"};
-/// Throws where a kind or layout is unknown; `place` gives file and line of a key.
+
+using Place = std::function<std::string(const std::string& key)>;
+
+/// Throws where ROS would not take a name; what stands in braces is written out later.
+void check_pattern(const std::string& key,
+                   const std::string& pattern,
+                   bool is_topic,
+                   const Place& place) {
+  if (pattern.empty() || pattern == "-") return;
+  const std::string text = with_names(pattern, {"x", 0, "x"});
+  const std::string fault = is_topic ? topic_fault(text) : frame_fault(text);
+  if (fault.empty()) return;
+  throw InputError(fmt::format("{}: {}: '{}' is no {} for ROS: it {}",
+                               place(key),
+                               key,
+                               pattern,
+                               is_topic ? "topic" : "frame",
+                               fault));
+}
+
+/// Throws where a kind or layout is unknown, or a name is none for ROS; `place` gives file and line
+/// of a key.
 void check_names(const std::vector<RosOutput>& outputs,
                  const std::vector<RosInput>& inputs,
                  const std::string& prefix,
-                 const std::function<std::string(const std::string&)>& place) {
+                 const Place& place) {
   const auto check = [&](const std::string& key,
                          const std::string& value,
                          const std::vector<std::string>& known) {
     if (std::find(known.begin(), known.end(), value) != known.end()) return;
     const std::string close = closest_word(value, known);
+    std::vector<std::string> named = known;
+    std::erase(named, "");  // left open
     throw InputError(fmt::format("{}: {}: '{}' is unknown; {}",
                                  place(key),
                                  key,
                                  value,
-                                 close.empty() ? fmt::format("one of: {}", fmt::join(known, ", "))
+                                 close.empty() ? fmt::format("one of: {}", fmt::join(named, ", "))
                                                : fmt::format("did you mean '{}'?", close)));
   };
   std::vector<std::string> kinds;
@@ -57,11 +81,36 @@ void check_names(const std::vector<RosOutput>& outputs,
   for (std::size_t i = 0; i < outputs.size(); ++i) {
     check(fmt::format("{}outputs[{}].kind", prefix, i), outputs[i].kind, kinds);
     check(fmt::format("{}outputs[{}].layout", prefix, i), outputs[i].layout, layouts);
+    const auto key = [&](const char* name) {
+      return fmt::format("{}outputs[{}].{}", prefix, i, name);
+    };
+    check_pattern(key("topic"), outputs[i].topic, true, place);
+    check_pattern(key("frame"), outputs[i].frame, false, place);
+    check_pattern(key("child_frame"), outputs[i].child_frame, false, place);
   }
   for (std::size_t i = 0; i < inputs.size(); ++i) {
     check(fmt::format("{}inputs[{}].kind", prefix, i),
           inputs[i].kind,
           {kInputs.begin(), kInputs.end()});
+    check_pattern(fmt::format("{}inputs[{}].topic", prefix, i), inputs[i].topic, true, place);
+  }
+}
+
+/// Throws where a vehicle's name cannot be part of a topic.
+void check_vehicle_names(const Scenario& scenario) {
+  const auto fleet = scenario.fleet();
+  for (std::size_t v = 0; v < fleet.size(); ++v) {
+    const std::string& name = fleet[v].name;
+    if (is_ros_word(name)) continue;
+    const std::string key = scenario.vehicle_key(v, "name");
+    throw InputError(fmt::format(
+        "{}: {}: '{}' is part of ROS topics (/{}/odom), which take letters, digits and _ only; "
+        "call it {}",
+        scenario.place(key),
+        key,
+        name,
+        name,
+        as_ros_word(name)));
   }
 }
 
@@ -70,10 +119,14 @@ RosProfile read(SettingsReader& reader, const std::string& path) {
   describe(reader, profile);
   reader.finish();
   profile.path = path;
-  check_names(profile.outputs, profile.inputs, "", [&](const std::string& key) {
+  const Place place = [&](const std::string& key) {
     const auto line = reader.lines().find(key);
     return line == reader.lines().end() ? path : fmt::format("{}:{}", path, line->second);
-  });
+  };
+  check_names(profile.outputs, profile.inputs, "", place);
+  check_pattern("world_frame", profile.world_frame, false, place);
+  check_pattern("body_frame", profile.body_frame, false, place);
+  check_pattern("sensor_frame", profile.sensor_frame, false, place);
   return profile;
 }
 
@@ -101,6 +154,7 @@ void describe(SettingsVisitor& v, RosProfile& s) {
   v.value({"title", "", "whose names these are"}, s.title);
   v.value({"source", "", "where they were read"}, s.source);
   v.value({"world_frame", "", ""}, s.world_frame);
+  v.value({"world_alias", "", "another name of it in goals and commands"}, s.world_alias);
   v.value({"body_frame", "", ""}, s.body_frame);
   v.value({"sensor_frame", "", ""}, s.sensor_frame);
   v.value({"first_id", "", "number of the first vehicle", 0, 1000}, s.first_id);
@@ -138,9 +192,11 @@ RosProfile profile_for(const Scenario& scenario, const std::string& name) {
           ? scenario.at("ros.profile",
                         [&] { return load_ros_profile(scenario.ros.profile, scenario.folder()); })
           : load_ros_profile(name);
+  check_vehicle_names(scenario);
   check_names(scenario.ros.outputs, scenario.ros.inputs, "ros.", [&](const std::string& key) {
     return scenario.place(key);
   });
+  if (!scenario.ros.world_alias.empty()) profile.world_alias = scenario.ros.world_alias;
   const auto take = [](std::string& own, const std::string& base) {
     if (own.empty()) own = base;
   };

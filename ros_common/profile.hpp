@@ -15,6 +15,7 @@ struct RosProfile {
   std::string title;
   std::string source;
   std::string world_frame = "world";
+  std::string world_alias;  ///< Another name of it that goals and commands may have.
   std::string body_frame = "{vehicle}/base_link";
   std::string sensor_frame = "{vehicle}/{lidar}";
   std::int64_t first_id = 0;
@@ -37,7 +38,8 @@ RosProfile load_ros_profile(const std::string& name_or_path, const std::string& 
 RosProfile parse_ros_profile(std::string_view text, const std::string& path);
 
 /// The profile that a scenario asks for (or `name`, where it is not empty) with the scenario's own
-/// names in it. Throws InputError with file and line.
+/// names in it. Throws InputError with file and line, also for vehicles' names that ROS does not
+/// take.
 RosProfile profile_for(const Scenario& scenario, const std::string& name = {});
 
 /// What `{vehicle}`, `{id}` and `{lidar}` stand for.

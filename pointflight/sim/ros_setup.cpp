@@ -7,6 +7,8 @@ namespace {
 
 constexpr std::array<std::string_view, 2> kRotorUnits = {"si", "rpm"};
 constexpr std::array<std::string_view, 2> kFrames = {"world", "body"};
+constexpr std::array<std::string_view, 2> kCommandPackages = {"quadrotor_msgs",
+                                                              "mars_quadrotor_msgs"};
 
 }  // namespace
 
@@ -26,11 +28,16 @@ void describe(SettingsVisitor& v, RosInput& s) {
   v.value({"topic", "", "{vehicle} and {id} are written out; '-': not read"}, s.topic);
   v.choice({"unit", "", "of rotor speeds: rad/s or rpm"}, s.unit, kRotorUnits);
   v.choice({"frame", "", "of velocities that name no frame"}, s.frame, kFrames);
+  v.choice({"package", "", "of a PositionCommand on ROS 2; ROS 1 takes any"},
+           s.package,
+           kCommandPackages);
 }
 
 void describe(SettingsVisitor& v, RosSetup& s) {
   v.value({"profile", "", "whose names: default, marsim, ego, livox, ... or a path"}, s.profile);
   v.value({"epoch", "", "of stamps: now, or seconds since 1970; empty: the profile's"}, s.epoch);
+  v.value({"world_alias", "", "another name of the world's frame in what comes in, such as map"},
+          s.world_alias);
   v.list({"outputs", "", "of each kind named here, instead of the profile's"},
          s.outputs,
          [](SettingsVisitor& w, RosOutput& output) { describe(w, output); });

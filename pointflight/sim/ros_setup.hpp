@@ -25,6 +25,8 @@ struct RosInput {
   std::string topic;            ///< "-": not read.
   std::string unit = "si";      ///< Of rotor speeds: "si" (rad/s) or "rpm".
   std::string frame = "world";  ///< Of velocities that name no frame: "world" or "body".
+  /// Of a PositionCommand on ROS 2, where readers of different types do not meet.
+  std::string package = "quadrotor_msgs";
 };
 
 void describe(SettingsVisitor& visitor, RosOutput& output);
@@ -34,6 +36,7 @@ void describe(SettingsVisitor& visitor, RosInput& input);
 struct RosSetup {
   std::string profile = "default";  ///< A shipped one, or a path.
   std::string epoch;                ///< "now", or seconds since 1970; empty: the profile's.
+  std::string world_alias;          ///< Empty: the profile's.
   /// Of each kind that is named here, instead of the profile's; what is left open is the profile's.
   std::vector<RosOutput> outputs;
   std::vector<RosInput> inputs;

@@ -51,7 +51,7 @@ void describe_limits(SettingsVisitor& v, LimitSetup& s) {
 }
 
 void describe_airframe(SettingsVisitor& v, VehicleSetup& s) {
-  v.value({"name", "", "of its files; empty: drone and its number"}, s.name);
+  v.value({"name", "", "of its files and topics; empty: drone0, drone1, ..."}, s.name);
   v.value({"model", "", "name of a shipped vehicle, or a path"}, s.model);
   v.value({"start", "m", "where it hovers at first", -kFar, kFar}, s.start);
   v.value({"start_yaw_deg", "deg", "heading at first, from x towards y", -360, 360},

@@ -16,6 +16,9 @@ class Ros2 : public Program {
   std::unique_ptr<Flight> fly(const std::string& more = "", const std::string& scenario = "") {
     std::vector<std::string> arguments = {
         scenario.empty() ? map() : scenario, "--ros2", "--ros2-localhost"};
+    if (more.find("--epoch") == std::string::npos && more.find("--lockstep") == std::string::npos) {
+      arguments.insert(arguments.end(), {"--epoch", "1.7e9"});  // so that stamps say the run's time
+    }
     std::istringstream words(more);
     for (std::string word; words >> word;) arguments.push_back(word);
     return std::make_unique<Flight>(arguments, *folder_ / "fly.log");

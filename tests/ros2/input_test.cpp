@@ -62,7 +62,7 @@ TEST_P(Ros2Inputs, CommandsFlyTheVehicle) {
   {
     Writer<mars_quadrotor_msgs_msg_dds__PositionCommand_> writer(
         peer,
-        "rt/drone0/cmd/position",
+        "rt/drone0/cmd/position_mars",
         mars_quadrotor_msgs_msg_dds__PositionCommand__desc,
         reliable);
     mars_quadrotor_msgs_msg_dds__PositionCommand_ m{};

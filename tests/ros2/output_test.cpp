@@ -41,16 +41,16 @@ TEST_F(Ros2, ANodeOfThisNameWithItsEndpointsIsInTheGraph) {
       writers += entry.writer_gid_seq._length;
       readers += entry.reader_gid_seq._length;
     });
-    return nodes.size() == 2;
+    return !nodes.empty();
   })) << flight->stop();
-  // the second has the other type of PositionCommand
-  EXPECT_EQ(nodes, (std::set<std::string>{"/pointflight", "/pointflight_2"}));
-  EXPECT_EQ(writers, 13u);
-  EXPECT_EQ(readers, 12u);  // a PositionCommand has two types
+  EXPECT_EQ(nodes, std::set<std::string>{"/pointflight"});
+  EXPECT_EQ(writers, 13u + 3u);       // and the replies of services
+  EXPECT_EQ(readers, 12u + 5u + 3u);  // what comes once is read reliably as well; services
 
   // each endpoint says its type's hash
   std::map<std::string, std::string> types;
   std::map<std::string, std::string> hashes;
+  std::set<std::string> reliable;
   for (const dds_entity_t builtin :
        {DDS_BUILTIN_TOPIC_DCPSPUBLICATION, DDS_BUILTIN_TOPIC_DCPSSUBSCRIPTION}) {
     const dds_entity_t reader = dds_create_reader(peer.participant(), builtin, nullptr, nullptr);
@@ -64,18 +64,35 @@ TEST_F(Ros2, ANodeOfThisNameWithItsEndpointsIsInTheGraph) {
             const auto* e = static_cast<dds_builtintopic_endpoint_t*>(samples[i]);
             void* data = nullptr;
             std::size_t size = 0;
+            dds_reliability_kind_t kind = DDS_RELIABILITY_BEST_EFFORT;
+            dds_duration_t blocking = 0;
+            dds_qget_reliability(e->qos, &kind, &blocking);
             if (dds_qget_userdata(e->qos, &data, &size) && size > 0) {
+              if (kind == DDS_RELIABILITY_RELIABLE) reliable.insert(e->topic_name);
+              const auto other = types.find(e->topic_name);
+              EXPECT_TRUE(other == types.end() || other->second == e->type_name)
+                  << e->topic_name << " has two types";
               hashes[e->topic_name] = std::string(static_cast<char*>(data), size);
               types[e->topic_name] = e->type_name;
             }
             dds_free(data);
           }
           if (n > 0) dds_return_loan(reader, samples, n);
-          return types.contains("rt/drone0/odom") && types.contains("rt/drone0/goal");
+          return types.contains("rt/drone0/odom") && types.contains("rt/drone0/goal") &&
+                 types.contains("rt/drone0/cmd/position_mars");
         },
         5.0);
     dds_delete(reader);
   }
+  // what comes once is read reliably
+  for (const char* topic : {"drone0/goal",
+                            "drone0/cmd/takeoff_land",
+                            "pointflight/pause",
+                            "pointflight/step",
+                            "pointflight/reset"}) {
+    EXPECT_TRUE(reliable.contains(std::string("rt/") + topic)) << topic;
+  }
+  EXPECT_FALSE(reliable.contains("rt/drone0/cmd/velocity"));
   EXPECT_EQ(types["rt/drone0/odom"], "nav_msgs::msg::dds_::Odometry_");
   EXPECT_EQ(hashes["rt/drone0/odom"],
             "typehash=RIHS01_3cc97dc7fb7502f8714462c526d369e35b603cfc34d946e3f2eda2766dfec6e0;");
@@ -127,7 +144,7 @@ TEST_F(Ros2, EveryTypeArrivesReliableAndBestEffort) {
         peer, "rt/obstacles", visualization_msgs_msg_dds__MarkerArray__desc, reliable);
     Reader<diagnostic_msgs_msg_dds__DiagnosticArray_> diagnostics(
         peer, "rt/diagnostics", diagnostic_msgs_msg_dds__DiagnosticArray__desc, reliable);
-    const auto flight = fly(reliable ? "" : "--shm", scenario);  // offered beside UDP
+    const auto flight = fly("", scenario);
     std::map<std::string, int> counts;
     double last = -1.0;
     const auto all_there = [&] {

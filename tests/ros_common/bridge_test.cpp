@@ -347,7 +347,7 @@ TEST(RosBridge, TheClockOfAPausedRunSaysWhereItStands) {
     bridge.on_time(simulation.time());
   }
   EXPECT_NEAR(seconds_of(keeper.of<msg::Clock>("/clock").back().clock), 0.010, 1e-9);
-  bridge.repeat_clock();
+  bridge.repeat();
   EXPECT_NEAR(seconds_of(keeper.of<msg::Clock>("/clock").back().clock), 0.013, 1e-9);
 }
 

@@ -124,6 +124,23 @@ TEST(PointLayouts, HoldTheScan) {
   }
 }
 
+TEST(PointLayouts, ReturnsWithoutAnIntensityGetAPlainOne) {
+  Scan scan = scan_of_three();
+  scan.points[1].intensity = 0.0f;
+  for (const PointLayout& layout : point_layouts()) {
+    const auto cloud = cloud_of(scan, layout, "sensor", kEpoch, {}, kPlainIntensity);
+    for (const char* name : {"intensity", "reflectivity"}) {
+      const double value = value_of(cloud, 1, name);
+      EXPECT_TRUE(std::isnan(value) || value == kPlainIntensity) << layout.name << " " << name;
+      const double other = value_of(cloud, 0, name);
+      EXPECT_TRUE(std::isnan(other) || other == 100.0) << layout.name << " " << name;
+    }
+  }
+  const auto custom = custom_cloud_of(scan, "livox_frame", kEpoch, kPlainIntensity);
+  EXPECT_EQ(custom.points[1].reflectivity, 45);
+  EXPECT_EQ(custom.points[0].reflectivity, 100);
+}
+
 TEST(PointLayouts, LivoxCustomCountsFromItsFirstPoint) {
   const Scan scan = scan_of_three();
   const msg::CustomMsg cloud = custom_cloud_of(scan, "livox_frame", kEpoch);

@@ -20,6 +20,7 @@ OrderContext context() {
   c.mass = 2.0;
   c.thrust_max = 40.0;
   c.world_frame = "world";
+  c.body_frame = "drone0/base_link";
   return c;
 }
 
@@ -44,6 +45,48 @@ std::optional<Order> order_for(const std::string& kind,
   auto order = order_of(stream, W, received, context(), reason);
   if (!order) expect_contains(reason, "/in: a message of");
   return order;
+}
+
+TEST(Inputs, FramesThatAreNotKnownAreRefused) {
+  InputStream stream;
+  stream.topic.name = "/in";
+  const auto reason_for =
+      [&](const std::string& kind, const auto& message, const OrderContext& c) -> std::string {
+    stream.settings.kind = kind;
+    const auto bytes = encode<Wire::kCdr>(message);
+    Received received;
+    received.data = bytes.data();
+    received.size = bytes.size();
+    std::string reason;
+    return order_of(stream, Wire::kCdr, received, c, reason) ? "taken" : reason;
+  };
+  OrderContext alias = context();
+  alias.world_alias = "map";
+  msg::PoseStamped goal;
+  goal.pose.orientation.w = 1.0;
+  msg::TwistStamped velocity;
+  msg::PositionCommandShort position;
+  const auto check = [&](const std::string& kind, auto message) {
+    const bool has_body = kind == "velocity";
+    for (const char* frame : {"", "world", "/world"}) {
+      message.header.frame_id = frame;
+      EXPECT_EQ(reason_for(kind, message, context()), "taken") << kind << " " << frame;
+    }
+    for (const char* frame : {"map", "odom", "world2", "drone1/base_link"}) {
+      message.header.frame_id = frame;
+      expect_contains(reason_for(kind, message, context()),
+                      "/in: frame '" + std::string(frame) + "' is not known; it is 'world' here");
+    }
+    for (const char* frame : {"drone0/base_link", "base_link"}) {
+      message.header.frame_id = frame;
+      EXPECT_EQ(reason_for(kind, message, context()) == "taken", has_body) << kind << " " << frame;
+    }
+    message.header.frame_id = "map";
+    EXPECT_EQ(reason_for(kind, message, alias), "taken") << kind;
+  };
+  check("goal", goal);
+  check("velocity", velocity);
+  check("position", position);
 }
 
 template <class C>
