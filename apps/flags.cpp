@@ -27,4 +27,21 @@ void refuse_same_file(const std::string& output, const std::string& input) {
   }
 }
 
+void add_start_in_flag(CLI::App& app, std::vector<double>& numbers) {
+  app.add_option("--start-in",
+                 numbers,
+                 "x,y,z,x,y,z of a box, m: a start is looked for in it; a scenario's is warned of "
+                 "outside. What a planner's grid covers")
+      ->delimiter(',')
+      ->expected(6)
+      ->check(within(-1e7, 1e7));
+}
+
+Aabb box_from(const std::vector<double>& numbers, const std::string& flag) {
+  const Aabb box{Vector3d(numbers.data()), Vector3d(numbers.data() + 3)};
+  if (box.size().minCoeff() > 0.0) return box;
+  throw InputError(
+      fmt::format("{}: is empty; give x,y,z of the lower corner, then of the upper", flag));
+}
+
 }  // namespace pointflight::apps

@@ -4,6 +4,7 @@
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
 #include <chrono>
+#include <cmath>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -11,6 +12,7 @@
 #include <thread>
 
 #include "apps/commands.hpp"
+#include "apps/flags.hpp"
 #include "apps/pictures.hpp"
 #include "apps/ros_session.hpp"
 #include "apps/scenario_command.hpp"
@@ -31,6 +33,9 @@ struct FlyFlags {
   std::string output;
   std::string rate;  ///< Empty: real time with ROS, else as fast as it goes.
   std::int64_t seed = -1;
+  std::string lidar;             ///< Of a scenario made up for a map.
+  std::vector<double> start;     ///< x, y, z
+  std::vector<double> start_in;  ///< A box.
   int threads = 0;
   bool force = false;
   bool snapshot = false;
@@ -74,6 +79,7 @@ class Pace {
   void restart_at(SimTime time) {
     start_ = Clock::now();
     from_ = time;
+    next_trouble_ = 1.0;
   }
 
   /// How long ago an instant was due, s.
@@ -81,6 +87,21 @@ class Pace {
     if (rate_ <= 0.0) return std::nullopt;
     const std::chrono::duration<double> since = Clock::now() - start_;
     return since.count() - to_seconds(time - from_) / rate_;
+  }
+
+  /// A line for the user where the run has fallen behind by a second, and when that has doubled.
+  std::optional<std::string> trouble(SimTime time) {
+    const double behind = late(time).value_or(0.0);
+    if (behind < next_trouble_) return std::nullopt;
+    const double passed = to_seconds(time - from_) / rate_;
+    next_trouble_ = 2.0 * behind;
+    return fmt::format(
+        "warning: {:.1f} s behind: this machine manages a rate of {:.2f}, not {}; "
+        "use fewer LiDARs, a coarser map or --rate {:.1f}, or --lockstep",
+        behind,
+        rate_ * passed / (passed + behind),
+        rate_,
+        std::max(0.1, std::floor(9.0 * rate_ * passed / (passed + behind)) / 10.0));
   }
 
   void wait_for(SimTime time) const {
@@ -92,6 +113,7 @@ class Pace {
 
  private:
   double rate_;
+  double next_trouble_ = 1.0;  ///< s behind.
   Clock::time_point start_ = Clock::now();
   SimTime from_;
 };
@@ -107,13 +129,29 @@ double parse_rate(const std::string& text) {
 }
 
 Scenario load_input(const FlyFlags& flags, const Executor& executor) {
-  if (fs::path(flags.input).extension() != ".pfmap") return load_scenario(flags.input);
-  log(fmt::format("looking for a way through {}", flags.input));
-  Scenario scenario =
-      make_scenario(flags.input, flags.input, "mid360", "quad_330", 60.0, 2.0, executor);
+  std::optional<Aabb> bounds;
+  if (!flags.start_in.empty()) bounds = box_from(flags.start_in, "--start-in");
+  if (fs::path(flags.input).extension() != ".pfmap") {
+    if (!flags.lidar.empty()) {
+      throw InputError("--lidar: is for a .pfmap; this scenario names its own (lidars)");
+    }
+    Scenario scenario = load_scenario(flags.input);
+    if (!flags.start.empty()) scenario.vehicles.front().start = Vector3d(flags.start.data());
+    if (bounds) warn_of_starts_outside(scenario, *bounds);
+    return scenario;
+  }
+  ScenarioWish wish;
+  wish.map_path = flags.input;
+  wish.map_key = flags.input;
+  wish.lidar = flags.lidar.empty() ? wish.lidar : flags.lidar;
+  if (!flags.start.empty()) wish.start = Vector3d(flags.start.data());
+  wish.bounds = bounds;
+  wish.mission = !flags.ros.is_live();  // there somebody else will say where to fly
+  if (wish.mission || !wish.start) log(fmt::format("looking for a way through {}", flags.input));
+  Scenario scenario = make_scenario(wish, executor);
   scenario.path.clear();
-  // somebody else will say where to fly
-  if (flags.ros.is_live()) scenario.vehicles.front().mission.waypoints.clear();
+  if (!wish.mission) scenario.vehicles.front().mission.waypoints.clear();
+  if (bounds) warn_of_starts_outside(scenario, *bounds);
   return scenario;
 }
 
@@ -275,7 +313,7 @@ int fly(const FlyFlags& flags) {
     for (LidarMount& mount : vehicle.lidars) mount.snapshot = mount.snapshot || flags.snapshot;
   }
   const auto map = scenario.open_map();
-  prepare_for_ros(flags.ros, scenario);
+  prepare_for_ros(flags.ros, rate, scenario);
   Simulation simulation(scenario, map, executor);
   warn_about(scenario, *map);
 
@@ -311,6 +349,9 @@ int fly(const FlyFlags& flags) {
       running = true;
     }
     if (ros.is_over()) simulation.interrupt();
+    if (flags.ros.lockstep <= 0.0) {
+      if (const auto trouble = pace.trouble(simulation.time())) log(*trouble);
+    }
     pace.wait_for(simulation.time());
     if (simulation.time().time_since_epoch() % std::chrono::milliseconds(100) == Duration{0}) {
       report(progress, "flying", to_seconds(simulation.time()) / to_seconds(simulation.end_time()));
@@ -337,6 +378,12 @@ void add_fly_command(CLI::App& parent, int& exit_code) {
   app->add_option("--rate",
                   flags->rate,
                   "Simulated seconds a second: 'max', or 1.0 for real time (the default with ROS)");
+  app->add_option("--lidar", flags->lidar, "Sensor for a .pfmap: a shipped one or a path (mid360)");
+  app->add_option("--start", flags->start, "x,y,z where the first vehicle starts, m")
+      ->delimiter(',')
+      ->expected(3)
+      ->check(within(-1e7, 1e7));
+  add_start_in_flag(*app, flags->start_in);
   app->add_option("--threads", flags->threads, "0: all cores; results never depend on it")
       ->check(CLI::Range(0, 1024));
   app->add_flag("--force", flags->force, "Write into a folder that is not empty");

@@ -26,6 +26,7 @@ struct ImportFlags {
   std::string output;
   double resolution = 0.0;
   double scale = 1.0;
+  std::vector<double> shift;
   std::string up = "z";
   double tau = 0.0;  ///< 0: by the density.
   std::string quality = "high";
@@ -101,6 +102,7 @@ void import_map(const ImportFlags& flags) {
   ImportOptions options;
   if (flags.resolution > 0.0) options.resolution = flags.resolution;
   options.scale = flags.scale;
+  if (!flags.shift.empty()) options.shift = Vector3d(flags.shift.data());
   options.up = flags.up.front();
   options.quality = flags.quality == "high" ? TreeQuality::kHigh : TreeQuality::kNormal;
   if (flags.tau > 0.0) options.tau = static_cast<float>(flags.tau);
@@ -137,6 +139,12 @@ void add_import(CLI::App& parent) {
                   flags->resolution,
                   "Voxel size r, m; without it the one that the points' spacing supports")
       ->check(within(1e-4, 1e4));
+  app->add_option("--shift",
+                  flags->shift,
+                  "x,y,z to add, m, after --scale and --up: many planners want the ground at z = 0")
+      ->delimiter(',')
+      ->expected(3)
+      ->check(within(-1e9, 1e9));
   app->add_option("--scale", flags->scale, "Metres per unit of the files")
       ->check(within(1e-9, 1e9))
       ->capture_default_str();

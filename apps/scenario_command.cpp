@@ -19,6 +19,8 @@
 #include "pointflight/sim/simulation.hpp"
 #include "pointflight/world/clearance.hpp"
 #include "pointflight/world/free_space.hpp"
+#include "ros_common/outputs.hpp"
+#include "ros_common/profile.hpp"
 
 namespace pointflight::apps {
 namespace {
@@ -33,6 +35,16 @@ Vector3d rounded(const Vector3d& v) {
   return {rounded(v.x()), rounded(v.y()), rounded(v.z())};
 }
 
+std::string words_for(const Aabb& box) {
+  return fmt::format("({:.1f}, {:.1f}, {:.1f}) and ({:.1f}, {:.1f}, {:.1f})",
+                     box.min.x(),
+                     box.min.y(),
+                     box.min.z(),
+                     box.max.x(),
+                     box.max.y(),
+                     box.max.z());
+}
+
 struct NewFlags {
   std::string map;
   std::string output;
@@ -40,6 +52,7 @@ struct NewFlags {
   std::string vehicle = "quad_330";
   double length = 60.0;
   double speed = 2.0;
+  std::vector<double> start_in;
 };
 
 void new_scenario(const NewFlags& flags) {
@@ -52,13 +65,15 @@ void new_scenario(const NewFlags& flags) {
     const fs::path relative = absolute.lexically_relative(folder);
     return relative.empty() ? absolute.string() : relative.string();
   };
-  Scenario scenario = make_scenario(flags.map,
-                                    from_folder(flags.map),
-                                    flags.lidar,
-                                    flags.vehicle,
-                                    flags.length,
-                                    flags.speed,
-                                    executor);
+  ScenarioWish wish;
+  wish.map_path = flags.map;
+  wish.map_key = from_folder(flags.map);
+  wish.lidar = flags.lidar;
+  wish.vehicle = flags.vehicle;
+  wish.length = flags.length;
+  wish.speed = flags.speed;
+  if (!flags.start_in.empty()) wish.bounds = box_from(flags.start_in, "--start-in");
+  Scenario scenario = make_scenario(wish, executor);
   VehicleSetup& vehicle = scenario.vehicles.front();
   for (std::string* model : {&vehicle.lidars.front().model, &vehicle.model}) {
     if (is_model_path(*model)) *model = from_folder(*model);
@@ -81,6 +96,9 @@ void check_scenario(const std::string& path) {
   const auto map = scenario.open_map();
   const Executor executor;
   const Simulation simulation(scenario, map, executor);
+  // whatever --ros1, --ros2 and --record will ask for
+  const RosProfile profile = profile_for(scenario);
+  output_streams(simulation, profile);
   warn_about(scenario, *map);
   fmt::print("{}: ready: {:.1f} s\n", path, to_seconds(simulation.end_time()));
   for (std::size_t v = 0; v < simulation.vehicle_count(); ++v) {
@@ -98,40 +116,45 @@ void check_scenario(const std::string& path) {
 
 }  // namespace
 
-Scenario make_scenario(const std::string& map_path,
-                       const std::string& map_key,
-                       const std::string& lidar,
-                       const std::string& vehicle,
-                       double length,
-                       double speed,
-                       const Executor& executor) {
-  const auto map = SurfelMap::open(map_path);
-  const VehicleSettings airframe = load_vehicle(vehicle);
-  load_lidar(lidar);  // an unknown sensor is said before the search
+Scenario make_scenario(const ScenarioWish& wish, const Executor& executor) {
+  const auto map = SurfelMap::open(wish.map_path);
+  const VehicleSettings airframe = load_vehicle(wish.vehicle);
+  load_lidar(wish.lidar);  // an unknown sensor is said before the search
+  Scenario scenario;
+  scenario.map = wish.map_key;
+  VehicleSetup& flown = scenario.vehicles.front();
+  flown.model = wish.vehicle;
+  flown.lidars.front().model = wish.lidar;
+  flown.mission.motion.speed = wish.speed;
+  if (wish.start && !wish.mission) {
+    flown.start = *wish.start;
+    return scenario;
+  }
   std::optional<Tour> tour;
   for (const double margin : {0.5, 0.3, 0.15}) {
     TourOptions options;
     options.radius = bounding_radius(airframe.hull());
     options.margin = margin;
-    options.length_min = length;
+    options.length_min = wish.length;
+    options.start = wish.start;
+    options.bounds = wish.bounds;
     auto found = find_tour(*map, options, executor);
     if (found && (!tour || found->length > 1.5 * tour->length)) tour = std::move(found);
-    if (tour && tour->length >= length) break;
+    if (tour && tour->length >= wish.length) break;
   }
   if (!tour) {
-    throw InputError(
-        fmt::format("{}: no free place for a vehicle of radius {:.2f} m was found; write start and "
-                    "mission.waypoints yourself",
-                    map_path,
-                    bounding_radius(airframe.hull())));
+    throw InputError(fmt::format(
+        "{}: no free place for a vehicle of radius {:.2f} m was found{}; write start and "
+        "mission.waypoints yourself",
+        wish.map_path,
+        bounding_radius(airframe.hull()),
+        wish.bounds ? fmt::format(" between {} (the map lies between {}; `map import "
+                                  "--shift` moves it)",
+                                  words_for(*wish.bounds),
+                                  words_for(map->bounds_world()))
+                    : std::string()));
   }
-  Scenario scenario;
-  scenario.map = map_key;
-  VehicleSetup& flown = scenario.vehicles.front();
-  flown.model = vehicle;
   flown.start = rounded(tour->points_world.front());
-  flown.lidars.front().model = lidar;
-  flown.mission.motion.speed = speed;
   for (std::size_t i = 1; i < tour->points_world.size(); ++i) {
     flown.mission.waypoints.push_back(rounded(tour->points_world[i]));
   }
@@ -163,6 +186,23 @@ void warn_about(const Scenario& scenario, const SurfelMap& map) {
   }
 }
 
+void warn_of_starts_outside(const Scenario& scenario, const Aabb& box) {
+  const auto fleet = scenario.fleet();
+  for (std::size_t v = 0; v < fleet.size(); ++v) {
+    const Vector3d& p = fleet[v].start;
+    if ((p - box.min).minCoeff() >= 0.0 && (box.max - p).minCoeff() >= 0.0) continue;
+    log(
+        fmt::format("{}: warning: {} starts at ({:.2f}, {:.2f}, {:.2f}), which is not between {}: "
+                    "the planner has no map there (--start-in)",
+                    scenario.place(scenario.vehicle_key(v, "start")),
+                    fleet[v].name,
+                    p.x(),
+                    p.y(),
+                    p.z(),
+                    words_for(box)));
+  }
+}
+
 void add_scenario_command(CLI::App& parent, int& /*exit_code*/) {
   auto* app = parent.add_subcommand("scenario", "Make and check scenario files");
   app->require_subcommand(1);
@@ -176,6 +216,7 @@ void add_scenario_command(CLI::App& parent, int& /*exit_code*/) {
       ->check(within(1.0, 1e5))
       ->capture_default_str();
   make->add_option("--speed", flags->speed, "m/s")->check(within(0.1, 30.0))->capture_default_str();
+  add_start_in_flag(*make, flags->start_in);
   make->callback([flags] { new_scenario(*flags); });
 
   auto* check = app->add_subcommand("check", "Read a scenario and say whether it can be flown");

@@ -108,7 +108,7 @@ class Import {
   [[nodiscard]] Vector3d to_world(const Vector3d& p) const {
     const Vector3d q = options_.scale * p;
     // y up to z up: a quarter turn about x
-    return options_.up == 'y' ? Vector3d(q.x(), -q.z(), q.y()) : q;
+    return (options_.up == 'y' ? Vector3d(q.x(), -q.z(), q.y()) : q) + options_.shift;
   }
 
   void choose_resolution() {
@@ -320,6 +320,9 @@ class Import {
     json["sources"] = report.sources;
     json["scale"] = options_.scale;
     json["up"] = std::string(1, options_.up);
+    if (!options_.shift.isZero(0.0)) {
+      json["shift"] = {options_.shift.x(), options_.shift.y(), options_.shift.z()};
+    }
     json["resolution"] = report.resolution;
     json["resolution_was_chosen"] = report.resolution_was_chosen;
     json["point_spacing"] = report.spacing;

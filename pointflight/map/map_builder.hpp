@@ -18,9 +18,10 @@
 namespace pointflight {
 
 struct ImportOptions {
-  std::optional<double> resolution;  ///< r, m; without it the one that the spacing supports.
-  double scale = 1.0;                ///< Metres per unit of the file.
-  char up = 'z';                     ///< The file's up axis: 'z', or 'y' (turned to z).
+  std::optional<double> resolution;   ///< r, m; without it the one that the spacing supports.
+  double scale = 1.0;                 ///< Metres per unit of the file.
+  char up = 'z';                      ///< The file's up axis: 'z', or 'y' (turned to z).
+  Vector3d shift = Vector3d::Zero();  ///< Added to each point, after scale and up, m.
   OutlierOptions outliers;
   TreeQuality quality = TreeQuality::kHigh;
   std::optional<float> tau;  ///< Coverage that makes a return; without it by the density.

@@ -23,8 +23,14 @@ class FreeSpaceGrid {
  public:
   FreeSpaceGrid(const SurfelMap& map, const TourOptions& options, const Executor& executor)
       : map_(map), options_(options) {
-    const Aabb& bounds = map.bounds_world();
-    const Vector3d extent = bounds.size();
+    Aabb bounds = map.bounds_world();
+    if (options.bounds) {
+      // with the ground below it
+      bounds.min =
+          bounds.min.cwiseMax(options.bounds->min - (kGroundMax + 1.0) * Vector3d::UnitZ());
+      bounds.max = bounds.max.cwiseMin(options.bounds->max);
+    }
+    const Vector3d extent = bounds.size().cwiseMax(kCellMin);
     cell_ = std::max(kCellMin, std::cbrt(extent.prod() / kCellsMax));
     for (std::size_t axis = 0; axis < 3; ++axis) {
       size_[axis] =
@@ -53,9 +59,14 @@ class FreeSpaceGrid {
       const bool height_ok = !near_ground || (ground_[i] >= static_cast<float>(kGroundMin) &&
                                               ground_[i] <= static_cast<float>(kGroundMax));
       ok[i] = distance_[i] > static_cast<float>(needed) && ground_[i] >= 0.0f &&
-              sides_[i] >= sides && height_ok;
+              sides_[i] >= sides && height_ok && is_inside(center(i));
     }
     return ok;
+  }
+
+  [[nodiscard]] bool is_inside(const Vector3d& p) const {
+    return !options_.bounds || ((p - options_.bounds->min).minCoeff() >= 0.0 &&
+                                (options_.bounds->max - p).minCoeff() >= 0.0);
   }
 
   /// The six neighbours inside the grid.

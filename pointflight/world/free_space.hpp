@@ -15,6 +15,7 @@ struct TourOptions {
   double margin = 0.4;            ///< Kept free beyond it, m.
   double length_min = 60.0;       ///< m
   std::optional<Vector3d> start;  ///< Else one is found.
+  std::optional<Aabb> bounds;     ///< Where to look, world, m; else all of the map.
 };
 
 /// A way through free space: straight legs that a vehicle can fly.

@@ -1,3 +1,4 @@
+#include <cstdio>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <vector>
@@ -110,6 +111,95 @@ TEST_F(Program, BadScenariosSayFileAndLine) {
   expect_user_error(check(map_line + "vehicle:\n  start: [12, 10, 0.3]\n"),
                     "s.yaml:3: vehicle.start");
   expect_user_error(check(map_line + "vehicle: [\n"), "not valid YAML");
+}
+
+TEST_F(Program, NamesThatNoRosTakesAreRefusedWithTheirLine) {
+  const TemporaryFolder folder;
+  const std::string yaml = folder / "s.yaml";
+  ASSERT_EQ(run(fmt::format("scenario new {} -o {} --length 5", map(), yaml)).code, 0);
+  const std::string text = read_file(yaml);
+  const auto from = text.find("start: [");
+  const auto start = text.substr(from, text.find(']', from) + 1 - from);
+  const auto check = [&](const std::string& vehicle, const std::string& ros, const char* words) {
+    write_file(
+        yaml,
+        fmt::format(
+            "map: {}\nvehicles:\n  - {{{}, name: {}}}\nros: {{{}}}\n", map(), start, vehicle, ros));
+    const Result result = run(fmt::format("scenario check {}", yaml));
+    if (*words == '\0') {
+      EXPECT_EQ(result.code, 0) << result.err;
+      return;
+    }
+    expect_user_error(result, words);
+    expect_contains(result.err, fmt::format("s.yaml:{}: ", ros.empty() ? 3 : 4));
+  };
+  check("uav_1", "", "");
+  check("uav-1", "", "'uav-1' is part of ROS topics (/uav-1/odom)");
+  check("a", "profile: nosuch", "not among the shipped ros_profiles");
+  check("a", "outputs: [{kind: odometry, topic: '/x y'}]", "'/x y' is no topic for ROS");
+  check("a", "outputs: [{kind: odometry, topic: '/a//b'}]", "has an empty part");
+  check("a", "outputs: [{kind: odometry, frame: /my-odom}]", "'/my-odom' is no frame for ROS");
+  check("a", "outputs: [{kind: odometry, frame: 'my odom'}]", "'my odom' is no frame for ROS");
+  check("a", "outputs: [{kind: cloud, layout: livos}]", "did you mean 'livox'?");
+  check("a", "inputs: [{kind: goal, topic: /go-al}]", "'/go-al' is no topic for ROS");
+  check("a", "inputs: [{kind: goal, topic: '/{vehicle}/goal'}]", "");
+  expect_user_error(run(fmt::format("fly {} --record {} --node 'a b'", yaml, folder / "a.mcap")),
+                    "--node: 'a b'");
+}
+
+TEST_F(Program, FallingBehindIsSaidWhileItHappens) {
+  const TemporaryFolder folder;
+  const std::string yaml = folder / "s.yaml";
+  ASSERT_EQ(run(fmt::format("scenario new {} -o {} --length 5", map(), yaml)).code, 0);
+  std::string text = read_file(yaml);
+  text.replace(text.find("duration: 0"), 11, "duration: 90000");
+  write_file(yaml, text);
+  // no machine flies a thousand seconds in one
+  const Result result =
+      run(fmt::format("fly {} -o {} --rate 1000", yaml, folder / "run"), "timeout -s INT 4");
+  expect_contains(result.err, "s behind: this machine manages a rate of");
+  expect_contains(result.err, ", not 1000; use fewer LiDARs");
+}
+
+TEST_F(Program, StartsWhereAPlannerCanPlan) {
+  const TemporaryFolder folder;
+  const std::string yaml = folder / "s.yaml";
+  const Result made = run(
+      fmt::format("scenario new {} -o {} --length 5 --start-in=2,2,0.5,20,18,1.7", map(), yaml));
+  ASSERT_EQ(made.code, 0) << made.err;
+  const std::string text = read_file(yaml);
+  double x = 0.0;
+  double y = 0.0;
+  double z = 0.0;
+  ASSERT_EQ(std::sscanf(text.c_str() + text.find("start: ["), "start: [%lf, %lf, %lf]", &x, &y, &z),
+            3);
+  EXPECT_TRUE(x >= 2 && x <= 20 && y >= 2 && y <= 18 && z >= 0.5 && z <= 1.7);
+  expect_user_error(
+      run(fmt::format("scenario new {} -o {} --start-in=2,2,90,20,18,95", map(), yaml)),
+      "`map import --shift` moves it");
+  expect_user_error(run(fmt::format("scenario new {} -o {} --start-in=2,2,3,20,18,2", map(), yaml)),
+                    "--start-in: is empty");
+  const Result outside =
+      run(fmt::format("fly {} -o {} --start-in=-9,-9,0,-8,-8,1 --seed 1", yaml, folder / "run"));
+  expect_contains(outside.err, "warning: drone0 starts at");
+  // the ground of a map at z = 0
+  const std::string moved = folder / "moved.pfmap";
+  ASSERT_EQ(
+      run(fmt::format("map import {} -o {} --resolution 0.1 --shift 100,-7,31", cloud(), moved))
+          .code,
+      0);
+  const auto corner = [](const std::string& map_file) {
+    const std::string info = run(fmt::format("map info {}", map_file)).out;
+    Vector3d low = Vector3d::Zero();
+    EXPECT_EQ(std::sscanf(info.c_str() + info.find("from ("),
+                          "from (%lf, %lf, %lf)",
+                          &low.x(),
+                          &low.y(),
+                          &low.z()),
+              3);
+    return low;
+  };
+  EXPECT_LT((corner(moved) - corner(map()) - Vector3d(100, -7, 31)).norm(), 0.3);  // cells
 }
 
 TEST_F(Program, EndsOneForAMissionCutShortAndForACollisionUnderStop) {

@@ -66,6 +66,25 @@ TEST(FreeSpace, FindsATourInsideTheRoomAndAroundItsWall) {
   EXPECT_EQ(again->points_world.back(), tour->points_world.back());
 }
 
+TEST(FreeSpace, StaysInItsBounds) {
+  // a hall with a mezzanine of more room above than below
+  ShapeScene scene;
+  scene.add_box({0, 0, 0}, {20, 10, 30});
+  scene.add_rectangle({0, 0, 4}, {20, 0, 0}, {0, 10, 0});
+  const auto map = map_of(scene, 0.1);
+  TourOptions options;
+  options.length_min = 10.0;
+  options.bounds = Aabb{{2, 1, 0.5}, {18, 9, 1.6}};
+  const auto tour = find_tour(*map, options, Executor(1));
+  ASSERT_TRUE(tour);
+  for (const Vector3d& p : tour->points_world) {
+    EXPECT_GE((p - options.bounds->min).minCoeff(), 0.0) << p.transpose();
+    EXPECT_GE((options.bounds->max - p).minCoeff(), 0.0) << p.transpose();
+  }
+  options.bounds = Aabb{{30, 0, 0}, {40, 10, 4}};
+  EXPECT_FALSE(find_tour(*map, options, Executor(1)));
+}
+
 TEST(FreeSpace, SaysWhenThereIsNone) {
   ShapeScene scene;
   scene.add_box({0, 0, 0}, {0.4, 0.4, 0.4});
