@@ -21,6 +21,7 @@ cmake -S "$ros/ament/pointflight_ros" -B "$folder/ament" -DCMAKE_INSTALL_PREFIX=
   { cat "$folder/log"; fail "the ament package does not build"; }
 for file in launch/fly.launch.py launch/fast_lio.launch.py launch/glim.launch.py \
     launch/kiss_icp.launch.py rviz/pointflight.rviz config/fast_lio_mid360.yaml \
+    config/fast_lio_avia.yaml config/fast_lio_velodyne.yaml config/fast_lio_ouster.yaml \
     config/glim/config_ros.json; do
   [ -f "$folder/ament_install/share/pointflight_ros/$file" ] || fail "ament: no $file"
 done
