@@ -89,7 +89,7 @@ void add_ros_flags(CLI::App& app, RosFlags& flags) {
   auto* stay = app.add_flag("--stay",
                             flags.stay,
                             "Hover when the mission is flown, until interrupted (the default with "
-                            "ROS in real time, but with --lockstep or a duration)");
+                            "ROS in real time, unless --lockstep or a duration is given)");
   app.add_flag("--no-stay", flags.no_stay, "End when the mission is flown")->excludes(stay);
   app.add_option("--lockstep",
                  flags.lockstep,

@@ -583,8 +583,6 @@ class Ros1Test(unittest.TestCase):
 
     def test_ctrl_c_ends_beside_a_master_that_has_stopped(self):
         """Before it was found, and while the flight goes on."""
-        from rosgraph_msgs.msg import Clock
-
         for found in (True, False):
             port = free_port()
             uri = f"http://127.0.0.1:{port}"

@@ -64,7 +64,7 @@ def check_extrinsics(values):
     need([float(v) for v in rotation] == [1, 0, 0, 0, 1, 0, 0, 0, 1], "extrinsic_R")
 
 
-F32, F64, U8, U16, U32 = 7, 8, 2, 4, 6
+F32, U8, U16, U32 = 7, 2, 4, 6  # of sensor_msgs/PointField
 FIELDS = {
     2: {"x": F32, "y": F32, "z": F32, "intensity": F32, "time": F32, "ring": U16},
     3: {"x": F32, "y": F32, "z": F32, "intensity": F32, "t": U32, "reflectivity": U16, "ring": U8,

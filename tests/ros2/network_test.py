@@ -22,6 +22,7 @@ import time
 DOMAIN = 17
 BASE = 7400 + 250 * DOMAIN
 HOSTS = {"drone": "10.99.0.1", "left": "10.99.0.2", "right": "10.99.0.3"}
+HERTZ = {"odometry": 200, "imu": 200, "cloud": 10}
 SKIPPED = 77
 
 
@@ -136,14 +137,10 @@ def junk(packets, address):
     print(f"{packets} packets of junk, made of {len(heard)} that were heard")
 
 
-def pieces(name):
-    """Messages a second of a topic by its stamps: whole is 1."""
-    return {"odometry": 200, "imu": 200, "cloud": 10}[name]
-
-
 def share(counted, name):
+    """Of the messages between the first and the last, by their stamps: 1 where none is missing."""
     count, seconds, _ = counted[name]
-    return (count - 1) / (seconds * pieces(name)) if seconds > 0 else 0.0
+    return (count - 1) / (seconds * HERTZ[name]) if seconds > 0 else 0.0
 
 
 def main():
@@ -205,7 +202,7 @@ def main():
         for node in stay:
             counted = node.leave()
             print(node.kind, "stayed:", ", ".join(
-                f"{name} {pieces(name) * share(counted, name):.2f} Hz" for name in counted))
+                f"{name} {HERTZ[name] * share(counted, name):.2f} Hz" for name in counted))
             for name in ("odometry", "imu", "cloud"):
                 check(share(counted, name) > 0.98, f"{node.kind}: {name} {counted[name]}")
         alive()
@@ -225,7 +222,7 @@ def main():
         for node in after:
             counted = node.leave()
             print(node.kind, "after junk:", ", ".join(
-                f"{name} {pieces(name) * share(counted, name):.2f} Hz" for name in counted))
+                f"{name} {HERTZ[name] * share(counted, name):.2f} Hz" for name in counted))
             for name in ("odometry", "cloud"):
                 check(counted[name][0] > 20, f"{node.kind} after junk: {counted}")
         alive()
