@@ -31,4 +31,15 @@ class MappedFile {
   std::size_t size_ = 0;
 };
 
+/// From now on a mapped file that another program cuts short does not end the process (SIGBUS): its
+/// missing bytes read as zeros, and `throw_if_mapped_file_was_cut` says so. For a program's
+/// `main`: the handler of SIGBUS is the process's.
+void survive_cut_files();
+
+/// Throws InputError where a mapped file of this process was cut short while it was read, as long
+/// as that is open, and once after that if nobody was told. Loops and
+/// outputs ask (`Executor::parallel_for`, `OutputFile::commit`), so that nothing is kept of what
+/// was made from zeros.
+void throw_if_mapped_file_was_cut();
+
 }  // namespace pointflight

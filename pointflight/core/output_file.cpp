@@ -1,6 +1,7 @@
 #include "pointflight/core/output_file.hpp"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <cerrno>
 #include <filesystem>
@@ -8,6 +9,8 @@
 #include <utility>
 
 #include "pointflight/core/input_error.hpp"
+#include "pointflight/core/locked_file.hpp"
+#include "pointflight/core/mapped_file.hpp"
 
 namespace pointflight {
 
@@ -21,15 +24,16 @@ OutputFile::OutputFile(std::string path)
     throw InputError(
         fmt::format("{}: is there and is not a regular file; give the path of a file", path_));
   }
-  file_ = std::fopen(partial_path_.c_str(), "wbe");
+  file_ = ::fdopen(open_locked(partial_path_, path_), "wb");
   if (file_ == nullptr) fail(errno);
   std::setvbuf(file_, buffer_.data(), _IOFBF, buffer_.size());
 }
 
 OutputFile::~OutputFile() {
   if (file_ == nullptr) return;
-  std::fclose(file_);
+  // while it is still ours
   std::remove(partial_path_.c_str());
+  std::fclose(file_);
 }
 
 OutputFile::OutputFile(OutputFile&& other) noexcept
@@ -47,18 +51,16 @@ void OutputFile::write(std::string_view text) {
 }
 
 void OutputFile::commit() {
+  throw_if_mapped_file_was_cut();
   if (std::fflush(file_) != 0) fail(errno);
-  const int closed = std::fclose(std::exchange(file_, nullptr));
-  if (closed != 0 || std::rename(partial_path_.c_str(), path_.c_str()) != 0) {
-    const int error = errno;
-    std::remove(partial_path_.c_str());
-    fail(error);
-  }
+  // some file systems say only here that they have no room; the lock stays with `file_`
+  if (::close(::dup(::fileno(file_))) != 0) fail(errno);
+  if (std::rename(partial_path_.c_str(), path_.c_str()) != 0) fail(errno);
+  std::fclose(std::exchange(file_, nullptr));
 }
 
 void OutputFile::fail(int error) const {
-  throw InputError(fmt::format(
-      "{}: cannot write: {}; choose another place", path_, std::generic_category().message(error)));
+  throw InputError(fmt::format("{}: cannot write: {}", path_, write_error_text(error)));
 }
 
 }  // namespace pointflight

@@ -11,9 +11,10 @@ namespace pointflight {
 
 /// A file that appears under its name only when it is complete.
 ///
-/// Bytes go to `<path>.partial`, which `commit()` renames. Without `commit()` (an exception, an
-/// interrupt) the partial file is removed. Every failed write throws InputError with the path and
-/// the system's reason (disk full, no permission, ...).
+/// Bytes go to `<path>.partial`, which is locked and which `commit()` renames. Without `commit()`
+/// (an exception, an interrupt) the partial file is removed. Every failed write throws InputError
+/// with the path and the system's reason (disk full, no permission, ...), and so does `commit()`
+/// where a file that was read has been cut short meanwhile (core/mapped_file.hpp).
 class OutputFile {
  public:
   explicit OutputFile(std::string path);

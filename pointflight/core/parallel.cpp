@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <thread>
 
+#include "pointflight/core/mapped_file.hpp"
+
 #ifdef POINTFLIGHT_HAS_TBB
 #include <oneapi/tbb/global_control.h>
 #include <oneapi/tbb/info.h>
@@ -38,9 +40,10 @@ void Executor::parallel_for(std::size_t count,
   const auto run_chunk = [&](std::size_t i) { body(i * chunk, std::min(count, (i + 1) * chunk)); };
   if (threads_ == 1 || chunks <= 1) {
     for (std::size_t i = 0; i < chunks; ++i) run_chunk(i);
-    return;
+  } else {
+    arena_->arena.execute([&] { tbb::parallel_for(std::size_t{0}, chunks, run_chunk); });
   }
-  arena_->arena.execute([&] { tbb::parallel_for(std::size_t{0}, chunks, run_chunk); });
+  throw_if_mapped_file_was_cut();
 }
 
 #else
@@ -75,6 +78,7 @@ void Executor::parallel_for(std::size_t count,
     work();
   }
   if (error) std::rethrow_exception(error);
+  throw_if_mapped_file_was_cut();
 }
 
 #endif

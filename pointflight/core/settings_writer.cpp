@@ -60,7 +60,11 @@ void SettingsWriter::value(const Key& key, std::string& value) {
   std::string quoted = "\"";
   for (const char c : value) {
     if (c == '"' || c == '\\') quoted += '\\';
-    quoted += c;
+    if (c == '\n') {
+      quoted += "\\n";  // else YAML folds lines
+    } else {
+      quoted += c;
+    }
   }
   line(key, plain ? value : quoted + "\"");
 }

@@ -13,6 +13,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstring>
+#include <memory>
 
 #include "pointflight/map/children-inl.hpp"
 #include "pointflight/render/hit_rule-inl.hpp"
@@ -227,7 +228,9 @@ static std::uint64_t trace_singly(const KernelMap& map,
     for (std::size_t i = 0; i < count; ++i) hits[order[i]] = {};
     return 0;
   }
-  RayState states[kInFlight];  // NOLINT(cppcoreguidelines-pro-type-member-init): by start_ray
+  // 130 KB, too large for the small stacks that some shells and embedding programs give; filled by
+  // start_ray
+  thread_local const auto states = std::make_unique_for_overwrite<RayState[]>(kInFlight);
   RayState* active[kInFlight];
   std::uint32_t entered[kInFlight];
   std::size_t flying = 0;

@@ -10,6 +10,8 @@
 #define POINTFLIGHT_RENDER_BEAM_PACKETS_INL_HPP
 #endif
 
+#include <memory>
+
 #include "pointflight/render/packet-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
@@ -414,7 +416,10 @@ static std::uint64_t trace(const KernelMap& map,
   if (grouping != BeamGrouping::kAsSuits || map.node_count == 0) {
     return trace_singly(map, rays, order, count, hits);
   }
-  Packet packet;  // NOLINT(cppcoreguidelines-pro-type-member-init): by take_beams and set_up
+  // 80 KB, too large for the small stacks that some shells and embedding programs give; filled by
+  // take_beams and set_up
+  thread_local const auto room = std::make_unique_for_overwrite<Packet>();
+  Packet& packet = *room;
   if (!is_dense(map, rays, order, count, packet)) {
     return trace_singly(map, rays, order, count, hits);
   }

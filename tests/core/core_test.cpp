@@ -2,10 +2,14 @@
 
 #include <atomic>
 #include <cmath>
+#include <filesystem>
+#include <optional>
 #include <stdexcept>
+#include <string>
 #include <vector>
 
 #include "pointflight/core/constants.hpp"
+#include "pointflight/core/mapped_file.hpp"
 #include "pointflight/core/math.hpp"
 #include "pointflight/core/output_file.hpp"
 #include "pointflight/core/parallel.hpp"
@@ -18,7 +22,9 @@ namespace {
 
 using testing::error_of;
 using testing::expect_contains;
+using testing::read_file;
 using testing::TemporaryFolder;
+using testing::write_file;
 
 TEST(Schedule, RatesThatDoNotDivideASecondDoNotDrift) {
   const Schedule thirty(30.0);
@@ -126,6 +132,56 @@ TEST(OutputFile, AppearsOnlyWhenCommitted) {
   file.write("text");
   file.commit();
   EXPECT_EQ(testing::read_file(folder / "a.txt"), "text");
+}
+
+TEST(OutputFile, OneWriterAtATime) {
+  const TemporaryFolder folder;
+  std::optional<OutputFile> first(folder / "a.txt");
+  first->write("first");
+  EXPECT_NE(error_of([&] { OutputFile(folder / "a.txt"); }).find("is being written"),
+            std::string::npos);
+  EXPECT_NE(error_of([&] { OutputFile(folder.path() + "/./a.txt"); }).find("is being written"),
+            std::string::npos);
+  first->commit();
+  OutputFile second(folder / "a.txt");  // what was committed is nobody's any more
+  second.write("second");
+  second.commit();
+  EXPECT_EQ(read_file(folder / "a.txt"), "second");
+}
+
+TEST(MappedFile, ReadsZerosWhereItWasCutShortAndSaysSo) {
+  const TemporaryFolder folder;
+  survive_cut_files();
+  write_file(folder / "a", std::string(5 * 4096, 'x'));
+  {
+    const MappedFile file(folder / "a");
+    EXPECT_EQ(file.bytes()[4 * 4096], std::byte{'x'});
+    std::filesystem::resize_file(folder / "a", 2 * 4096);
+    throw_if_mapped_file_was_cut();  // nobody has missed anything yet
+    EXPECT_EQ(file.bytes()[4096], std::byte{'x'});
+    EXPECT_EQ(file.bytes()[3 * 4096 + 5], std::byte{0});
+    const Executor executor;
+    for (const std::string& error :
+         {error_of([] { throw_if_mapped_file_was_cut(); }),
+          error_of([&] { executor.parallel_for(4, 1, [](std::size_t, std::size_t) {}); }),
+          error_of([&] {
+            OutputFile output(folder / "b");
+            output.commit();
+          })}) {
+      EXPECT_NE(error.find("/a: was cut short by another program"), std::string::npos) << error;
+    }
+    EXPECT_FALSE(std::filesystem::exists(folder / "b"));
+  }
+  throw_if_mapped_file_was_cut();  // it was told
+  write_file(folder / "a", std::string(5 * 4096, 'x'));
+  {
+    const MappedFile file(folder / "a");
+    std::filesystem::resize_file(folder / "a", 0);
+    EXPECT_EQ(file.bytes()[0], std::byte{0});
+  }
+  EXPECT_NE(error_of([] { throw_if_mapped_file_was_cut(); }).find("/a: was cut short"),
+            std::string::npos);
+  throw_if_mapped_file_was_cut();
 }
 
 TEST(OutputFile, SaysWhereAndWhyItCannotWrite) {
