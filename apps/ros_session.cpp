@@ -13,6 +13,7 @@
 #include "apps/modules.hpp"
 #include "apps/terminal.hpp"
 #include "pointflight/core/input_error.hpp"
+#include "pointflight/core/locked_file.hpp"
 #include "pointflight/core/mapped_file.hpp"
 #include "recording/mcap_writer.hpp"
 #include "ros_common/ros_names.hpp"
@@ -133,27 +134,7 @@ RosSession::RosSession(const RosFlags& flags, Simulation& simulation)
   const RosProfile profile = profile_for(scenario, flags.profile);
   const Duration epoch = epoch_of(flags, scenario, profile);
   bridge_ = std::make_unique<RosBridge>(simulation, profile, epoch);
-  for (const std::string& path : flags.records) {
-    if (std::find(paths_.begin(), paths_.end(), path) != paths_.end()) {
-      throw InputError(fmt::format("--record: {} is given twice", path));
-    }
-    const std::string extension = fs::path(path).extension().string();
-    if (extension == ".mcap") {
-      McapOptions options;
-      options.compression = flags.compression;
-      auto writer = std::make_unique<McapWriter>(path, options);
-      writer->attach("scenario.yaml", "application/yaml", text_of(scenario), epoch.count());
-      recordings_.push_back(std::move(writer));
-    } else if (extension == ".bag") {
-      // bags know no zstd
-      const std::string compression = flags.compression == "zstd" ? "lz4" : flags.compression;
-      recordings_.push_back(ros1_module().bag_writer(path, compression));
-    } else {
-      throw InputError(fmt::format("--record: {}: give a name that ends in .mcap or .bag", path));
-    }
-    paths_.push_back(path);
-    bridge_->add(*recordings_.back());
-  }
+  for (const std::string& path : flags.records) open_recording(path, epoch);
   TransportOptions options;
   options.node = flags.node;
   options.log = [](const std::string& text) { log(text); };
@@ -171,6 +152,49 @@ RosSession::RosSession(const RosFlags& flags, Simulation& simulation)
   splitter_ = std::make_unique<SampleSplitter>();
   splitter_->add(*bridge_);
   splitter_->add(*scans_);
+}
+
+void RosSession::open_recording(const std::string& path, Duration epoch) {
+  const bool is_mcap = fs::path(path).extension() == ".mcap";
+  if (!is_mcap && fs::path(path).extension() != ".bag") {
+    throw InputError(fmt::format("--record: {}: give a name that ends in .mcap or .bag", path));
+  }
+  for (const auto& other : recordings_) {
+    if (fs::weakly_canonical(other->path()) == fs::weakly_canonical(path)) {
+      throw InputError(fmt::format("--record: {} is given twice", path));
+    }
+  }
+  check_recording({path, flags_.overwrite});
+  if (is_mcap) {
+    McapOptions options;
+    options.compression = flags_.compression;
+    auto writer = std::make_unique<McapWriter>(path, options);
+    writer->attach(
+        "scenario.yaml", "application/yaml", text_of(simulation_.scenario()), epoch.count());
+    recordings_.push_back(std::make_unique<Recording>(path, std::move(writer)));
+  } else {
+    const Ros1Module& ros1 = ros1_module();
+    // rosbag itself knows of no locks
+    const int lock = open_locked(path + ".active", path + ".active");
+    // bags know no zstd
+    const std::string compression = flags_.compression == "zstd" ? "lz4" : flags_.compression;
+    recordings_.push_back(
+        std::make_unique<Recording>(path, ros1.bag_writer(path, compression), lock));
+  }
+  bridge_->add(*recordings_.back());
+}
+
+void RosSession::say_failed_recordings() {
+  for (const auto& recording : recordings_) {
+    if (const auto why = recording->take_failure()) {
+      log(fmt::format("warning: the recording ends here: {}", *why));
+    }
+  }
+}
+
+std::size_t RosSession::failed_recordings() const {
+  return static_cast<std::size_t>(std::count_if(
+      recordings_.begin(), recordings_.end(), [](const auto& r) { return r->has_failed(); }));
 }
 
 RosSession::~RosSession() {
@@ -253,6 +277,7 @@ RosSession::Next RosSession::after_step(double took) {
     if (step_once_ && scans_->scans > scans_->answered) step_once_ = false;
     scans_->answered = scans_->scans;
   }
+  say_failed_recordings();
   take_orders();
   if (std::exchange(reset_, false)) return Next::kReset;
   if (!paused_ || step_once_) return Next::kStep;
@@ -326,11 +351,14 @@ void RosSession::was_reset(SimTime reached) {
 }
 
 void RosSession::close() {
-  for (std::size_t i = 0; i < recordings_.size(); ++i) {
-    recordings_[i]->close();
-    log(fmt::format(
-        "recorded {}, {:.1f} MB", paths_[i], 1e-6 * static_cast<double>(fs::file_size(paths_[i]))));
+  for (const auto& recording : recordings_) {
+    recording->close();
+    if (recording->has_failed()) continue;
+    log(fmt::format("recorded {}, {:.1f} MB",
+                    recording->path(),
+                    1e-6 * static_cast<double>(fs::file_size(recording->path()))));
   }
+  say_failed_recordings();
   close_transports();
   for (const auto& transport : transports_) {
     if (const std::string why = transport->failure(); !why.empty()) log(why);

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "recording/recording.hpp"
 #include "ros_common/bridge.hpp"
 #include "ros_common/inputs.hpp"
 
@@ -26,6 +27,7 @@ struct RosFlags {
   double lockstep = 0.0;             ///< Wait so long for an answer to each scan, s; 0: not at all.
   std::vector<std::string> records;  ///< Files.
   std::string compression = "zstd";
+  bool overwrite = false;  ///< Recordings that are there already.
 
   /// Somebody outside may listen and command.
   [[nodiscard]] bool is_live() const { return ros1 || ros2; }
@@ -71,8 +73,13 @@ class RosSession {
   /// Recordings get their names; says what was recorded, how late scans left, what went wrong.
   void close();
 
+  /// Recordings that could not be written to their end; it was said.
+  [[nodiscard]] std::size_t failed_recordings() const;
+
  private:
   class ScanCount;
+  void open_recording(const std::string& path, Duration epoch);
+  void say_failed_recordings();
   void close_transports();
   bool wait_for_planner();
   void take_orders();
@@ -81,8 +88,7 @@ class RosSession {
 
   RosFlags flags_;
   Simulation& simulation_;
-  std::vector<std::string> paths_;
-  std::vector<std::unique_ptr<Outlet>> recordings_;
+  std::vector<std::unique_ptr<Recording>> recordings_;
   std::unique_ptr<Inbox> inbox_;  ///< Outlives the transports, whose threads fill it.
   std::vector<std::unique_ptr<Transport>> transports_;
   std::unique_ptr<RosBridge> bridge_;

@@ -1,17 +1,20 @@
 #include "recording/active_file.hpp"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <cerrno>
 #include <filesystem>
 #include <system_error>
+#include <utility>
 
 #include "pointflight/core/input_error.hpp"
+#include "pointflight/core/locked_file.hpp"
 
 namespace pointflight {
 
 ActiveFile::ActiveFile(std::string path) : path_(std::move(path)), active_path_(path_ + ".active") {
-  file_ = std::fopen(active_path_.c_str(), "wb");
+  file_ = ::fdopen(open_locked(active_path_, active_path_), "wb");
   if (file_ == nullptr) {
     throw InputError(fmt::format(
         "{}: cannot be written: {}", active_path_, std::generic_category().message(errno)));
@@ -20,6 +23,12 @@ ActiveFile::ActiveFile(std::string path) : path_(std::move(path)), active_path_(
 
 ActiveFile::~ActiveFile() {
   if (file_ != nullptr) std::fclose(file_);
+}
+
+void ActiveFile::discard() {
+  std::remove(active_path_.c_str());
+  if (file_ != nullptr) std::fclose(file_);
+  file_ = nullptr;
 }
 
 void ActiveFile::fail(int error) {
@@ -43,11 +52,11 @@ void ActiveFile::flush() {
 void ActiveFile::commit() {
   if (file_ == nullptr) return;
   flush();
-  std::FILE* file = file_;
-  file_ = nullptr;
-  if (std::fclose(file) != 0) fail(errno);
+  // some file systems say only here that they have no room; the lock stays with `file_`
+  if (::close(::dup(::fileno(file_))) != 0) fail(errno);
   std::error_code error;
   std::filesystem::rename(active_path_, path_, error);
+  std::fclose(std::exchange(file_, nullptr));
   if (error) {
     throw InputError(
         fmt::format("{}: cannot be renamed to {}: {}", active_path_, path_, error.message()));

@@ -8,9 +8,9 @@
 
 namespace pointflight {
 
-/// A recording that grows: `NAME.active` until it is complete, then `NAME`. What was flushed stays
-/// readable whatever happens to the program; nothing is ever removed. A failed write throws
-/// InputError with the path and the system's reason.
+/// A recording that grows: `NAME.active`, locked, until it is complete, then `NAME`. What was
+/// flushed stays readable whatever happens to the program. A failed write throws InputError with
+/// the path and the system's reason.
 class ActiveFile {
  public:
   explicit ActiveFile(std::string path);
@@ -22,6 +22,8 @@ class ActiveFile {
   void flush();
   /// Closes it and gives it its name.
   void commit();
+  /// Takes it away: nothing of worth is in it yet.
+  void discard();
 
   [[nodiscard]] std::uint64_t size() const { return size_; }
   [[nodiscard]] const std::string& path() const { return path_; }

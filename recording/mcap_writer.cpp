@@ -70,11 +70,16 @@ McapWriter::McapWriter(const std::string& path, const McapOptions& options)
     throw InputError(
         fmt::format("compression '{}' is unknown; zstd, lz4 or none", options_.compression));
   }
-  file_.write(std::as_bytes(std::span(mcap::kMagic)));
-  RecordWriter header;
-  header.text("ros2").text(fmt::format("pointflight {}", kVersion));
-  write_record(Opcode::kHeader, header.bytes());
-  file_.flush();
+  try {
+    file_.write(std::as_bytes(std::span(mcap::kMagic)));
+    RecordWriter header;
+    header.text("ros2").text(fmt::format("pointflight {}", kVersion));
+    write_record(Opcode::kHeader, header.bytes());
+    file_.flush();
+  } catch (const InputError&) {
+    file_.discard();
+    throw;
+  }
 }
 
 McapWriter::~McapWriter() {

@@ -21,6 +21,8 @@ class BagWriter : public Outlet {
     try {
       bag_->open(active_, rosbag::bagmode::Write);
     } catch (const rosbag::BagException& error) {
+      give_up();
+      std::remove(active_.c_str());
       throw std::runtime_error(active_ + ": cannot be written: " + error.what());
     }
     bag_->setCompression(compression == "lz4"   ? rosbag::compression::LZ4
