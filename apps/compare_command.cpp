@@ -11,6 +11,7 @@
 
 #include "apps/commands.hpp"
 #include "apps/error_picture.hpp"
+#include "apps/flags.hpp"
 #include "apps/terminal.hpp"
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/fidelity/scan_comparison.hpp"
@@ -26,6 +27,7 @@ struct CompareFlags {
   std::string renderer = "beam";
   bool floor = false;
   std::string png;
+  bool force = false;
   bool json = false;
   int threads = 0;
 };
@@ -91,11 +93,7 @@ ErrorCollector compare_floor(const std::vector<RealScan>& scans,
 }
 
 void compare(const CompareFlags& flags) {
-  if (!flags.png.empty()) {
-    std::error_code error;
-    std::filesystem::create_directories(flags.png, error);
-    if (error) throw InputError(fmt::format("{}: {}", flags.png, error.message()));
-  }
+  if (!flags.png.empty()) make_picture_folder(flags.png, flags.force);
   const Executor executor(flags.threads);
   const auto map = SurfelMap::open(flags.map);
   const auto scans = read_real_scans(flags.scans, flags.poses);
@@ -169,6 +167,7 @@ void add_compare_command(CLI::App& parent, int& /*exit_code*/) {
                 flags->floor,
                 "Also each scan against the local planes of the others: what the data allow");
   app->add_option("--png", flags->png, "Folder for a picture of each scan's errors");
+  add_force_flag(*app, flags->force);
   app->add_flag("--json", flags->json, "JSON on stdout");
   app->add_option("--threads", flags->threads, "0: all cores")->check(CLI::Range(0, 1024));
   app->callback([flags] { compare(*flags); });

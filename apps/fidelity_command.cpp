@@ -36,6 +36,7 @@ struct FidelityFlags {
   std::uint64_t seed = 1;
   bool json = false;
   std::string png;
+  bool force = false;
   int threads = 0;
 };
 
@@ -212,11 +213,7 @@ void run_scene(const ExactScene& scene,
 
 void fidelity(const FidelityFlags& flags) {
   const Executor executor(flags.threads);
-  if (!flags.png.empty()) {
-    std::error_code error;
-    std::filesystem::create_directories(flags.png, error);
-    if (error) throw InputError(fmt::format("{}: {}", flags.png, error.message()));
-  }
+  if (!flags.png.empty()) make_picture_folder(flags.png, flags.force);
   std::vector<ExactScene> scenes;
   for (const std::string& name : flags.scenes) scenes.push_back(load_scene(name));
   nlohmann::ordered_json cases = nlohmann::ordered_json::array();
@@ -281,6 +278,7 @@ void add_fidelity_command(CLI::App& parent, int& /*exit_code*/) {
       ->capture_default_str();
   app->add_flag("--json", flags->json, "JSON on stdout");
   app->add_option("--png", flags->png, "Folder for pictures of where the errors sit");
+  add_force_flag(*app, flags->force);
   app->add_option("--threads", flags->threads, "0: all cores")->check(CLI::Range(0, 1024));
   app->footer(scene_help());
   app->callback([flags] {

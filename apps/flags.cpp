@@ -19,6 +19,37 @@ CLI::Validator within(double min, double max) {
   return {check, fmt::format("in [{} - {}]", min, max)};
 }
 
+void add_force_flag(CLI::App& app, bool& force) {
+  app.add_flag("--force", force, "Replace outputs that are there already");
+}
+
+void refuse_to_overwrite(const std::string& output, bool force) {
+  if (output.empty()) return;
+  std::error_code ignored;
+  const auto status = std::filesystem::status(output, ignored);
+  if (!std::filesystem::exists(status)) return;
+  if (!std::filesystem::is_regular_file(status)) {
+    throw InputError(
+        fmt::format("{}: is there and is not a regular file; give the path of a file", output));
+  }
+  if (!force) {
+    throw InputError(fmt::format("{}: is there already; give another name or --force", output));
+  }
+}
+
+void make_picture_folder(const std::string& folder, bool force) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (std::error_code ignored; !std::filesystem::is_directory(folder, ignored)) {
+    throw InputError(fmt::format(
+        "{}: cannot make the folder: {}", folder, error ? error.message() : "is a file"));
+  }
+  if (!force && !std::filesystem::is_empty(folder, error)) {
+    throw InputError(
+        fmt::format("{}: is not empty; choose another folder or give --force", folder));
+  }
+}
+
 void refuse_same_file(const std::string& output, const std::string& input) {
   std::error_code ignored;
   if (output == input || std::filesystem::equivalent(output, input, ignored)) {

@@ -15,6 +15,17 @@ CLI::Validator within(double min, double max);
 void add_start_in_flag(CLI::App& app, std::vector<double>& numbers);
 Aabb box_from(const std::vector<double>& numbers, const std::string& flag);
 
+/// --force: outputs may replace what is there.
+void add_force_flag(CLI::App& app, bool& force);
+
+/// Throws InputError where an output is there already, unless it may be replaced. An empty name is
+/// no output.
+void refuse_to_overwrite(const std::string& output, bool force);
+
+/// Makes a folder for a command's pictures. Throws InputError where it cannot be made, or where it
+/// holds anything that may not be replaced.
+void make_picture_folder(const std::string& folder, bool force);
+
 /// Throws InputError where both names mean one file.
 void refuse_same_file(const std::string& output, const std::string& input);
 

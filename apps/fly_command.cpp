@@ -5,6 +5,7 @@
 #include <CLI/Formatter.hpp>
 #include <chrono>
 #include <cmath>
+#include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -21,6 +22,7 @@
 #include "pointflight/core/output_file.hpp"
 #include "pointflight/core/resources.hpp"
 #include "pointflight/sim/flight_recorder.hpp"
+#include "pointflight/sim/start_check.hpp"
 
 namespace pointflight::apps {
 namespace {
@@ -32,13 +34,19 @@ struct FlyFlags {
   std::string input;
   std::string output;
   std::string rate;  ///< Empty: real time with ROS, else as fast as it goes.
+  std::string map;   ///< Instead of the scenario's.
   std::int64_t seed = -1;
-  std::string lidar;             ///< Of a scenario made up for a map.
-  std::vector<double> start;     ///< x, y, z
-  std::vector<double> start_in;  ///< A box.
+  std::string lidar;
+  std::string vehicle;
+  std::vector<double> start;         ///< x, y, z
+  std::vector<double> start_in;      ///< A box.
+  std::vector<std::string> mission;  ///< "x,y,z" each.
+  double duration = -1.0;            ///< s
   int threads = 0;
   bool force = false;
   bool snapshot = false;
+  bool no_scans = false;
+  bool json = false;
   RosFlags ros;
 };
 
@@ -118,6 +126,10 @@ class Pace {
   SimTime from_;
 };
 
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
 double parse_rate(const std::string& text) {
   if (text == "max") return 0.0;
   char* end = nullptr;
@@ -128,33 +140,90 @@ double parse_rate(const std::string& text) {
   return rate;
 }
 
-Scenario load_input(const FlyFlags& flags, const Executor& executor) {
-  std::optional<Aabb> bounds;
-  if (!flags.start_in.empty()) bounds = box_from(flags.start_in, "--start-in");
-  if (fs::path(flags.input).extension() != ".pfmap") {
-    if (!flags.lidar.empty()) {
-      throw InputError("--lidar: is for a .pfmap; this scenario names its own (lidars)");
+std::vector<Vector3d> waypoints_from(const std::vector<std::string>& words) {
+  std::vector<Vector3d> waypoints;
+  for (const std::string& word : words) {
+    Vector3d p;
+    int end = 0;
+    const bool three = std::sscanf(  // NOLINT(cert-err34-c): all of it is looked at below
+                           word.c_str(),
+                           "%lf,%lf,%lf%n",
+                           &p.x(),
+                           &p.y(),
+                           &p.z(),
+                           &end) == 3;
+    if (!three || static_cast<std::size_t>(end) != word.size() || !(p.norm() < 1e7)) {
+      throw InputError(
+          fmt::format("--mission: '{}'; waypoints x,y,z in metres, such as 10,4,2 20,4,2", word));
     }
-    Scenario scenario = load_scenario(flags.input);
-    if (!flags.start.empty()) scenario.vehicles.front().start = Vector3d(flags.start.data());
-    if (bounds) warn_of_starts_outside(scenario, *bounds);
-    return scenario;
+    waypoints.push_back(p);
   }
+  return waypoints;
+}
+
+/// A scenario made up for a map.
+Scenario scenario_for_map(const FlyFlags& flags,
+                          const std::optional<Aabb>& bounds,
+                          const Executor& executor) {
   ScenarioWish wish;
   wish.map_path = flags.input;
   wish.map_key = flags.input;
-  wish.lidar = flags.lidar.empty() ? wish.lidar : flags.lidar;
+  if (!flags.lidar.empty()) wish.lidar = flags.lidar;
+  if (!flags.vehicle.empty()) wish.vehicle = flags.vehicle;
   if (!flags.start.empty()) wish.start = Vector3d(flags.start.data());
   wish.bounds = bounds;
-  wish.mission = !flags.ros.is_live();  // there somebody else will say where to fly
+  // with ROS somebody else will say where to fly
+  wish.mission = !flags.ros.is_live() && flags.mission.empty();
   if (wish.mission || !wish.start) log(fmt::format("looking for a way through {}", flags.input));
   Scenario scenario = make_scenario(wish, executor);
   scenario.path.clear();
   if (!wish.mission) scenario.vehicles.front().mission.waypoints.clear();
+  return scenario;
+}
+
+/// A scenario file with what the command line says instead.
+Scenario scenario_from_file(const FlyFlags& flags) {
+  Scenario scenario = load_scenario(flags.input);
+  if (!flags.start.empty()) scenario.vehicles.front().start = Vector3d(flags.start.data());
+  for (VehicleSetup& vehicle : scenario.vehicles) {
+    // relative to where the command is given, not to the scenario's folder
+    const auto from_here = [](const std::string& model) {
+      return is_model_path(model) ? fs::absolute(model).string() : model;
+    };
+    if (!flags.vehicle.empty()) vehicle.model = from_here(flags.vehicle);
+    if (flags.lidar.empty()) continue;
+    vehicle.lidars.resize(1);  // where the first one sits
+    vehicle.lidars.front().model = from_here(flags.lidar);
+  }
+  if (!flags.map.empty()) scenario.map = fs::absolute(flags.map).string();
+  return scenario;
+}
+
+Scenario load_input(const FlyFlags& flags, const Executor& executor) {
+  std::optional<Aabb> bounds;
+  if (!flags.start_in.empty()) bounds = box_from(flags.start_in, "--start-in");
+  const auto waypoints = waypoints_from(flags.mission);
+  const bool is_map = fs::path(flags.input).extension() == ".pfmap";
+  if (is_map && !flags.map.empty()) {
+    throw InputError(fmt::format("--map: is for a scenario; {} is a map itself", flags.input));
+  }
+  Scenario scenario =
+      is_map ? scenario_for_map(flags, bounds, executor) : scenario_from_file(flags);
+  if (!waypoints.empty()) {
+    scenario.vehicles.front().mission.waypoints = waypoints;
+    scenario.vehicles.front().commands.clear();
+  }
+  if (flags.seed >= 0) scenario.seed = flags.seed;
+  if (flags.duration >= 0.0) scenario.duration = flags.duration;
+  if (flags.no_scans) scenario.output.scans = false;
+  for (VehicleSetup& vehicle : scenario.vehicles) {
+    for (LidarMount& mount : vehicle.lidars) mount.snapshot = mount.snapshot || flags.snapshot;
+  }
   if (bounds) warn_of_starts_outside(scenario, *bounds);
   return scenario;
 }
 
+/// What is wrong with the folder is said before a long search; `RunFolder` says it for good.
 void check_folder(const FlyFlags& flags) {
   std::error_code error;
   if (fs::exists(flags.output, error) && !fs::is_directory(flags.output, error)) {
@@ -164,49 +233,6 @@ void check_folder(const FlyFlags& flags) {
     throw InputError(
         fmt::format("{}: is not empty; choose another folder or give --force", flags.output));
   }
-}
-
-/// Removes what an earlier run left in the folder of a vehicle, or of the run.
-void clear_files(const fs::path& folder) {
-  std::error_code error;
-  const auto is_scan = [](const std::string& name) {
-    return name.ends_with(".pcd") && name.find('_') != std::string::npos &&
-           name.find_first_not_of("0123456789_") == name.size() - 4;
-  };
-  // what others have put there stays
-  for (const auto& entry : fs::directory_iterator(folder / "scans", error)) {
-    if (is_scan(entry.path().filename().string())) fs::remove(entry.path(), error);
-  }
-  for (const char* name : {"summary.json",
-                           "timing.json",
-                           "overview.png",
-                           "trajectory.csv",
-                           "trajectory.tum",
-                           "imu.csv",
-                           "odometry.csv",
-                           "events.csv",
-                           "obstacles.csv",
-                           "scans.csv"}) {
-    fs::remove(folder / name, error);
-  }
-}
-
-/// So that `--force` never mixes two runs.
-void clear_earlier_run(const FlyFlags& flags, const Simulation& simulation) {
-  clear_files(flags.output);
-  for (std::size_t v = 0; v < simulation.vehicle_count(); ++v) {
-    clear_files(fs::path(flags.output) / simulation.vehicle(v).setup().name);
-  }
-}
-
-void write_timing(const FlyFlags& flags, const Simulation& simulation, double wall, int threads) {
-  nlohmann::ordered_json json;
-  json["wall_time"] = wall;
-  json["real_time_factor"] = to_seconds(simulation.time()) / wall;
-  json["threads"] = threads;
-  OutputFile file((fs::path(flags.output) / "timing.json").string());
-  file.write(json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
-  file.commit();
 }
 
 void print_vehicle(const Simulation& simulation, std::size_t v) {
@@ -246,6 +272,13 @@ void print_vehicle(const Simulation& simulation, std::size_t v) {
 }
 
 void print_result(const FlyFlags& flags, const Simulation& simulation, double wall) {
+  if (flags.json) {
+    auto json = nlohmann::ordered_json::parse(summary_json(simulation));
+    if (!flags.output.empty()) json["folder"] = flags.output;
+    json["real_time_factor"] = to_seconds(simulation.time()) / wall;
+    fmt::print("{}\n", json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
+    return;
+  }
   fmt::print("{}\n", flags.output.empty() ? flags.input : flags.output);
   fmt::print("  end               {}, after {:.1f} s\n",
              to_string(simulation.end()),
@@ -270,27 +303,41 @@ int exit_code_of(RunEnd end) {
 /// Files and picture of a run; nothing without a folder.
 class RunFiles {
  public:
-  RunFiles(const FlyFlags& flags, const Simulation& simulation) : flags_(flags) {
+  RunFiles(const FlyFlags& flags, const Simulation& simulation) {
     if (flags.output.empty()) return;
-    if (flags.force) clear_earlier_run(flags, simulation);
-    recorder_.emplace(flags.output, simulation);
+    recorder_.emplace(
+        flags.output, simulation, flags.force ? Existing::kReplace : Existing::kRefuse);
     sinks_.add(*recorder_);
     sinks_.add(picture_);
   }
 
   [[nodiscard]] SampleSink& sink() { return ended_ ? nothing_ : sinks_; }
 
-  /// The run starts again, which its files cannot: they end here.
-  void end(const Simulation& simulation) {
+  /// The run ends, or starts again, which its files cannot. `wall`: s that it took.
+  void end(const Simulation& simulation, double wall, int threads) {
     if (ended_ || !recorder_) return;
     ended_ = true;
     describe_run(simulation, picture_);
-    draw_overview(simulation.map(), picture_, (fs::path(flags_.output) / "overview.png").string());
+    draw_overview(simulation.map(), picture_, recorder_->path_for("overview.png"));
+    write_timing(simulation, wall, threads);
     recorder_->finish(simulation);
   }
 
  private:
-  const FlyFlags& flags_;
+  /// The one file that knows of clocks and of this machine's folders.
+  void write_timing(const Simulation& simulation, double wall, int threads) const {
+    const Scenario& scenario = simulation.scenario();
+    nlohmann::ordered_json json;
+    json["wall_time"] = wall;
+    json["real_time_factor"] = to_seconds(simulation.time()) / wall;
+    json["threads"] = threads;
+    json["map"] = fs::weakly_canonical(resolve_path(scenario.map, scenario.folder())).string();
+    json["command_line"] = command_line();
+    OutputFile file(recorder_->path_for("timing.json"));
+    file.write(json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
+    file.commit();
+  }
+
   std::optional<FlightRecorder> recorder_;
   RunPicture picture_;
   SampleSplitter sinks_;
@@ -308,14 +355,11 @@ int fly(const FlyFlags& flags) {
   if (!flags.output.empty()) check_folder(flags);
   const Executor executor(flags.threads);
   Scenario scenario = load_input(flags, executor);
-  if (flags.seed >= 0) scenario.seed = flags.seed;
-  for (VehicleSetup& vehicle : scenario.vehicles) {
-    for (LidarMount& mount : vehicle.lidars) mount.snapshot = mount.snapshot || flags.snapshot;
-  }
   const auto map = scenario.open_map();
   prepare_for_ros(flags.ros, rate, scenario);
   Simulation simulation(scenario, map, executor);
   warn_about(scenario, *map);
+  for (const std::string& warning : start_warnings(simulation, executor)) log(warning);
 
   RunFiles files(flags, simulation);
   CollisionLog collisions(simulation);
@@ -341,14 +385,16 @@ int fly(const FlyFlags& flags) {
       pace.restart_at(simulation.time());
     }
     if (next == RosSession::Next::kReset) {
-      files.end(simulation);
+      files.end(simulation, seconds_since(start), executor.threads());
       const SimTime reached = simulation.time();
       simulation.restore(at_start);
       ros.was_reset(reached);
       pace.restart_at(simulation.time());
       running = true;
     }
-    if (ros.is_over()) simulation.interrupt();
+    const bool for_nobody = flags.output.empty() && !flags.ros.is_live() &&
+                            ros.failed_recordings() == flags.ros.records.size();
+    if (ros.is_over() || for_nobody) simulation.interrupt();
     if (flags.ros.lockstep <= 0.0) {
       if (const auto trouble = pace.trouble(simulation.time())) log(*trouble);
     }
@@ -357,13 +403,12 @@ int fly(const FlyFlags& flags) {
       report(progress, "flying", to_seconds(simulation.time()) / to_seconds(simulation.end_time()));
     }
   }
-  const double wall = std::chrono::duration<double>(Clock::now() - start).count();
+  const double wall = seconds_since(start);
   end_progress();
   ros.close();
-  if (!flags.output.empty()) write_timing(flags, simulation, wall, executor.threads());
-  files.end(simulation);
+  files.end(simulation, wall, executor.threads());
   print_result(flags, simulation, wall);
-  return exit_code_of(simulation.end());
+  return ros.failed_recordings() > 0 ? kWrongInput : exit_code_of(simulation.end());
 }
 
 }  // namespace
@@ -378,7 +423,18 @@ void add_fly_command(CLI::App& parent, int& exit_code) {
   app->add_option("--rate",
                   flags->rate,
                   "Simulated seconds a second: 'max', or 1.0 for real time (the default with ROS)");
-  app->add_option("--lidar", flags->lidar, "Sensor for a .pfmap: a shipped one or a path (mid360)");
+  app->add_option(
+      "--map",
+      flags->map,
+      "Where the scenario's map lies now; one that a run was flown in must be the same");
+  app->add_option("--lidar",
+                  flags->lidar,
+                  "A shipped sensor or a path; a scenario's vehicles carry it instead of theirs");
+  app->add_option("--vehicle", flags->vehicle, "A shipped vehicle or a path, for all that fly");
+  app->add_option("--mission", flags->mission, "Waypoints x,y,z x,y,z ... of the first vehicle, m")
+      ->type_name("X,Y,Z ...");
+  app->add_option("--duration", flags->duration, "s; 0: as long as the mission takes")
+      ->check(within(0.0, 1e6));
   app->add_option("--start", flags->start, "x,y,z where the first vehicle starts, m")
       ->delimiter(',')
       ->expected(3)
@@ -386,11 +442,19 @@ void add_fly_command(CLI::App& parent, int& exit_code) {
   add_start_in_flag(*app, flags->start_in);
   app->add_option("--threads", flags->threads, "0: all cores; results never depend on it")
       ->check(CLI::Range(0, 1024));
-  app->add_flag("--force", flags->force, "Write into a folder that is not empty");
+  app->add_flag("--force",
+                flags->force,
+                "Write into a folder that is not empty: an earlier run's files go, others stay; "
+                "and over recordings");
+  app->add_flag("--no-scans", flags->no_scans, "Do not write scans as PCD");
+  app->add_flag("--json", flags->json, "summary.json on stdout, with the real-time factor");
   app->add_flag(
       "--snapshot", flags->snapshot, "All beams of a scan from one pose, as in the paper");
   add_ros_flags(*app, flags->ros);
-  app->callback([flags, &exit_code] { exit_code = fly(*flags); });
+  app->callback([flags, &exit_code] {
+    flags->ros.overwrite = flags->force;
+    exit_code = fly(*flags);
+  });
 }
 
 }  // namespace pointflight::apps

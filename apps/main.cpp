@@ -1,8 +1,10 @@
 #include <fmt/format.h>
+#include <sys/resource.h>
 
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
+#include <algorithm>
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
@@ -12,6 +14,7 @@
 #include "apps/commands.hpp"
 #include "apps/terminal.hpp"
 #include "pointflight/core/input_error.hpp"
+#include "pointflight/core/mapped_file.hpp"
 #include "pointflight/core/version.hpp"
 
 namespace {
@@ -46,11 +49,21 @@ int run(int argc, char** argv) {
   return exit_code;
 }
 
+/// A swarm has some files open for each vehicle, more than shells allow at first.
+void allow_many_files() {
+  rlimit limit{};
+  if (::getrlimit(RLIMIT_NOFILE, &limit) != 0) return;
+  limit.rlim_cur = std::min<rlim_t>(limit.rlim_max, 65536);
+  ::setrlimit(RLIMIT_NOFILE, &limit);
+}
+
 /// Runs the program; every error becomes a line and an exit code.
 int guarded_run(int argc, char** argv) {
   // a full file-size limit or a closed pipe is an error of a write, not the end of the process
   std::signal(SIGXFSZ, SIG_IGN);
   std::signal(SIGPIPE, SIG_IGN);
+  pointflight::survive_cut_files();
+  allow_many_files();
   using pointflight::apps::end_progress;
   using pointflight::apps::say;
   try {

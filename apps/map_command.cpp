@@ -35,6 +35,7 @@ struct ImportFlags {
   double outlier_sigmas = OutlierOptions{}.sigmas;
   std::string outliers_out;
   std::string scratch;
+  bool force = false;
   int threads = 0;
 };
 
@@ -111,6 +112,8 @@ void import_map(const ImportFlags& flags) {
   options.outliers.sigmas = flags.outlier_sigmas;
   options.scratch_folder = flags.scratch.empty() ? folder_of(flags.output) : flags.scratch;
   for (const std::string& input : flags.inputs) refuse_same_file(flags.output, input);
+  refuse_to_overwrite(flags.output, flags.force);
+  refuse_to_overwrite(flags.outliers_out, flags.force);
   std::optional<OutputFile> outliers;
   if (!flags.outliers_out.empty()) {
     refuse_same_file(flags.outliers_out, flags.output);
@@ -181,6 +184,7 @@ void add_import(CLI::App& parent) {
       ->capture_default_str();
   app->add_option(
       "--export-outliers", flags->outliers_out, "Write the dropped cells as a PCD cloud");
+  add_force_flag(*app, flags->force);
   app->add_option("--threads", flags->threads, "0: all cores")->check(CLI::Range(0, 1024));
   app->callback([flags] { import_map(*flags); });
 }
@@ -190,6 +194,7 @@ struct InfoFlags {
   std::string png;
   bool json = false;
   bool verify = false;
+  bool force = false;
 };
 
 nlohmann::ordered_json metadata_of(const SurfelMap& map) {
@@ -276,6 +281,7 @@ void print_info(const SurfelMap& map, const InfoFlags& flags) {
 }
 
 void show_info(const InfoFlags& flags) {
+  refuse_to_overwrite(flags.png, flags.force);
   const auto map = SurfelMap::open(flags.map);
   if (flags.verify) map->verify();
   print_info(*map, flags);
@@ -292,6 +298,7 @@ void add_info(CLI::App& parent) {
   app->add_flag("--json", flags->json, "JSON on stdout");
   app->add_option("--png", flags->png, "Draw a top and a side view");
   app->add_flag("--verify", flags->verify, "Read all of it and check checksums and structure");
+  add_force_flag(*app, flags->force);
   app->callback([flags] { show_info(*flags); });
 }
 
@@ -300,9 +307,11 @@ struct ForestFlags {
   ForestOptions options;
   double density = 800.0;
   double noise = 0.005;
+  bool force = false;
 };
 
 void make_forest_cloud(const ForestFlags& flags) {
+  refuse_to_overwrite(flags.output, flags.force);
   const ShapeScene scene = make_forest(flags.options);
   std::vector<CloudPoint> points;
   scene.sample(flags.density, flags.noise, flags.options.seed, [&](const Vector3d& p) {
@@ -337,6 +346,7 @@ void add_forest(CLI::App& parent) {
   app->add_option("--seed", o.seed, "Another seed, another forest")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
+  add_force_flag(*app, flags->force);
   app->callback([flags] { make_forest_cloud(*flags); });
 }
 

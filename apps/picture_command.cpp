@@ -11,6 +11,7 @@
 #include <sstream>
 
 #include "apps/commands.hpp"
+#include "apps/flags.hpp"
 #include "apps/pictures.hpp"
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/io/cloud_reader.hpp"
@@ -25,6 +26,7 @@ struct PictureFlags {
   std::string run;
   std::string map;
   std::string output;
+  bool force = false;
 };
 
 /// Lines of a text file split at commas, the first left out; for tables with words in them.
@@ -132,16 +134,33 @@ RunPicture read_run(const fs::path& folder) {
   return picture;
 }
 
+/// The map that a run's scenario names, or the one that is given instead: the same, where the run
+/// says which that was.
+std::shared_ptr<const SurfelMap> map_of(const PictureFlags& flags) {
+  const fs::path file = fs::path(flags.run) / "scenario.yaml";
+  if (!fs::exists(file)) {
+    if (!flags.map.empty()) return SurfelMap::open(flags.map);
+    throw InputError(
+        fmt::format("{}: is not there; give the map that was flown in with --map", file.string()));
+  }
+  Scenario scenario = load_scenario(file.string());
+  if (!flags.map.empty()) scenario.map = fs::absolute(flags.map).string();
+  return scenario.open_map();
+}
+
 }  // namespace
 
 void add_picture_command(CLI::App& parent, int& /*exit_code*/) {
   auto* app = parent.add_subcommand("picture", "Draw a run from its folder");
   auto flags = std::make_shared<PictureFlags>();
   app->add_option("run", flags->run, "A folder that `fly` or a program of yours wrote")->required();
-  app->add_option("--map", flags->map, "The .pfmap it was flown in")->required();
+  app->add_option("--map", flags->map, "Where the map lies now, if not where the run says");
   app->add_option("-o,--output", flags->output, "The .png; else overview.png in the folder");
+  add_force_flag(*app, flags->force);
   app->callback([flags] {
-    const auto map = SurfelMap::open(flags->map);
+    // the run's own picture may be drawn again
+    if (!flags->output.empty()) refuse_to_overwrite(flags->output, flags->force);
+    const auto map = map_of(*flags);
     const RunPicture picture = read_run(flags->run);
     const std::string path =
         flags->output.empty() ? (fs::path(flags->run) / "overview.png").string() : flags->output;

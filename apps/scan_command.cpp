@@ -32,6 +32,7 @@ struct ScanFlags {
   std::string output;
   std::string png;
   bool json = false;
+  bool force = false;
   int threads = 0;
 };
 
@@ -89,6 +90,9 @@ void take_scan(const ScanFlags& flags) {
   const Pose pose = parse_pose(flags.pose);
   refuse_same_file(flags.output, flags.map);
   refuse_same_file(flags.png, flags.map);
+  if (!flags.png.empty()) refuse_same_file(flags.png, flags.output);
+  refuse_to_overwrite(flags.output, flags.force);
+  refuse_to_overwrite(flags.png, flags.force);
   const auto map = SurfelMap::open(flags.map);
   const LidarSettings settings = load_lidar(flags.lidar);
   const Lidar lidar(settings, 0);
@@ -134,6 +138,7 @@ void add_scan_command(CLI::App& parent, int& /*exit_code*/) {
                   "PCD of the points in the sensor frame: x y z intensity range time ring");
   app->add_option("--png", flags->png, "Picture: range over azimuth and elevation");
   app->add_flag("--json", flags->json, "JSON on stdout");
+  add_force_flag(*app, flags->force);
   app->add_option("--threads", flags->threads, "0: all cores")->check(CLI::Range(0, 1024));
   app->callback([flags] { take_scan(*flags); });
 }

@@ -17,6 +17,7 @@
 #include "pointflight/core/output_file.hpp"
 #include "pointflight/core/resources.hpp"
 #include "pointflight/sim/simulation.hpp"
+#include "pointflight/sim/start_check.hpp"
 #include "pointflight/world/clearance.hpp"
 #include "pointflight/world/free_space.hpp"
 #include "ros_common/outputs.hpp"
@@ -53,11 +54,13 @@ struct NewFlags {
   double length = 60.0;
   double speed = 2.0;
   std::vector<double> start_in;
+  bool force = false;
 };
 
 void new_scenario(const NewFlags& flags) {
   const Executor executor;
   refuse_same_file(flags.output, flags.map);
+  refuse_to_overwrite(flags.output, flags.force);
   // the scenario finds its files from its own folder
   const fs::path folder = fs::weakly_canonical(fs::absolute(flags.output).parent_path());
   const auto from_folder = [&](const std::string& path) {
@@ -100,6 +103,7 @@ void check_scenario(const std::string& path) {
   const RosProfile profile = profile_for(scenario);
   output_streams(simulation, profile);
   warn_about(scenario, *map);
+  for (const std::string& warning : start_warnings(simulation, executor)) log(warning);
   fmt::print("{}: ready: {:.1f} s\n", path, to_seconds(simulation.end_time()));
   for (std::size_t v = 0; v < simulation.vehicle_count(); ++v) {
     const VehicleAgent& agent = simulation.vehicle(v);
@@ -217,6 +221,7 @@ void add_scenario_command(CLI::App& parent, int& /*exit_code*/) {
       ->capture_default_str();
   make->add_option("--speed", flags->speed, "m/s")->check(within(0.1, 30.0))->capture_default_str();
   add_start_in_flag(*make, flags->start_in);
+  add_force_flag(*make, flags->force);
   make->callback([flags] { new_scenario(*flags); });
 
   auto* check = app->add_subcommand("check", "Read a scenario and say whether it can be flown");

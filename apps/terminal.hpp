@@ -14,8 +14,8 @@ Progress terminal_progress();
 /// Thrown out of work that a signal ended; main() turns it into the exit code.
 struct Interrupted {};
 
-/// The same, and throws Interrupted after SIGINT or SIGTERM, so that destructors remove what is
-/// half-written.
+/// The same, and throws Interrupted after SIGINT, SIGTERM or SIGHUP, so that destructors remove
+/// what is half-written.
 Progress interruptible_progress();
 
 /// Ends an open progress line.
@@ -27,10 +27,14 @@ void say(std::string_view text);
 /// A line on stderr.
 void log(std::string_view text);
 
+/// This process's command line, quoted where a shell would need it.
+std::string command_line();
+
 /// "1.2 M", "34 k", "567".
 std::string short_count(double count);
 
-/// True after SIGINT or SIGTERM. `catch_interrupts` installs the handlers.
+/// True after SIGINT, SIGTERM or SIGHUP (a closed terminal; `nohup` is honoured).
+/// `catch_interrupts` installs the handlers.
 void catch_interrupts();
 bool interrupted();
 

@@ -19,6 +19,7 @@ struct ShowFlags {
   std::string name;
   std::string controller;
   std::string picture;
+  bool force = false;
 };
 
 void list_vehicles() {
@@ -35,6 +36,7 @@ double hover_power(const VehicleSettings& s) {
 }
 
 void show_vehicle(const ShowFlags& flags) {
+  refuse_to_overwrite(flags.picture, flags.force);
   VehicleSettings s = load_vehicle(flags.name);
   if (!flags.controller.empty()) s.controller.kind = flags.controller;
   const double hover = s.hover_speed();
@@ -96,6 +98,7 @@ void add_vehicle_command(CLI::App& parent, int& /*exit_code*/) {
   show->add_option(
       "--controller", flags->controller, "cascade or geometric, instead of the file's");
   show->add_option("--png", flags->picture, "Draw the step responses");
+  add_force_flag(*show, flags->force);
   show->callback([flags] { show_vehicle(*flags); });
 }
 

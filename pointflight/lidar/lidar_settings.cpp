@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <array>
+#include <filesystem>
 
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/core/resources.hpp"
@@ -169,6 +170,17 @@ void describe(SettingsVisitor& v, LidarSettings& s) {
 std::string LidarSettings::place(const std::string& key) const {
   const auto line = lines.find(key);
   return line == lines.end() ? path : fmt::format("{}:{}", path, line->second);
+}
+
+std::vector<std::string*> tables_of(LidarSettings& settings) {
+  std::vector<std::string*> tables;
+  const std::string folder = std::filesystem::path(settings.path).parent_path().string();
+  for (std::string* table : {&settings.rings.table, &settings.csv.file}) {
+    if (table->empty()) continue;
+    *table = resolve_path(*table, folder);
+    tables.push_back(table);
+  }
+  return tables;
 }
 
 LidarSettings load_lidar(const std::string& name_or_path, const std::string& base) {

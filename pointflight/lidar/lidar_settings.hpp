@@ -126,6 +126,10 @@ void describe(SettingsVisitor& visitor, LidarSettings& settings);
 /// Reads a sensor by name ("mid360") or path; relative paths are taken from `base`.
 LidarSettings load_lidar(const std::string& name_or_path, const std::string& base = {});
 
+/// The files that a sensor's settings name beside its own, as paths that can be opened; each in
+/// its setting.
+std::vector<std::string*> tables_of(LidarSettings& settings);
+
 /// From text, for tests and fuzzers; `path` is where files beside it would lie.
 LidarSettings parse_lidar(std::string_view text, const std::string& path);
 

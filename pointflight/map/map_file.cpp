@@ -198,6 +198,13 @@ void SurfelMap::attach(std::span<const std::byte> bytes, const std::string& name
   intensity_step_ = header.intensity_step;
 }
 
+std::string SurfelMap::hash() const {
+  MapHeader header{};
+  std::memcpy(&header, bytes_.data(), sizeof header);
+  header.sections[kMetadata] = {};  // names of files and options
+  return fmt::format("{:016x}", hash64(std::as_bytes(std::span(&header, 1))));
+}
+
 void SurfelMap::verify() const {
   const auto fail = [&](const char* section, const std::string& what) {
     throw InputError(

@@ -51,6 +51,10 @@ class SurfelMap {
   [[nodiscard]] std::uint64_t surfel_count() const { return surfel_count_; }
   [[nodiscard]] std::uint64_t file_size() const { return file_size_; }
 
+  /// Sixteen hexadecimal digits of what is in the map, its metadata left out. Read from the header:
+  /// it costs nothing.
+  [[nodiscard]] std::string hash() const;
+
   /// How the map was made, as JSON text.
   [[nodiscard]] std::string_view metadata() const { return metadata_; }
 

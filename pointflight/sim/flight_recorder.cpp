@@ -7,6 +7,7 @@
 
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/core/version.hpp"
+#include "pointflight/sim/scenario_copy.hpp"
 
 namespace pointflight {
 namespace {
@@ -119,33 +120,31 @@ struct FlightRecorder::VehicleFiles {
   std::optional<OutputFile> odometry;
 };
 
-std::string vehicle_folder(const std::string& folder, const Simulation& simulation, std::size_t v) {
-  return simulation.vehicle_count() == 1
-             ? folder
-             : (fs::path(folder) / simulation.vehicle(v).setup().name).string();
-}
-
 std::string label_name(const Simulation& simulation, Label label) {
   if (label == kMapLabel) return "map";
   if (label >= kFirstObstacle) return fmt::format("obstacle {}", label - kFirstObstacle);
   return simulation.vehicle(label - kFirstVehicle).setup().name;
 }
 
-FlightRecorder::FlightRecorder(const std::string& folder, const Simulation& simulation)
-    : folder_(made_folder(folder)),
+FlightRecorder::FlightRecorder(const std::string& folder,
+                               const Simulation& simulation,
+                               Existing existing)
+    : folder_(folder, existing),
       write_scans_(simulation.scenario().output.scans),
-      events_(at(folder, "events.csv")) {
+      events_(path_for("events.csv")) {
+  write_scenario_copy(simulation.scenario(), simulation.map(), folder_.staging(), folder_.path());
   const OutputSetup& output = simulation.scenario().output;
   events_.write(
       "time,event,vehicle,partner,vehicle_x,vehicle_y,vehicle_z,place_x,place_y,place_z,"
       "penetration\n");
   if (!simulation.scenario().obstacles.empty()) {
-    obstacles_.emplace(at(folder, "obstacles.csv"));
+    obstacles_.emplace(path_for("obstacles.csv"));
     obstacles_->write("time,label,px,py,pz,qw,qx,qy,qz,half_x,half_y,half_z\n");
   }
   for (std::size_t v = 0; v < simulation.vehicle_count(); ++v) {
     names_.push_back(simulation.vehicle(v).setup().name);
-    auto files = std::make_unique<VehicleFiles>(vehicle_folder(folder, simulation, v), output);
+    auto files = std::make_unique<VehicleFiles>(
+        simulation.vehicle_count() == 1 ? folder_.staging() : path_for(names_.back()), output);
     files->trajectory.write(
         fmt::format("time,{},command_px,command_py,command_pz,clearance,nearest", kStateColumns));
     for (std::size_t i = 0; i < simulation.status(v).state.rotors.size(); ++i) {
@@ -163,6 +162,10 @@ FlightRecorder::FlightRecorder(const std::string& folder, const Simulation& simu
 }
 
 FlightRecorder::~FlightRecorder() = default;
+
+std::string FlightRecorder::path_for(const std::string& name) const {
+  return (fs::path(folder_.staging()) / name).string();
+}
 
 void FlightRecorder::on_state(const StateSample& sample) {
   VehicleFiles& files = *vehicles_[sample.vehicle];
@@ -257,9 +260,10 @@ void FlightRecorder::finish(const Simulation& simulation) {
   for (const auto& files : vehicles_) files->commit();
   if (obstacles_) obstacles_->commit();
   events_.commit();
-  OutputFile summary(at(folder_, "summary.json"));
+  OutputFile summary(path_for("summary.json"));
   summary.write(summary_json(simulation));
   summary.commit();
+  folder_.commit();
 }
 
 std::string summary_json(const Simulation& simulation) {
@@ -269,6 +273,8 @@ std::string summary_json(const Simulation& simulation) {
   json["end"] = to_string(simulation.end());
   json["seed"] = scenario.seed;
   json["map"] = fs::path(scenario.map).filename().string();
+  json["map_bytes"] = simulation.map().file_size();
+  json["map_hash"] = simulation.map().hash();
   json["simulated_time"] = to_seconds(simulation.time());
   json["obstacles"] = simulation.obstacle_count();
   json["vehicles"] = nlohmann::ordered_json::array();

@@ -6,19 +6,23 @@
 #include <vector>
 
 #include "pointflight/core/output_file.hpp"
+#include "pointflight/sim/run_folder.hpp"
 #include "pointflight/sim/simulation.hpp"
 
 namespace pointflight {
 
 /// Writes a run into a folder. For each vehicle, in the folder itself where there is only one and
 /// in one of its name else: trajectory.csv, trajectory.tum, imu.csv, odometry.csv, scans.csv and
-/// scans/<lidar>_<number>.pcd. For all: events.csv, obstacles.csv and at last summary.json. Files
-/// appear under their names when `finish` is called; scans as they are taken. Throws InputError
+/// scans/<lidar>_<number>.pcd. For all: scenario.yaml with what it needs (scenario_copy.hpp),
+/// events.csv, obstacles.csv and at last summary.json. Files appear when `finish` is called, all
+/// together; without it none do, and an earlier run stays (run_folder.hpp). Throws InputError
 /// (disk full, not writable).
 class FlightRecorder : public SampleSink {
  public:
   /// Makes the folders; they must be writable.
-  FlightRecorder(const std::string& folder, const Simulation& simulation);
+  FlightRecorder(const std::string& folder,
+                 const Simulation& simulation,
+                 Existing existing = Existing::kRefuse);
   ~FlightRecorder() override;
 
   void on_state(const StateSample& sample) override;
@@ -28,22 +32,22 @@ class FlightRecorder : public SampleSink {
   void on_collision(const CollisionEvent& event) override;
   void on_obstacle(const ObstacleSample& sample) override;
 
+  /// Where to write a file that shall be part of the run, before `finish`.
+  [[nodiscard]] std::string path_for(const std::string& name) const;
+
   /// Closes the files and writes summary.json.
   void finish(const Simulation& simulation);
 
  private:
   struct VehicleFiles;
 
-  std::string folder_;
+  RunFolder folder_;
   bool write_scans_;
   std::vector<std::string> names_;  ///< Of the vehicles.
   std::vector<std::unique_ptr<VehicleFiles>> vehicles_;
   OutputFile events_;
   std::optional<OutputFile> obstacles_;
 };
-
-/// Folder of a vehicle's files within a run's.
-std::string vehicle_folder(const std::string& folder, const Simulation& simulation, std::size_t v);
 
 /// summary.json as text: what happened, without wall-clock figures.
 std::string summary_json(const Simulation& simulation);

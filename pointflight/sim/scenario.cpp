@@ -113,6 +113,7 @@ Scenario read(SettingsReader& reader, const std::string& path) {
 
 void describe(SettingsVisitor& v, Scenario& s) {
   v.value(required({"map", "", ".pfmap to fly in"}), s.map);
+  v.value({"map_hash", "", "of the map; another one is refused; empty: any will do"}, s.map_hash);
   v.value({"seed", "", "of everything random", 0, 9e15}, s.seed);
   v.value({"duration", "s", "0: as long as the mission takes", 0, 1e6}, s.duration);
   v.value({"physics_step", "s", "of the integrator", 0.0001, 0.005}, s.physics_step);
@@ -191,7 +192,15 @@ std::string Scenario::place(const std::string& key) const {
 }
 
 std::shared_ptr<const SurfelMap> Scenario::open_map() const {
-  return at("map", [&] { return SurfelMap::open(resolve_path(map, folder())); });
+  auto opened = at("map", [&] { return SurfelMap::open(resolve_path(map, folder())); });
+  if (map_hash.empty() || map_hash == opened->hash()) return opened;
+  throw InputError(fmt::format(
+      "{}: map_hash: {} is another map than this scenario was flown in (its hash is {}, "
+      "not {}); give that one, or take the key away",
+      place("map_hash"),
+      map,
+      opened->hash(),
+      map_hash));
 }
 
 Scenario load_scenario(const std::string& path) {

@@ -79,6 +79,7 @@ struct Scenario {
   std::string path;  ///< Of the file; relative paths in it are taken from its folder.
   std::map<std::string, int> lines;  ///< Line of each key, for messages.
   std::string map;
+  std::string map_hash;  ///< Of the map it was flown in (SurfelMap::hash); empty: any will do.
   std::int64_t seed = 1;
   double duration = 0.0;        ///< s; 0: as long as the mission takes.
   double physics_step = 0.001;  ///< s
@@ -108,7 +109,7 @@ struct Scenario {
     return at_key(place(key), key, action);
   }
 
-  /// Opens the map.
+  /// Opens the map. Throws InputError where it is another than `map_hash` says.
   [[nodiscard]] std::shared_ptr<const SurfelMap> open_map() const;
 };
 

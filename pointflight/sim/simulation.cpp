@@ -44,6 +44,8 @@ const char* to_string(RunEnd end) {
       return "mission unfinished";
     case RunEnd::kCollision:
       return "collision";
+    case RunEnd::kLeftMap:
+      return "left the map";
     case RunEnd::kInterrupted:
       return "interrupted";
   }
@@ -113,6 +115,10 @@ const VehicleAgent& Simulation::vehicle(std::size_t number) const {
   return *setup_->agents[number];
 }
 
+std::shared_ptr<const SurfelMap> Simulation::shared_map() const {
+  return setup_->map;
+}
+
 std::size_t Simulation::obstacle_count() const {
   return setup_->obstacles.size();
 }
@@ -129,7 +135,7 @@ void Simulation::check_start(std::size_t number) const {
   for (std::size_t i = 0; i < number; ++i) before.push_back(placed(i));
   const Scenario& scenario = setup_->scenario;
   check_start_is_free(
-      scenario, *setup_->map, placed(number), before, obstacles(SimTime{}, SimTime{}));
+      scenario, *setup_->map, placed(number), before, obstacles(SimTime{}, SimTime{}), *executor_);
 }
 
 std::optional<std::string> Simulation::command(std::size_t vehicle_number, const Command& command) {
@@ -265,6 +271,10 @@ bool Simulation::step(SampleSink& sink) {
     finish_run(sink);
     return false;
   }
+  if (has_left_map()) {
+    state_.end = RunEnd::kLeftMap;
+    return false;
+  }
   std::vector<char> fine(vehicle_count(), 1);
   executor_->parallel_for(
       vehicle_count(), kVehiclesAChunk, [&](std::size_t begin, std::size_t end) {
@@ -316,6 +326,20 @@ bool Simulation::arrived() const {
     if (away >= kGoalTolerance || to_seconds(state_.time) < mission.duration()) return false;
   }
   return true;
+}
+
+/// Somebody flies where nothing can be measured any more, or falls through a hole in the floor. A
+/// wreck that does so ends nothing while others fly.
+bool Simulation::has_left_map() const {
+  bool flying = false;
+  bool lost = false;
+  for (std::size_t i = 0; i < vehicle_count(); ++i) {
+    const bool is_out = is_lost(*setup_->map, status(i).state.body.p_world);
+    if (is_out && !status(i).crashed) return true;
+    lost = lost || is_out;
+    flying = flying || !status(i).crashed;
+  }
+  return lost && !flying;
 }
 
 /// All vehicles' samples in the order (time, kind, vehicle).

@@ -14,7 +14,7 @@
 
 namespace pointflight {
 
-enum class RunEnd { kRunning, kCompleted, kMissionUnfinished, kCollision, kInterrupted };
+enum class RunEnd { kRunning, kCompleted, kMissionUnfinished, kCollision, kLeftMap, kInterrupted };
 const char* to_string(RunEnd end);
 
 /// Everything of a run that changes: a value. What it holds by pointer (trajectories that are
@@ -37,8 +37,8 @@ class Simulation {
   /// Clearance is known up to here, m.
   static constexpr double kClearanceReach = 10.0;
 
-  /// Throws InputError where the scenario cannot be flown (unknown models, start inside the map or
-  /// in each other, obstacles without room). The executor must outlive it.
+  /// Throws InputError where the scenario cannot be flown (unknown models, start inside the map,
+  /// far outside of it or in each other, obstacles without room). The executor must outlive it.
   Simulation(const Scenario& scenario,
              std::shared_ptr<const SurfelMap> map,
              const Executor& executor);
@@ -71,6 +71,7 @@ class Simulation {
   [[nodiscard]] RunEnd end() const { return state_.end; }
   [[nodiscard]] const Scenario& scenario() const;
   [[nodiscard]] const SurfelMap& map() const;
+  [[nodiscard]] std::shared_ptr<const SurfelMap> shared_map() const;
 
   [[nodiscard]] std::size_t vehicle_count() const { return state_.vehicles.size(); }
   [[nodiscard]] const VehicleAgent& vehicle(std::size_t number) const;
@@ -97,6 +98,7 @@ class Simulation {
   void finish_run(SampleSink& sink);
   [[nodiscard]] std::vector<Body> bodies_for_scan(SimTime from, SimTime until) const;
   [[nodiscard]] bool arrived() const;
+  [[nodiscard]] bool has_left_map() const;
 
   std::shared_ptr<const Setup> setup_;
   const Executor* executor_;

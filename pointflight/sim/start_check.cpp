@@ -4,11 +4,60 @@
 
 #include <algorithm>
 #include <cctype>
+#include <optional>
 #include <set>
 
 #include "pointflight/core/input_error.hpp"
+#include "pointflight/render/renderer.hpp"
+#include "pointflight/sim/simulation.hpp"
+#include "pointflight/world/free_space.hpp"
 
 namespace pointflight {
+namespace {
+
+constexpr double kBeside = 50.0;  // m outside of the map's bounds, and below
+constexpr double kAbove = 500.0;  // m
+
+std::string text_of(const Vector3d& p) {
+  return fmt::format("({:.2f}, {:.2f}, {:.2f})", p.x(), p.y(), p.z());
+}
+
+std::string free_place_text(const SurfelMap& map,
+                            const VehicleAgent& agent,
+                            const Vector3d& p,
+                            const Executor& executor) {
+  const auto place = nearest_free_place(map, p, bounding_radius(agent.hull()), executor);
+  return place ? "; the nearest free place found is " + text_of(*place) : std::string();
+}
+
+/// How far the map is along the vertical, by rays side by side: a surface may have holes.
+std::optional<double> vertical_distance(const Renderer& renderer, const Vector3d& p, float up) {
+  constexpr double kApart = 0.3;  // m
+  std::optional<double> least;
+  for (const double x : {-kApart, 0.0, kApart}) {
+    for (const double y : {-kApart, 0.0, kApart}) {
+      Ray ray;
+      ray.origin_world = p + Vector3d(x, y, 0.0);
+      ray.direction_world = Vector3f(0.0f, 0.0f, up);
+      ray.range_max = 1e4f;
+      const Hit hit = renderer.trace(ray);
+      if (hit.is_return() && !(least && *least < static_cast<double>(hit.range))) {
+        least = static_cast<double>(hit.range);
+      }
+    }
+  }
+  return least;
+}
+
+}  // namespace
+
+bool is_lost(const SurfelMap& map, const Vector3d& p_world) {
+  if (map.surfel_count() == 0) return false;
+  const Aabb& b = map.bounds_world();
+  const Vector3d below = b.min - p_world;
+  const Vector3d above = p_world - b.max;
+  return below.maxCoeff() > kBeside || above.head<2>().maxCoeff() > kBeside || above.z() > kAbove;
+}
 
 void check_names(const Scenario& scenario, const std::vector<VehicleSetup>& fleet) {
   std::set<std::string> names;
@@ -30,7 +79,8 @@ void check_start_is_free(const Scenario& scenario,
                          const SurfelMap& map,
                          const StartingVehicle& vehicle,
                          std::span<const StartingVehicle> others,
-                         std::span<const Body> obstacles) {
+                         std::span<const Body> obstacles,
+                         const Executor& executor) {
   const VehicleAgent& agent = *vehicle.agent;
   const Pose& pose = vehicle.T_world_body;
   const Vector3d& p = pose.translation;
@@ -39,6 +89,15 @@ void check_start_is_free(const Scenario& scenario,
     throw InputError(fmt::format("{}: {}: {}", scenario.place(key), key, what));
   };
   const std::string& name = agent.setup().name;
+  if (is_lost(map, p)) {
+    const Aabb& b = map.bounds_world();
+    fail(fmt::format("{} of {} is outside of the map, which lies between {} and {}{}",
+                     text_of(p),
+                     name,
+                     text_of(b.min),
+                     text_of(b.max),
+                     free_place_text(map, agent, p, executor)));
+  }
   const auto here = contact_with_map(map, agent.hull(), pose, 0.0);
   if (here && here->distance < 0.0) {
     fail(fmt::format(
@@ -67,6 +126,34 @@ void check_start_is_free(const Scenario& scenario,
                      -met->distance,
                      body.label - kFirstObstacle));
   }
+}
+
+std::vector<std::string> start_warnings(const Simulation& simulation, const Executor& executor) {
+  const SurfelMap& map = simulation.map();
+  const Scenario& scenario = simulation.scenario();
+  const auto renderer = make_renderer("beam", Scene{simulation.shared_map()});
+  std::vector<std::string> warnings;
+  for (std::size_t i = 0; i < simulation.vehicle_count(); ++i) {
+    const VehicleAgent& agent = simulation.vehicle(i);
+    const Vector3d& p = agent.setup().start;
+    const double radius = bounding_radius(agent.hull());
+    const auto ground = vertical_distance(*renderer, p, -1.0f);
+    std::string what;
+    if (!ground && vertical_distance(*renderer, p, 1.0f)) {
+      what = "is below the floor: the map is above it and nothing below";
+    } else if (agent.setup().landed && (!ground || *ground > radius + map.resolution())) {
+      what = ground ? fmt::format("starts landed, but the ground is {:.2f} m below", *ground)
+                    : std::string("starts landed, but there is no ground below");
+    }
+    if (what.empty()) continue;
+    warnings.push_back(fmt::format("{}: warning: {} of {} {}{}",
+                                   scenario.place(scenario.vehicle_key(i, "start")),
+                                   text_of(p),
+                                   agent.setup().name,
+                                   what,
+                                   free_place_text(map, agent, p, executor)));
+  }
+  return warnings;
 }
 
 }  // namespace pointflight

@@ -1,12 +1,15 @@
 #pragma once
 
 #include <span>
+#include <string>
 #include <vector>
 
 #include "pointflight/sim/scenario.hpp"
 #include "pointflight/sim/vehicle_agent.hpp"
 
 namespace pointflight {
+
+class Simulation;
 
 /// Names make folders and topics: each its own, and nothing but plain letters. Throws InputError.
 void check_names(const Scenario& scenario, const std::vector<VehicleSetup>& fleet);
@@ -17,12 +20,21 @@ struct StartingVehicle {
   Pose T_world_body;
 };
 
+/// True for places so far outside of the map's bounds that nobody means to be there: 50 m beside or
+/// below, 500 m above. A run ends there.
+bool is_lost(const SurfelMap& map, const Vector3d& p_world);
+
 /// Throws InputError where a vehicle starts inside the map, another vehicle or an obstacle (which
-/// stand where they are at time zero).
+/// stand where they are at time zero), or lost.
 void check_start_is_free(const Scenario& scenario,
                          const SurfelMap& map,
                          const StartingVehicle& vehicle,
                          std::span<const StartingVehicle> others,
-                         std::span<const Body> obstacles);
+                         std::span<const Body> obstacles,
+                         const Executor& executor);
+
+/// What is odd about where vehicles start, in words for the user with file and line: below the
+/// floor, or landed where there is no ground.
+std::vector<std::string> start_warnings(const Simulation& simulation, const Executor& executor);
 
 }  // namespace pointflight

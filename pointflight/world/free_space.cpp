@@ -333,4 +333,27 @@ std::optional<Tour> find_tour(const SurfelMap& map,
   return best;
 }
 
+std::optional<Vector3d> nearest_free_place(const SurfelMap& map,
+                                           const Vector3d& near_world,
+                                           double radius,
+                                           const Executor& executor) {
+  if (map.surfel_count() == 0) return std::nullopt;
+  for (const double margin : {0.5, 0.3, 0.15}) {
+    TourOptions options;
+    options.radius = radius;
+    options.margin = margin;
+    const FreeSpaceGrid grid(map, options, executor);
+    const std::vector<bool> usable = grid.usable(0, false);
+    std::optional<Vector3d> best;
+    for (std::size_t i = 0; i < usable.size(); ++i) {
+      const Vector3d place = grid.center(i);
+      const bool nearer =
+          !best || (place - near_world).squaredNorm() < (*best - near_world).squaredNorm();
+      if (usable[i] && nearer) best = place;
+    }
+    if (best) return best;
+  }
+  return std::nullopt;
+}
+
 }  // namespace pointflight

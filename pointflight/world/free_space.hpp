@@ -31,4 +31,12 @@ std::optional<Tour> find_tour(const SurfelMap& map,
                               const TourOptions& options,
                               const Executor& executor);
 
+/// A place for a vehicle of `radius` (m), free of the map by half a metre or as much as there is
+/// room for, with ground below; the nearest one to `near_world` within the resolution of the
+/// search. Nothing where none is found. Deterministic.
+std::optional<Vector3d> nearest_free_place(const SurfelMap& map,
+                                           const Vector3d& near_world,
+                                           double radius,
+                                           const Executor& executor);
+
 }  // namespace pointflight

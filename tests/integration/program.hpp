@@ -19,6 +19,25 @@ struct Result {
 /// Runs `pointflight ARGUMENTS`; `before` stands before the program's name on the command line.
 Result run(const std::string& arguments, const std::string& before = "");
 
+/// The program in a process of its own; killed where nobody ends it.
+class Started {
+ public:
+  explicit Started(const std::string& arguments);
+  ~Started();
+  Started(const Started&) = delete;
+  Started& operator=(const Started&) = delete;
+
+  /// Waits until a file is there; false where the program has ended without.
+  [[nodiscard]] bool waits_for(const std::string& path) const;
+  /// Sends a signal (0: none) and waits for the end; the exit code.
+  int end(int signal) const;
+  [[nodiscard]] std::string err() const { return read_file(folder_ / "err"); }
+
+ private:
+  TemporaryFolder folder_;
+  int process_ = -1;
+};
+
 /// One line on stderr that starts with the program's name, exit code 2.
 void expect_user_error(const Result& result, const std::string& words);
 
