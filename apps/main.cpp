@@ -10,19 +10,46 @@
 #include <cstdlib>
 #include <exception>
 #include <new>
+#include <string>
+#include <vector>
 
+#include "apps/command_line.hpp"
 #include "apps/commands.hpp"
+#include "apps/modules.hpp"
 #include "apps/terminal.hpp"
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/core/mapped_file.hpp"
 #include "pointflight/core/version.hpp"
+#include "pointflight_commit.hpp"
 
 namespace {
+
+/// "pointflight 0.1.0" and what this build can do.
+std::string version_text() {
+  using pointflight::apps::has_module;
+  const auto yes = [](bool has) { return has ? "yes" : "no"; };
+  return fmt::format("pointflight {} ({})\nmeshes  {}\nROS 1   {}\nROS 2   {}",
+                     pointflight::kVersion,
+                     POINTFLIGHT_COMMIT,
+                     yes(POINTFLIGHT_WITH_MESHES != 0),
+                     yes(has_module("pointflight_ros1")),
+                     yes(has_module("pointflight_ros2")));
+}
+
+void add_shell_commands(CLI::App& app) {
+  auto* completion = app.add_subcommand(
+      "completion", "Print a completion script: source <(pointflight completion) in ~/.bashrc");
+  completion->callback([&app] { fmt::print("{}", pointflight::apps::bash_completion(app)); });
+  auto* man =
+      app.add_subcommand("man", "Print this program's manual page: pointflight man | man -l -");
+  man->callback(
+      [&app] { fmt::print("{}", pointflight::apps::man_page(app, pointflight::kVersion)); });
+}
 
 int run(int argc, char** argv) {
   using namespace pointflight::apps;  // NOLINT(google-build-using-namespace): this function only
   CLI::App app{"pointflight: a LiDAR drone in point-cloud maps of real places", "pointflight"};
-  app.set_version_flag("--version", std::string("pointflight ") + pointflight::kVersion);
+  app.set_version_flag("--version", version_text);
   app.require_subcommand(1);
   app.footer(
       "A first tour: pointflight map forest -o forest.pcd\n"
@@ -39,11 +66,14 @@ int run(int argc, char** argv) {
   add_bag_command(app, exit_code);
   add_compare_command(app, exit_code);
   add_fidelity_command(app, exit_code);
+  add_shell_commands(app);
+  const std::vector<std::string> words = command_words(argc, argv);
   try {
-    app.parse(argc, argv);
+    // CLI11 takes them from the back
+    app.parse(std::vector<std::string>(words.rbegin(), words.rend()));
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return app.exit(error);  // --help, --version
-    say(fmt::format("pointflight: {}; see pointflight --help\n", error.what()));
+    say(fmt::format("pointflight: {}\n", explain(error, app, words)));
     return kWrongInput;
   }
   return exit_code;

@@ -5,6 +5,7 @@
 
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "pointflight/core/input_error.hpp"
 
@@ -13,17 +14,24 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The module that a library's entry function returns.
-template <class Module>
-const Module& load(const std::string& name, const std::string& what, const std::string& packages) {
+/// Where a module's library may lie: in a build and where it is installed.
+std::vector<fs::path> places_of(const std::string& name) {
   std::error_code error;
   const fs::path program = fs::read_symlink("/proc/self/exe", error);
   const fs::path root = program.parent_path().parent_path();
-  const std::string file = fmt::format("lib{}.so", name);
-  std::string reason = "this build has none";
+  std::vector<fs::path> places;
   for (const char* folder : {"lib/pointflight", POINTFLIGHT_LIBDIR "/pointflight"}) {
-    const fs::path path = root / folder / file;
-    if (!fs::exists(path, error)) continue;
+    const fs::path path = root / folder / fmt::format("lib{}.so", name);
+    if (fs::exists(path, error)) places.push_back(path);
+  }
+  return places;
+}
+
+/// The module that a library's entry function returns.
+template <class Module>
+const Module& load(const std::string& name, const std::string& what, const std::string& packages) {
+  std::string reason = "this build has none";
+  for (const fs::path& path : places_of(name)) {
     // stays loaded: what it made lives until the program ends
     void* library = dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL);
     if (library == nullptr) {
@@ -40,6 +48,10 @@ const Module& load(const std::string& name, const std::string& what, const std::
 
 }  // namespace
 
+bool has_module(const std::string& name) {
+  return !places_of(name).empty();
+}
+
 const Ros1Module& ros1_module() {
   static const Ros1Module& module =
       load<Ros1Module>("pointflight_ros1", "ROS 1", "libroscpp-dev and librosbag-storage-dev");
@@ -47,8 +59,7 @@ const Ros1Module& ros1_module() {
 }
 
 const Ros2Module& ros2_module() {
-  static const Ros2Module& module =
-      load<Ros2Module>("pointflight_ros2", "ROS 2", "libfastrtps-dev and libfastcdr-dev");
+  static const Ros2Module& module = load<Ros2Module>("pointflight_ros2", "ROS 2", "cyclonedds-dev");
   return module;
 }
 

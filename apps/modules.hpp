@@ -1,8 +1,13 @@
 #pragma once
 
+#include <string>
+
 #include "ros_common/wire.hpp"
 
 namespace pointflight::apps {
+
+/// True where this build came with a module ("pointflight_ros1", "pointflight_ros2").
+bool has_module(const std::string& name);
 
 /// The library that speaks ROS 1, loaded when first asked for. Throws InputError that says what to
 /// install where this build has none.

@@ -11,11 +11,18 @@ install(FILES ${PROJECT_BINARY_DIR}/generated/pointflight/core/version.hpp
 install(DIRECTORY data/ DESTINATION ${CMAKE_INSTALL_DATADIR}/pointflight)
 install(EXPORT pointflight NAMESPACE pointflight:: FILE pointflight-targets.cmake
         DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/pointflight)
+set(POINTFLIGHT_DATA ${CMAKE_INSTALL_DATADIR}/pointflight)
 configure_package_config_file(cmake/pointflight-config.cmake.in
   ${PROJECT_BINARY_DIR}/pointflight-config.cmake
+  PATH_VARS POINTFLIGHT_DATA
   INSTALL_DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/pointflight)
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/pointflight-config-version.cmake
   COMPATIBILITY SameMinorVersion)
 install(FILES ${PROJECT_BINARY_DIR}/pointflight-config.cmake
               ${PROJECT_BINARY_DIR}/pointflight-config-version.cmake
         DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/pointflight)
+
+# what `cmake --install` wrote goes again by: cmake --build BUILD --target uninstall
+add_custom_target(uninstall
+  COMMAND ${CMAKE_COMMAND} -D MANIFEST=${PROJECT_BINARY_DIR}/install_manifest.txt
+          -P ${PROJECT_SOURCE_DIR}/cmake/uninstall.cmake)

@@ -31,6 +31,7 @@ function(pointflight_module name)
   set_target_properties(pointflight_${name} PROPERTIES EXPORT_NAME ${name}
                                                        POSITION_INDEPENDENT_CODE ON)
   target_link_libraries(pointflight_${name} PUBLIC ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE})
+  target_compile_features(pointflight_${name} PUBLIC cxx_std_20)  # of whoever includes its headers
   pointflight_target_options(pointflight_${name})
   if(POINTFLIGHT_FUZZ AND name IN_LIST POINTFLIGHT_FUZZED)
     target_compile_options(pointflight_${name} PRIVATE -fsanitize=fuzzer-no-link)

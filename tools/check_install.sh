@@ -1,21 +1,63 @@
 #!/bin/sh
-# Installs a build tree, builds the example of a library user against it, and runs both.
-# usage: check_install.sh BUILD_FOLDER
+# Installs a build tree, moves it, builds the examples of a library user against it, runs all of it from
+# elsewhere, and uninstalls. usage: check_install.sh BUILD_FOLDER
 set -eu
 source=$(cd "$(dirname "$0")/.." && pwd)
+build=$(cd "$1" && pwd)
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
-cmake --install "$1" --prefix "$folder/usr" >"$folder/log"
-"$folder/usr/bin/pointflight" lidar list | grep -q mid360
-cmake -S "$source/examples" -B "$folder/build" -G Ninja \
-      -DCMAKE_PREFIX_PATH="$folder/usr" -DCMAKE_BUILD_TYPE=RelWithDebInfo >"$folder/log" 2>&1 ||
-  { cat "$folder/log"; exit 1; }
-cmake --build "$folder/build" >"$folder/log" 2>&1 || { cat "$folder/log"; exit 1; }
+unset POINTFLIGHT_DATA
+fail() {
+  echo "check_install: $*" >&2
+  exit 1
+}
+
+cmake --install "$build" --prefix "$folder/first" >"$folder/log"
+for file in bin/pointflight share/man/man1/pointflight.1 share/bash-completion/completions/pointflight \
+            share/pointflight/lidars/mid360.yaml; do
+  [ -f "$folder/first/$file" ] || fail "$file was not installed"
+done
+mv "$folder/first" "$folder/usr"  # a prefix that no build has heard of
 cd "$folder"
-POINTFLIGHT_DATA="$folder/usr/share/pointflight" "$folder/build/scan_a_room"
-POINTFLIGHT_DATA="$folder/usr/share/pointflight" "$folder/build/step_a_flight"
-"$folder/usr/bin/pointflight" map forest --size-x 24 --size-y 16 --trees 800 -o forest.pcd 2>/dev/null
-"$folder/usr/bin/pointflight" map import forest.pcd -o forest.pfmap --resolution 0.1 >/dev/null 2>&1
-POINTFLIGHT_DATA="$folder/usr/share/pointflight" "$folder/build/fly_with_planner" forest.pfmap \
-    -o planned --seed 1 --obstacles 8
-"$folder/usr/bin/pointflight" picture planned --map forest.pfmap
+usr/bin/pointflight lidar list | grep -q mid360
+
+# a program with nothing but what README and docs/planner.md say: the compiler's own standard, no paths
+mkdir user
+cat >user/CMakeLists.txt <<'END'
+cmake_minimum_required(VERSION 3.21)
+project(mine LANGUAGES CXX)
+find_package(pointflight REQUIRED)
+add_executable(mine mine.cpp)
+target_link_libraries(mine PRIVATE pointflight::sim)
+END
+cat >user/mine.cpp <<'END'
+#include <cstdio>
+
+#include "pointflight/core/resources.hpp"
+#include "pointflight/sim/scenario.hpp"
+
+int main() { std::printf("%s\n", pointflight::data_folder().c_str()); }
+END
+for of in user "$source/examples"; do
+  { cmake -S "$of" -B "$folder/build" -G Ninja -DCMAKE_PREFIX_PATH="$folder/usr" \
+          -DCMAKE_BUILD_TYPE=RelWithDebInfo && cmake --build "$folder/build"; } >"$folder/log" 2>&1 ||
+    { cat "$folder/log"; exit 1; }
+  [ "$of" = user ] || continue
+  found=$(build/mine)
+  [ "$found" = "$folder/usr/share/pointflight" ] || fail "a program found its data in $found"
+  rm -r build
+done
+build/scan_a_room
+build/step_a_flight
+usr/bin/pointflight map forest --size-x 24 --size-y 16 --trees 800 -o forest.pcd 2>/dev/null
+usr/bin/pointflight map import forest.pcd -o forest.pfmap --resolution 0.1 >/dev/null 2>&1
+build/fly_with_planner forest.pfmap -o planned --seed 1 --obstacles 8
+usr/bin/pointflight picture planned
+
+# everything goes again, but what others have put there
+cmake --install "$build" --prefix "$folder/gone" >"$folder/log"
+touch gone/bin/precious
+cmake -D MANIFEST="$build/install_manifest.txt" -P "$source/cmake/uninstall.cmake" >"$folder/log" 2>&1
+left=$(find gone -type f)
+[ "$left" = gone/bin/precious ] || fail "the uninstaller left: $left"
+[ ! -e gone/share/pointflight ] && [ ! -e gone/include/pointflight ] || fail "folders were left"

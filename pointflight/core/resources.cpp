@@ -13,18 +13,34 @@
 namespace pointflight {
 namespace fs = std::filesystem;
 
+namespace {
+
+/// A function's, for it is used before main.
+std::vector<std::string>& added_folders() {
+  static std::vector<std::string> folders;
+  return folders;
+}
+
+}  // namespace
+
+bool add_data_folder(const std::string& folder) {
+  added_folders().push_back(folder);
+  return true;
+}
+
 std::string data_folder() {
   // NOLINTNEXTLINE(concurrency-mt-unsafe): nothing in the program calls setenv
   if (const char* set = std::getenv("POINTFLIGHT_DATA")) return set;
+  std::vector<std::string> places;
   std::error_code error;
   const fs::path program = fs::read_symlink("/proc/self/exe", error);
   if (!error) {
-    const fs::path installed = program.parent_path().parent_path() / "share" / "pointflight";
-    if (fs::is_directory(installed / "lidars", error)) return installed.string();
+    places.push_back((program.parent_path().parent_path() / "share" / "pointflight").string());
   }
-  // a library user's program elsewhere: where the package was installed, or its source tree
-  if (fs::is_directory(fs::path(POINTFLIGHT_INSTALLED_DATA) / "lidars", error)) {
-    return POINTFLIGHT_INSTALLED_DATA;
+  places.insert(places.end(), added_folders().begin(), added_folders().end());
+  places.emplace_back(POINTFLIGHT_INSTALLED_DATA);
+  for (const std::string& place : places) {
+    if (fs::is_directory(fs::path(place) / "lidars", error)) return place;
   }
   return POINTFLIGHT_SOURCE_DATA;
 }

@@ -5,9 +5,15 @@
 
 namespace pointflight {
 
-/// The folder with the shipped `lidars/`, `vehicles/` and `scenarios/`: `$POINTFLIGHT_DATA` if set,
-/// else `../share/pointflight` beside the program, else the source tree it was built from.
+/// The folder with the shipped `lidars/`, `vehicles/` and `ros_profiles/`: `$POINTFLIGHT_DATA` if
+/// set, else the first that is there of `../share/pointflight` beside the program, what
+/// `add_data_folder` named, where the package was to be installed, and the source tree that it was
+/// built from.
 std::string data_folder();
+
+/// One more place for `data_folder` to look. The CMake package calls this in programs that link it,
+/// so that they find the data of whatever prefix it lies in. Returns true.
+bool add_data_folder(const std::string& folder);
 
 /// True for what `find_model` takes as a path: it contains '/' or ends in ".yaml".
 bool is_model_path(const std::string& name_or_path);

@@ -188,6 +188,7 @@ std::string Scenario::folder() const {
 
 std::string Scenario::place(const std::string& key) const {
   const auto line = lines.find(key);
+  if (path.empty()) return "the scenario";  // made up by a program
   return line == lines.end() ? path : fmt::format("{}:{}", path, line->second);
 }
 
