@@ -8,12 +8,14 @@
 
 #include "pointflight/render/beam_kernel.hpp"
 #include "pointflight/render/beam_renderer.hpp"
+#include "pointflight/render/direction_order.hpp"
 
 namespace pointflight {
 namespace {
 
 constexpr std::size_t kChunk = 2048;  // rays
 constexpr std::size_t kLanes = 8;
+constexpr std::size_t kManyBodies = 200;  // from here on sorted rays are worth their sorting
 
 /// The directions in which a body can be met while the batch is fired: around the middle of the
 /// rays' origins, as wide as it and everybody's motion make it.
@@ -75,37 +77,92 @@ std::vector<Cone> cones_of(const RayBatch& batch) {
   return cones;
 }
 
-/// Directions of a chunk's rays as arrays, in whole groups of eight.
-struct Directions {
-  std::array<float, kChunk> x{}, y{}, z{};
-  std::size_t count = 0;
-
-  explicit Directions(std::span<const Ray> rays) : count(rays.size()) {
-    const std::size_t groups = (count + kLanes - 1) / kLanes * kLanes;
+/// Directions of a chunk's rays as arrays, in whole groups of eight, and cones around blocks of
+/// neighbours, so that a body asks only blocks that it may be seen from.
+class Directions {
+ public:
+  /// `order`: the numbers of the chunk's rays, neighbours together where there are many bodies.
+  Directions(std::span<const Ray> rays, std::span<const std::uint32_t> order) : order_(order) {
+    const std::size_t groups = (order.size() + kLanes - 1) / kLanes * kLanes;
     for (std::size_t i = 0; i < groups; ++i) {
-      const Vector3f& d = rays[std::min(i, count - 1)].direction_world;
-      x[i] = d.x();
-      y[i] = d.y();
-      z[i] = d.z();
+      const Vector3f& d = rays[order[std::min(i, order.size() - 1)]].direction_world;
+      x_[i] = d.x();
+      y_[i] = d.y();
+      z_[i] = d.z();
+    }
+    for (std::size_t first = 0; first < groups; first += kBlock) {
+      blocks_.push_back(block_of(first, std::min(first + kBlock, groups)));
     }
   }
 
-  /// Appends `first` + the numbers of the rays within a cone.
-  void within(const Cone& cone, std::size_t first, std::vector<std::uint32_t>& found) const {
-    for (std::size_t g = 0; g < count; g += kLanes) {
-      std::array<float, kLanes> cosine{};
-      float most = -2.0f;
-      for (std::size_t k = 0; k < kLanes; ++k) {
-        cosine[k] = cone.axis.x() * x[g + k] + cone.axis.y() * y[g + k] + cone.axis.z() * z[g + k];
-      }
-      for (const float c : cosine) most = std::max(most, c);
-      if (most < cone.cos_limit) continue;
-      for (std::size_t k = 0; k < kLanes && g + k < count; ++k) {
-        if (cosine[k] >= cone.cos_limit) found.push_back(static_cast<std::uint32_t>(first + g + k));
-      }
+  /// Appends the numbers of the rays within a cone.
+  void within(const Cone& cone, std::vector<std::uint32_t>& found) const {
+    const float sine = std::sqrt(std::max(0.0f, 1.0f - cone.cos_limit * cone.cos_limit));
+    for (const Block& block : blocks_) {
+      // apart where the angle between the axes is more than both half angles
+      const bool whole = cone.cos_limit <= -block.cosine;
+      const float limit = cone.cos_limit * block.cosine - sine * block.sine - kBlockSlack;
+      if (!whole && cone.axis.dot(block.axis) < limit) continue;
+      for (std::size_t g = block.begin; g < block.end; g += kLanes) group_within(cone, g, found);
     }
   }
+
+ private:
+  static constexpr std::size_t kBlock = 64;
+  static constexpr float kBlockSlack = 1e-5f;  // room for rounding
+  struct Block {
+    std::size_t begin, end;
+    Vector3f axis;
+    float cosine, sine;  ///< Of the half angle.
+  };
+
+  [[nodiscard]] Vector3f at(std::size_t i) const { return {x_[i], y_[i], z_[i]}; }
+
+  [[nodiscard]] Block block_of(std::size_t begin, std::size_t end) const {
+    Vector3f sum = Vector3f::Zero();
+    for (std::size_t i = begin; i < end; ++i) sum += at(i);
+    if (sum.norm() < 0.1f) return {begin, end, Vector3f::UnitX(), -1.0f, 0.0f};  // all around
+    const Vector3f axis = sum.normalized();
+    float cosine = 1.0f;
+    for (std::size_t i = begin; i < end; ++i) cosine = std::min(cosine, axis.dot(at(i)));
+    return {begin, end, axis, cosine, std::sqrt(std::max(0.0f, 1.0f - cosine * cosine))};
+  }
+
+  void group_within(const Cone& cone, std::size_t g, std::vector<std::uint32_t>& found) const {
+    std::array<float, kLanes> cosine{};
+    float most = -2.0f;
+    for (std::size_t k = 0; k < kLanes; ++k) {
+      cosine[k] = cone.axis.x() * x_[g + k] + cone.axis.y() * y_[g + k] + cone.axis.z() * z_[g + k];
+    }
+    for (const float c : cosine) most = std::max(most, c);
+    if (most < cone.cos_limit) return;
+    for (std::size_t k = 0; k < kLanes && g + k < order_.size(); ++k) {
+      if (cosine[k] >= cone.cos_limit) found.push_back(order_[g + k]);
+    }
+  }
+
+  std::span<const std::uint32_t> order_;
+  std::array<float, kChunk> x_{}, y_{}, z_{};
+  std::vector<Block> blocks_;
 };
+
+/// Numbers of a batch's rays: as they are, or along a curve over the sphere where sorting pays.
+std::vector<std::uint32_t> ray_order(const RayBatch& batch,
+                                     std::size_t bodies,
+                                     const Executor& executor) {
+  if (bodies >= kManyBodies && batch.order.size() == batch.rays.size()) {
+    return {batch.order.begin(), batch.order.end()};
+  }
+  if (bodies >= kManyBodies) {
+    std::vector<Vector3f> directions;
+    directions.reserve(batch.rays.size());
+    for (const Ray& ray : batch.rays) directions.push_back(ray.direction_world);
+    return direction_order(directions, executor);
+  }
+  std::vector<std::uint32_t> order(batch.rays.size());
+  std::iota(order.begin(), order.end(), 0u);
+  return order;
+}
 
 /// A ray in the frame of a body at the ray's own time.
 Ray in_body(const Ray& ray, const Pose& T_world_body) {
@@ -175,12 +232,13 @@ void render_bodies(const RayBatch& batch, std::span<Hit> hits, const Executor& e
   if (batch.bodies.empty() || batch.rays.empty()) return;
   const std::vector<Cone> cones = cones_of(batch);
   if (cones.empty()) return;
-  executor.parallel_for(batch.rays.size(), kChunk, [&](std::size_t begin, std::size_t end) {
-    const Directions directions(batch.rays.subspan(begin, end - begin));
+  const std::vector<std::uint32_t> order = ray_order(batch, cones.size(), executor);
+  executor.parallel_for(order.size(), kChunk, [&](std::size_t begin, std::size_t end) {
+    const Directions directions(batch.rays, std::span(order).subspan(begin, end - begin));
     std::vector<std::uint32_t> candidates;
     for (const Cone& cone : cones) {
       candidates.clear();
-      directions.within(cone, begin, candidates);
+      directions.within(cone, candidates);
       if (candidates.empty()) continue;
       if (std::holds_alternative<Solid>(cone.body->shape)) {
         meet_solid(batch, *cone.body, candidates, hits);

@@ -16,6 +16,9 @@
 namespace pointflight {
 
 WaypointLoop::WaypointLoop(const std::vector<Vector3d>& waypoints, double speed) : speed_(speed) {
+  if (waypoints.empty() || !(speed > 0.0)) {
+    throw InputError("a loop needs waypoints and a speed above 0");
+  }
   Quaterniond heading = Quaterniond::Identity();
   for (std::size_t i = 0; i < waypoints.size(); ++i) {
     const Vector3d way = waypoints[(i + 1) % waypoints.size()] - waypoints[i];

@@ -2,7 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
+#include <stdexcept>
+#include <utility>
 
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/input_error.hpp"
@@ -20,6 +23,8 @@ constexpr std::array<std::string_view, 2> kDirections = {"any", "horizontal"};
 constexpr std::array<std::string_view, 2> kBorders = {"replace", "bounce"};
 constexpr double kFar = 1e7;          // m
 constexpr std::size_t kMost = 50000;  // labels have 16 bits in a scan's file
+constexpr Duration kSlice = std::chrono::milliseconds(200);
+constexpr std::size_t kSlicesKept = 8;
 
 /// Stands still.
 class Still : public ObstacleMotion {
@@ -80,6 +85,7 @@ void check(const ObstacleSettings& s, const std::function<std::string(const char
   if (s.shape == "cloud" && s.file.empty()) fail("file", "shape 'cloud' needs a cloud or mesh");
   if (s.shape != "cloud" && !s.file.empty()) fail("file", "only shape 'cloud' has a file");
   if (s.motion == "loop" && s.waypoints.empty()) fail("waypoints", "motion 'loop' needs some");
+  if (s.motion == "loop" && s.speed <= 0.0) fail("speed", "motion 'loop' needs one above 0");
   if (s.motion == "keyframes" && s.keyframes.empty()) fail("keyframes", "the CSV is missing");
   if (s.motion != "random" && s.count != 1) {
     fail("count", "only obstacles that move at random come in numbers; write one entry each");
@@ -122,9 +128,11 @@ void describe(SettingsVisitor& v, ObstacleSettings& s) {
 Obstacles::Obstacles(const std::vector<ObstacleSettings>& settings,
                      const ObstacleWorld& world,
                      const Executor& executor) {
+  if (!world.map || !world.place) throw std::invalid_argument("obstacles need a map and places");
   for (std::size_t entry = 0; entry < settings.size(); ++entry) {
     const ObstacleSettings& s = settings[entry];
     const auto place = [&](const char* key) { return world.place(entry, key); };
+    check_settings(s, fmt::format("obstacles[{}]", entry));
     check(s, place);
     std::shared_ptr<const SurfelMap> cloud;
     if (s.shape == "cloud") {
@@ -161,12 +169,60 @@ Obstacles::Obstacles(const std::vector<ObstacleSettings>& settings,
 std::vector<Body> Obstacles::bodies(SimTime from, SimTime until) const {
   std::vector<Body> bodies;
   bodies.reserve(obstacles_.size());
-  const std::lock_guard lock(*extending_);  // the motion is worked out as far as needed
+  const std::lock_guard lock(known_->mutex);  // the motion is worked out as far as needed
   for (const auto& obstacle : obstacles_) {
     obstacle->extend(until);
     obstacle->collect(from, until, bodies);
   }
   return bodies;
+}
+
+std::shared_ptr<const Obstacles::Slice> Obstacles::slice(std::int64_t number) const {
+  {
+    const std::lock_guard lock(known_->mutex);
+    const auto found = known_->slices.find(number);
+    if (found != known_->slices.end()) return found->second;
+  }
+  const SimTime from = SimTime{} + number * kSlice;
+  std::vector<Body> bodies = this->bodies(from, from + kSlice);
+  std::vector<BoundingBall> balls;
+  balls.reserve(bodies.size());
+  for (const Body& body : bodies) {
+    const SimTime first = std::max(from, body.from);
+    const SimTime last = std::min(from + kSlice, body.until);
+    const SimTime middle = first + (last - first) / 2;
+    const double moved = body.speed_max * to_seconds(last - middle);
+    balls.push_back({body.T_world_body(middle).translation, bounding_radius(body.shape) + moved});
+  }
+  auto made = std::make_shared<const Slice>(Slice{std::move(bodies), BallTree(std::move(balls))});
+  const std::lock_guard lock(known_->mutex);
+  known_->slices[number] = made;  // another thread may have made the same
+  if (known_->slices.size() > kSlicesKept) known_->slices.erase(known_->slices.begin());
+  return made;
+}
+
+std::vector<Body> Obstacles::near(const Vector3d& place_world,
+                                  double reach,
+                                  SimTime from,
+                                  SimTime until) const {
+  std::vector<Body> found;
+  if (obstacles_.empty()) return found;
+  const std::int64_t first = from.time_since_epoch() / kSlice;
+  const std::int64_t last = until.time_since_epoch() / kSlice;
+  for (std::int64_t number = first; number <= last; ++number) {
+    const auto slice = this->slice(number);
+    for (const std::uint32_t i : slice->tree.within(place_world, reach)) {
+      found.push_back(slice->bodies[i]);
+    }
+  }
+  if (first == last) return found;
+  // one that is there in two slices counts once
+  const auto key = [](const Body& body) { return std::pair(body.label, body.from); };
+  std::stable_sort(
+      found.begin(), found.end(), [&](const Body& a, const Body& b) { return key(a) < key(b); });
+  const auto same = [&](const Body& a, const Body& b) { return key(a) == key(b); };
+  found.erase(std::unique(found.begin(), found.end(), same), found.end());
+  return found;
 }
 
 }  // namespace pointflight

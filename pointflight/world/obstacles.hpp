@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -10,6 +11,7 @@
 
 #include "pointflight/core/parallel.hpp"
 #include "pointflight/core/settings.hpp"
+#include "pointflight/geometry/ball_tree.hpp"
 #include "pointflight/map/scene.hpp"
 #include "pointflight/world/obstacle_motion.hpp"
 
@@ -87,9 +89,28 @@ class Obstacles {
   /// Bodies between two instants. Callable from several threads.
   [[nodiscard]] std::vector<Body> bodies(SimTime from, SimTime until) const;
 
+  /// Those that may come within `reach` of a place between two instants, and perhaps some more, in
+  /// the order of their labels. Looks at no others. Callable from several threads.
+  [[nodiscard]] std::vector<Body> near(const Vector3d& place_world,
+                                       double reach,
+                                       SimTime from,
+                                       SimTime until) const;
+
  private:
+  /// All bodies of a slice of time, and where each can be in it.
+  struct Slice {
+    std::vector<Body> bodies;
+    BallTree tree;
+  };
+  /// What is worked out as time goes on; functions of the obstacles, so that all may share it.
+  struct Known {
+    std::mutex mutex;
+    std::map<std::int64_t, std::shared_ptr<const Slice>> slices;
+  };
+  [[nodiscard]] std::shared_ptr<const Slice> slice(std::int64_t number) const;
+
   std::vector<std::unique_ptr<Obstacle>> obstacles_;
-  std::unique_ptr<std::mutex> extending_ = std::make_unique<std::mutex>();
+  std::unique_ptr<Known> known_ = std::make_unique<Known>();
 };
 
 }  // namespace pointflight
