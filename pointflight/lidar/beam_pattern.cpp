@@ -12,6 +12,7 @@
 namespace pointflight {
 
 std::unique_ptr<BeamPattern> make_pattern(const LidarSettings& settings) {
+  check_settings(settings, settings.path.empty() ? "lidar" : settings.path);
   struct Entry {
     const char* name;
     std::unique_ptr<BeamPattern> (*make)(const LidarSettings& settings);

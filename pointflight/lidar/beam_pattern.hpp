@@ -17,7 +17,9 @@ struct Beam {
   Vector3f origin_sensor = Vector3f::Zero();      ///< Where it leaves: not zero for Ouster, HDL-64.
   Vector3f direction_sensor = Vector3f::UnitX();  ///< Unit vector.
   Duration time_offset{0};                        ///< Firing time after the start of the scan.
-  std::uint16_t ring = 0;                         ///< Channel (0 is the lowest) or line.
+  /// As the maker's driver numbers it: Velodyne's channels from below, Ouster's rows from above,
+  /// Livox' lines.
+  std::uint16_t ring = 0;
 };
 
 /// Where and when a LiDAR fires during one scan.

@@ -12,11 +12,11 @@ namespace {
 
 constexpr std::size_t kChunk = 2048;  // beams
 
-/// Range with the sensor's Gaussian noise.
-float measured_range(float range,
-                     const RangeNoiseSettings& noise,
-                     const RandomStream& random,
-                     std::uint64_t index) {
+/// Range (of a depth camera: depth) with the sensor's Gaussian noise.
+float measured(float range,
+               const RangeNoiseSettings& noise,
+               const RandomStream& random,
+               std::uint64_t index) {
   const double r = static_cast<double>(range);
   const double far = noise.range_sigma_per_m2 * r * r;
   const double sigma = std::sqrt(noise.range_sigma * noise.range_sigma + far * far);
@@ -26,7 +26,29 @@ float measured_range(float range,
 }  // namespace
 
 Lidar::Lidar(const LidarSettings& settings, std::uint32_t sensor)
-    : settings_(settings), sensor_(sensor), pattern_(make_pattern(settings)) {}
+    : settings_(settings),
+      sensor_(sensor),
+      pattern_(make_pattern(settings)),
+      measures_depth_(settings.pattern == "grid" && settings.grid.projection == "pinhole") {}
+
+/// What a beam's range times this is what the sensor measures and its limits are of: depth along
+/// the axis for cameras, else the range itself.
+float Lidar::depth_share(const Beam& beam) const {
+  return measures_depth_ ? beam.direction_sensor.x() : 1.0f;
+}
+
+double Lidar::reach() const {
+  if (!measures_depth_) return settings_.range_max;
+  // of the pixel that lies farthest from the principal point
+  const GridSettings& g = settings_.grid;
+  const auto farthest = [](double center, std::int64_t count, double focal_length) {
+    return std::max(std::abs(center), std::abs(static_cast<double>(count - 1) - center)) /
+           focal_length;
+  };
+  const double u = farthest(g.cx, g.columns, g.fx);
+  const double v = farthest(g.cy, g.rows, g.fy);
+  return 1.001 * settings_.range_max * std::sqrt(1.0 + u * u + v * v);
+}
 
 Duration Lidar::period() const {
   return from_seconds(1.0 / settings_.rate);
@@ -85,7 +107,7 @@ Scan Lidar::take(const ScanRequest& request,
       rays[i].origin_world = pose * beams[i].origin_sensor.cast<double>();
       rays[i].direction_world =
           (pose.rotation * beams[i].direction_sensor.cast<double>()).cast<float>().normalized();
-      rays[i].range_max = range_max;
+      rays[i].range_max = range_max / depth_share(beams[i]);
       if (!offsets.empty()) offsets[i] = beams[i].time_offset;
     }
   });
@@ -95,7 +117,7 @@ Scan Lidar::take(const ScanRequest& request,
   batch.rays = rays;
   batch.order = ordered->order;
   batch.T_world_sensor = middle;
-  batch.range_max = range_max;
+  batch.range_max = static_cast<float>(reach());
   batch.bodies = request.bodies;
   batch.snapshot_time = request.start + period() / 2;
   batch.time = snapshot ? batch.snapshot_time : request.start;
@@ -109,14 +131,16 @@ Scan Lidar::take(const ScanRequest& request,
     for (std::size_t i = begin; i < end; ++i) {
       ranges[i] = hits[i].range;
       if (!hits[i].is_return() || !request.noise) continue;
-      ranges[i] = measured_range(hits[i].range, settings_.noise, random, request.index << 32 | i);
+      const float share = depth_share(beams[i]);
+      ranges[i] =
+          measured(hits[i].range * share, settings_.noise, random, request.index << 32 | i) / share;
     }
   });
   const auto range_min = static_cast<float>(settings_.range_min);
   scan.points.reserve(beams.size());
   for (std::size_t i = 0; i < beams.size(); ++i) {
     // noise neither makes nor ends a return at the far limit; it may at the near one
-    if (!hits[i].is_return() || ranges[i] < range_min) continue;
+    if (!hits[i].is_return() || ranges[i] * depth_share(beams[i]) < range_min) continue;
     scan.points.push_back({beams[i].origin_sensor + ranges[i] * beams[i].direction_sensor,
                            ranges[i],
                            hits[i].intensity,

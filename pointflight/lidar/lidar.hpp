@@ -30,6 +30,8 @@ class Lidar {
 
   [[nodiscard]] const LidarSettings& settings() const { return settings_; }
   [[nodiscard]] Duration period() const;
+  /// The longest ray that it can see something at, m from the sensor.
+  [[nodiscard]] double reach() const;
 
   /// Takes one scan in arrears: `pose_at` (T_world_sensor) and the bodies must know all instants of
   /// the scan. The result does not depend on the executor's threads.
@@ -52,9 +54,12 @@ class Lidar {
   [[nodiscard]] std::shared_ptr<const OrderedBeams> ordered_beams(std::uint64_t scan_index,
                                                                   const Executor& executor) const;
 
+  [[nodiscard]] float depth_share(const Beam& beam) const;
+
   LidarSettings settings_;
   std::uint32_t sensor_;
   std::unique_ptr<BeamPattern> pattern_;
+  bool measures_depth_ = false;  ///< Limits and noise are of the depth along the axis.
   /// Of a pattern that repeats, after its first scan.
   struct Kept {
     std::mutex mutex;

@@ -76,7 +76,8 @@ void describe_csv(SettingsVisitor& v, CsvSettings& s) {
 }
 
 void describe_noise(SettingsVisitor& v, RangeNoiseSettings& s) {
-  v.value({"range_sigma", "m", "standard deviation of the range", 0, 10}, s.range_sigma);
+  v.value({"range_sigma", "m", "standard deviation of the range (pinhole grid: depth)", 0, 10},
+          s.range_sigma);
   v.value({"range_sigma_per_m2", "1/m", "part that grows with range squared (stereo)", 0, 1},
           s.range_sigma_per_m2);
 }
@@ -137,8 +138,15 @@ void describe(SettingsVisitor& v, LidarSettings& s) {
   v.value({"title", "", "maker and model"}, s.title);
   v.value({"source", "", "where the figures come from"}, s.source);
   v.value({"rate", "Hz", "scans a second", 0.01, 10000}, s.rate);
-  v.value({"range_min", "m", "shorter returns are dropped", 0, 1e5}, s.range_min);
-  v.value({"range_max", "m", "longest range", 0.01, 1e5, true}, s.range_max);
+  v.value({"range_min",
+           "m",
+           "shorter returns are dropped; of a pinhole grid: less depth along the axis",
+           0,
+           1e5},
+          s.range_min);
+  v.value(
+      {"range_max", "m", "longest range; of a pinhole grid: depth along the axis", 0.01, 1e5, true},
+      s.range_max);
   v.value({"image_resolution_deg", "deg", "theta_res of the paper renderer", 0.01, 10},
           s.image_resolution_deg);
   v.section({"noise", "", "Gaussian range noise"},

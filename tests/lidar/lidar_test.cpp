@@ -67,6 +67,43 @@ TEST(Lidar, AScanTakenWhileFlyingUsesThePoseOfEachBeam) {
   EXPECT_LT(mean_one_pose, 0.003);
 }
 
+/// Share of a D455's pixels that see a wall across its axis at `depth`; their depths are checked.
+double share_of_pixels(double depth, bool noise) {
+  ShapeScene scene;
+  scene.add_box({depth, -12, -12}, {depth + 0.4, 12, 12});
+  const auto map = map_of(scene, 0.1);
+  const auto renderer = make_renderer("beam", Scene{map});
+  const Lidar camera(load_lidar("d455"), 0);
+  ScanRequest request;
+  request.noise = noise;
+  const PoseAt still = [](SimTime) { return Pose{}; };
+  const Scan scan = camera.take(request, still, *renderer, Executor(2));
+  double sum = 0.0;
+  double squares = 0.0;
+  const auto count = static_cast<double>(scan.points.size());
+  for (const ScanPoint& point : scan.points) {
+    const double off = static_cast<double>(point.position_sensor.x()) - depth;
+    sum += off;
+    squares += off * off;
+  }
+  if (count > 0.0) {
+    EXPECT_NEAR(sum / count, 0.0, 0.01);
+    // stereo: the deviation of the depth grows with its square, in the corners as in the middle
+    EXPECT_NEAR(std::sqrt(squares / count), noise ? 0.00214 * depth * depth : 0.0, 0.01);
+  }
+  return count / static_cast<double>(scan.beams);
+}
+
+TEST(Lidar, ADepthCamerasLimitsAreOfTheDepthAlongItsAxis) {
+  for (const bool noise : {false, true}) {
+    EXPECT_GT(share_of_pixels(5.0, noise), 0.9999);
+    EXPECT_GT(share_of_pixels(5.9, noise), 0.9999);
+    EXPECT_EQ(share_of_pixels(6.1, noise), 0.0);
+    EXPECT_GT(share_of_pixels(0.65, noise), 0.9999);
+    EXPECT_EQ(share_of_pixels(0.55, noise), 0.0);
+  }
+}
+
 TEST(Lidar, RangeNoiseHasTheFilesDeviationAndNoBias) {
   ShapeScene scene;
   scene.add_box({-6, -6, -2}, {6, 6, 4});

@@ -5,9 +5,11 @@
 #include <cmath>
 #include <cstring>
 #include <fstream>
+#include <map>
 #include <set>
 
 #include "pointflight/core/constants.hpp"
+#include "pointflight/core/resources.hpp"
 #include "pointflight/io/csv_table.hpp"
 #include "pointflight/lidar/beam_pattern.hpp"
 #include "pointflight/lidar/lidar_settings.hpp"
@@ -219,6 +221,52 @@ TEST(Vlp32c, FiresItsChannelsAtTheirTimesAndAngles) {
   EXPECT_EQ(beams[2].time_offset - beams[0].time_offset, Duration(2304));
 }
 
+TEST(Vlp32c, RingsCountFromBelowAsInItsDriver) {
+  std::map<int, double> elevation;
+  for (const Beam& beam : scan_of("vlp32c")) elevation[beam.ring] = angles_of(beam).elevation_deg;
+  for (int ring = 1; ring < 32; ++ring) EXPECT_GT(elevation[ring], elevation[ring - 1]) << ring;
+}
+
+TEST(Lidars, AllBeamsOfAScanFireWithinIt) {
+  const Executor executor(1);
+  for (const std::string& name : model_names("lidars")) {
+    SCOPED_TRACE(name);
+    const LidarSettings settings = load_lidar(name);
+    const Schedule scans(settings.rate);
+    const auto pattern = make_pattern(settings);
+    for (const std::uint64_t k : {0, 1, 2, 37}) {
+      const auto index = static_cast<std::int64_t>(k);
+      const Duration period = scans.at(index + 1) - scans.at(index);
+      Duration last{0};
+      for (const Beam& beam : pattern->beams(k, executor)) {
+        ASSERT_GE(beam.time_offset, last);
+        ASSERT_LT(beam.time_offset, period);
+        last = beam.time_offset;
+      }
+    }
+  }
+}
+
+TEST(Vlp32c, NoFiringIsLostOrTakenTwiceBetweenScans) {
+  const Executor executor(1);
+  const LidarSettings settings = load_lidar("vlp32c");
+  const auto pattern = make_pattern(settings);
+  std::map<int, std::vector<std::int64_t>> times;  // of each ring, in the sensor's time
+  for (std::uint64_t k = 0; k < 5; ++k) {
+    const Duration start =
+        Schedule(settings.rate).at(static_cast<std::int64_t>(k)).time_since_epoch();
+    for (const Beam& beam : pattern->beams(k, executor)) {
+      times[beam.ring].push_back((start + beam.time_offset).count());
+    }
+  }
+  EXPECT_EQ(times.size(), 32u);
+  for (const auto& [ring, fired] : times) {
+    for (std::size_t i = 1; i < fired.size(); ++i) {
+      ASSERT_NEAR(static_cast<double>(fired[i] - fired[i - 1]), 55296.0, 1.0) << ring;
+    }
+  }
+}
+
 TEST(Hdl64e, HasItsPointsAndTheParallaxOfItsBlocks) {
   const auto beams = scan_of("hdl64e");
   EXPECT_NEAR(static_cast<double>(beams.size()), 133333.0, 130.0);
@@ -235,7 +283,12 @@ TEST(Ouster, ColumnsShareATimeAndBeamsLeaveTheRing) {
     SCOPED_TRACE(name);
     const auto beams = scan_of(name);
     ASSERT_EQ(beams.size(), rows * 1024u);
-    EXPECT_EQ(beams[0].ring, rows - 1);
+    // row 0 is the highest, as in ouster_ros
+    EXPECT_EQ(beams[0].ring, 0);
+    for (std::size_t row = 1; row < rows; ++row) {
+      ASSERT_EQ(beams[row].ring, row);
+      ASSERT_LT(beams[row].direction_sensor.z(), beams[row - 1].direction_sensor.z());
+    }
     EXPECT_EQ(beams[rows - 1].time_offset, beams[0].time_offset);
     EXPECT_EQ(beams[rows].time_offset, Duration(97656));
     EXPECT_NEAR(beams[0].origin_sensor.head<2>().norm(), 0.015806f, 1e-6f);

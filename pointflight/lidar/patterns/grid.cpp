@@ -1,4 +1,5 @@
 #include "pointflight/core/constants.hpp"
+#include "pointflight/core/input_error.hpp"
 #include "pointflight/lidar/lidar_settings.hpp"
 #include "pointflight/lidar/patterns/patterns.hpp"
 
@@ -12,6 +13,9 @@ class GridPattern : public BeamPattern {
   explicit GridPattern(const LidarSettings& settings) {
     const GridSettings& s = settings.grid;
     const bool pinhole = s.projection == "pinhole";
+    if (pinhole && !(s.fx > 0.0 && s.fy > 0.0)) {
+      throw InputError("grid.projection: pinhole needs fx and fy");
+    }
     for (std::int64_t row = 0; row < s.rows; ++row) {
       for (std::int64_t column = 0; column < s.columns; ++column) {
         const auto u = static_cast<double>(column);

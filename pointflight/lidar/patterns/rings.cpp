@@ -64,11 +64,18 @@ class VelodynePattern : public BeamPattern {
     std::stable_sort(channels_.begin(), channels_.end(), [](const Channel& a, const Channel& b) {
       return a.fire_time < b.fire_time;
     });
+    for (const Channel& channel : channels_) {
+      const double cycles = to_seconds(channel.fire_time) / (settings.rings.cycle_us * 1e-6);
+      reach_ = std::max(reach_, static_cast<std::int64_t>(std::ceil(std::abs(cycles))));
+    }
   }
 
   [[nodiscard]] std::vector<Beam> beams(std::uint64_t scan_index,
                                         const Executor& executor) const override {
-    const ShotTrain::Range range = train_.in_scan(scan_index);
+    // of the cycles that reach over its ends, too
+    ShotTrain::Range range = train_.in_scan(scan_index);
+    range.begin = std::max<std::int64_t>(0, range.begin - reach_);
+    range.end += reach_;
     const auto cycles = static_cast<std::size_t>(range.end - range.begin);
     std::vector<Beam> beams(cycles * channels_.size());
     executor.parallel_for(cycles, 64, [&](std::size_t begin, std::size_t end) {
@@ -79,6 +86,12 @@ class VelodynePattern : public BeamPattern {
           beams[i * channels_.size() + c] = fire(channels_[c], time, range.scan_start);
         }
       }
+    });
+    // each beam belongs to the scan that it fires in
+    const Duration period =
+        train_.scans.at(static_cast<std::int64_t>(scan_index) + 1) - range.scan_start;
+    std::erase_if(beams, [&](const Beam& beam) {
+      return beam.time_offset < Duration{0} || beam.time_offset >= period;
     });
     return beams;
   }
@@ -105,11 +118,13 @@ class VelodynePattern : public BeamPattern {
 
   double rate_;
   ShotTrain train_;
-  std::vector<Channel> channels_;
+  std::vector<Channel> channels_;  ///< In the order of their times.
+  std::int64_t reach_ = 0;         ///< Cycles that a channel fires before or after its own.
 };
 
 /// Ouster: all rows of a column share one time; geometry of the maker's SDK ("lidar range to XYZ"),
-/// in the sensor frame (half a turn about z from the lidar frame). A scan is one turn.
+/// in the sensor frame (half a turn about z from the lidar frame). A scan is one turn. Rings are
+/// the rows from the top, as in the maker's ROS driver (ouster_ros).
 class OusterPattern : public BeamPattern {
  public:
   explicit OusterPattern(const LidarSettings& settings) {
@@ -133,7 +148,7 @@ class OusterPattern : public BeamPattern {
         beams_.push_back({origin.cast<float>(),
                           Vector3d(-lidar.x(), -lidar.y(), lidar.z()).cast<float>(),
                           columns.at(column).time_since_epoch(),
-                          static_cast<std::uint16_t>(table.rows() - 1 - row)});
+                          static_cast<std::uint16_t>(row)});
       }
     }
   }
