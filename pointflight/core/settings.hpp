@@ -121,6 +121,45 @@ class SettingsReader : public SettingsVisitor {
   std::map<std::string, int> lines_;
 };
 
+/// Holds settings that were filled in by a program to what a file may say: throws InputError at the
+/// first number that is not finite or out of its range, and at unknown words.
+class SettingsChecker : public SettingsVisitor {
+ public:
+  /// `name` stands for the path in messages.
+  explicit SettingsChecker(std::string name) : name_(std::move(name)) {}
+
+  void value(const Key& key, double& value) override;
+  void value(const Key& key, std::int64_t& value) override;
+  void value(const Key& key, bool& value) override;
+  void value(const Key& key, std::string& value) override;
+  void value(const Key& key, Eigen::Vector3d& value) override;
+  void value(const Key& key, std::vector<double>& value) override;
+  void value(const Key& key, std::vector<Eigen::Vector3d>& value) override;
+  void choice(const Key& key,
+              std::string& value,
+              std::span<const std::string_view> choices) override;
+
+ protected:
+  bool enter(const Key& key) override;
+  void leave() override;
+  std::size_t enter_list(const Key& key, std::size_t size) override;
+  void enter_item(std::size_t index) override;
+  void leave_list() override;
+
+ private:
+  void check(const Key& key, double number) const;
+  [[noreturn]] void fail(const Key& key, const std::string& what) const;
+  std::string name_;
+  std::vector<std::string> path_;  ///< "vehicles", "[0]", ...
+};
+
+/// Checks a copy of `settings`.
+template <class T>
+void check_settings(T settings, const std::string& name) {
+  SettingsChecker checker(name);
+  describe(checker, settings);
+}
+
 /// Writes the values as YAML with a comment per key: `scenario new`.
 class SettingsWriter : public SettingsVisitor {
  public:

@@ -8,12 +8,19 @@
 namespace pointflight {
 namespace {
 
+/// All digits, so that what is written reads back the same; 0, not -0.
+std::string number_text(double value) {
+  return fmt::format("{}", value == 0.0 ? 0.0 : value);
+}
+
 std::string vector_text(const Eigen::Vector3d& v) {
-  return fmt::format("[{}, {}, {}]", v.x(), v.y(), v.z());
+  return fmt::format("[{}, {}, {}]", number_text(v.x()), number_text(v.y()), number_text(v.z()));
 }
 
 std::string list_text(const std::vector<double>& values) {
-  return fmt::format("[{}]", fmt::join(values, ", "));
+  std::vector<std::string> texts;
+  for (const double value : values) texts.push_back(number_text(value));
+  return fmt::format("[{}]", fmt::join(texts, ", "));
 }
 
 std::string range_text(const Key& key) {
@@ -42,7 +49,7 @@ void SettingsWriter::line(const Key& key, const std::string& value, const std::s
 }
 
 void SettingsWriter::value(const Key& key, double& value) {
-  line(key, fmt::format("{}", value));
+  line(key, number_text(value));
 }
 void SettingsWriter::value(const Key& key, std::int64_t& value) {
   line(key, fmt::format("{}", value));
@@ -125,7 +132,7 @@ void SettingsTable::row(const Key& key, const std::string& value, const std::str
 }
 
 void SettingsTable::value(const Key& key, double& value) {
-  row(key, fmt::format("{}", value), range_text(key));
+  row(key, number_text(value), range_text(key));
 }
 void SettingsTable::value(const Key& key, std::int64_t& value) {
   row(key, fmt::format("{}", value), range_text(key));

@@ -41,7 +41,13 @@ void describe_rotor(SettingsVisitor& v, RotorModel& r) {
 void describe_loop(SettingsVisitor& v, LoopDesign& loop) {
   v.value({"natural_frequency", "rad/s", "of the closed loop", 0.01, 1000}, loop.natural_frequency);
   v.value({"damping", "", "of the closed loop", 0.1, 10}, loop.damping);
-  v.value({"integral", "", "integral gain in units of natural_frequency^3", 0, 1}, loop.integral);
+  v.value({"integral",
+           "",
+           "position loops: how quickly wind and the like are learnt, in units of "
+           "natural_frequency; attitude loops: integral gain in units of its cube",
+           0,
+           1},
+          loop.integral);
 }
 
 void describe_controller(SettingsVisitor& v, ControllerSettings& c) {
@@ -61,7 +67,7 @@ void describe_controller(SettingsVisitor& v, ControllerSettings& c) {
   v.value({"climb_acceleration_max", "m/s^2", "of the position loop, up", 0.1, 100},
           c.climb_acceleration_max);
   v.value({"error_max", "m", "position errors count no more than this", 0.01, 1e4}, c.error_max);
-  v.value({"integral_max", "m/s^2", "the integral asks for no more than this", 0, 100},
+  v.value({"integral_max", "m/s^2", "position loops allow for disturbances up to this", 0, 100},
           c.integral_max);
   v.value({"body_rate_max", "rad/s", "demanded rates", 0.1, 100}, c.body_rate_max);
 }
@@ -84,6 +90,7 @@ void describe_battery(SettingsVisitor& v, BatterySettings& b) {
   v.value({"capacity", "Ah", "from full to empty", 0, 1000}, b.capacity);
   v.value({"resistance", "ohm", "of all cells and leads", 0, 10}, b.resistance);
   v.value({"efficiency", "", "shaft power by electrical power", 0.05, 1}, b.efficiency);
+  v.value({"reserve", "", "share of the capacity left when it counts as low", 0, 0.9}, b.reserve);
 }
 
 VehicleSettings read(SettingsReader& reader, const std::string& path) {
@@ -173,6 +180,15 @@ double VehicleSettings::hover_speed() const {
 double VehicleSettings::thrust_to_weight() const {
   return static_cast<double>(rotors.size()) * rotor.thrust_coefficient * rotor.speed_max *
          rotor.speed_max / (mass * kGravity);
+}
+
+Vector3d VehicleSettings::drag_in_still_air(const Vector3d& v_body) const {
+  const double rotor_drag =
+      static_cast<double>(rotors.size()) * rotor.drag_coefficient * hover_speed();
+  const Vector3d rotor_force = -rotor_drag * Vector3d(v_body.x(), v_body.y(), 0.0);
+  const Vector3d dynamic_pressure =
+      0.5 * kAirDensity * v_body.cwiseAbs().cwiseProduct(v_body);  // signed
+  return (rotor_force - drag_area.cwiseProduct(dynamic_pressure)) / mass;
 }
 
 VehicleSettings load_vehicle(const std::string& name_or_path, const std::string& base) {

@@ -33,13 +33,15 @@ struct RotorModel {
 struct LoopDesign {
   double natural_frequency = 1.0;  ///< rad/s
   double damping = 0.9;
-  double integral = 0.0;  ///< Integral gain in units of natural_frequency^3.
+  /// Position loops: how quickly steady disturbances are learnt, in units of natural_frequency;
+  /// attitude loops: integral gain in units of natural_frequency^3.
+  double integral = 0.0;
 };
 
 struct ControllerSettings {
   std::string kind = "cascade";  ///< or "geometric"
-  LoopDesign horizontal{1.8, 0.9, 0.05};
-  LoopDesign vertical{2.5, 0.9, 0.05};
+  LoopDesign horizontal{1.8, 0.9, 0.25};
+  LoopDesign vertical{2.5, 0.9, 0.25};
   LoopDesign roll_pitch{12.0, 0.9, 0.0};
   LoopDesign yaw{4.0, 0.9, 0.0};
   double speed_max = 15.0;         ///< Of velocity and position commands, m/s.
@@ -47,7 +49,7 @@ struct ControllerSettings {
   double acceleration_max = 10.0;  ///< Of the position loop, horizontal, m/s^2.
   double climb_acceleration_max = 10.0;
   double error_max = 5.0;       ///< Position errors count no more than this, m.
-  double integral_max = 2.0;    ///< Acceleration that the integral may ask for, m/s^2.
+  double integral_max = 4.0;    ///< Disturbance that the position loops allow for, m/s^2.
   double body_rate_max = 10.0;  ///< Demanded rates, rad/s.
 };
 
@@ -67,6 +69,7 @@ struct BatterySettings {
   double capacity = 0.0;    ///< Ah
   double resistance = 0.0;  ///< Of all cells and leads, ohm.
   double efficiency = 0.7;  ///< Of motors and speed controllers: shaft power by electrical.
+  double reserve = 0.1;     ///< Share of the capacity that is left when it counts as low.
 };
 
 /// A vehicle file, `data/vehicles/<name>.yaml`.
@@ -95,6 +98,10 @@ struct VehicleSettings {
 
   [[nodiscard]] double hover_speed() const;  ///< rad/s of each rotor.
   [[nodiscard]] double thrust_to_weight() const;
+
+  /// What the air does to it as it moves at `v_body` through still air, rotors at hover speed,
+  /// body frame, m/s^2.
+  [[nodiscard]] Vector3d drag_in_still_air(const Vector3d& v_body) const;
 };
 
 /// The one list of keys of a vehicle file.

@@ -35,6 +35,8 @@ constexpr double kDescent = 1e4;                                  // m: a landin
 constexpr double kLargest =
     1e9;  // of any number in a command: squares of larger ones overflow soon
 
+constexpr int kLooks = 64;  // at a trajectory
+
 /// False where a number of the command is not finite, or of no use.
 struct Finite {
   static bool all(const Vector3d& v) {
@@ -62,7 +64,16 @@ struct Finite {
     return all(c.p_world) && all(c.v_world) && all(c.a_world) && all(c.jerk_world) && all(c.yaw) &&
            all(c.yaw_rate);
   }
-  bool operator()(const TrajectoryCommand& c) const { return c.trajectory != nullptr; }
+  /// Looks at some instants: a trajectory of the user's own may be anything.
+  bool operator()(const TrajectoryCommand& c) const {
+    if (!c.trajectory) return false;
+    const double duration = c.trajectory->duration();
+    if (!all(duration) || duration < 0.0) return false;
+    for (int i = 0; i <= kLooks; ++i) {
+      if (!(*this)(c.trajectory->at(duration * i / kLooks))) return false;
+    }
+    return true;
+  }
   bool operator()(const WaypointCommand& c) const {
     for (const Vector3d& p : c.mission.waypoints) {
       if (!all(p)) return false;
@@ -148,6 +159,11 @@ const char* name_of(const Command& command) {
   return kNames[command.index()];
 }
 
+std::string AutopilotState::reject(std::string reason) {
+  ++rejected;
+  return last_rejection = std::move(reason);
+}
+
 Autopilot::Autopilot(const VehicleSettings& settings, Duration command_timeout)
     : settings_(settings),
       command_timeout_(command_timeout),
@@ -193,11 +209,7 @@ std::optional<std::string> Autopilot::give(AutopilotState& state,
                                            const Command& command,
                                            SimTime now,
                                            const RigidBodyState& body) const {
-  if (auto reason = objection(command)) {
-    ++state.rejected;
-    state.last_rejection = *reason;
-    return reason;
-  }
+  if (const auto reason = objection(command)) return state.reject(*reason);
   if (is_under_way(state, command)) return std::nullopt;
   // moves start from where it was told to be, so that nothing jumps; from where it is, else
   const bool held = state.hold.has_value() || state.trajectory != nullptr;

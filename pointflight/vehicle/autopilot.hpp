@@ -24,6 +24,9 @@ struct AutopilotState {
   std::uint64_t rejected = 0;  ///< Commands that were not taken.
   std::uint64_t timeouts = 0;  ///< Times the watchdog made it hover.
   std::string last_rejection;  ///< Why, in words.
+
+  /// Counts a command that is not taken; returns the reason.
+  std::string reject(std::string reason);
 };
 
 /// The one place where commands become setpoints and setpoints rotor speeds.

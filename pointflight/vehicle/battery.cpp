@@ -1,6 +1,7 @@
 #include "pointflight/vehicle/battery.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 
 namespace pointflight {
@@ -14,18 +15,22 @@ constexpr double kHour = 3600.0;    // s
 
 double Battery::step(BatteryState& state, const VehicleState& vehicle, double dt) const {
   const BatterySettings& b = settings_.battery;
+  assert(b.capacity > 0.0 && b.cells > 0.0);
   double power = 0.0;
   for (const RotorState& rotor : vehicle.rotors) {
     power += settings_.rotor.torque_coefficient * rotor.speed * rotor.speed * rotor.speed;
   }
   power /= b.efficiency;
-  const double left = std::max(0.0, 1.0 - state.used / b.capacity);
-  const double open = b.cells * (kEmptyCell + left * (kFullCell - kEmptyCell));
+  const double open = b.cells * (kEmptyCell + charge(state) * (kFullCell - kEmptyCell));
   // V = V_open - R P / V; where it cannot give the power, what it can give at most
   state.voltage = 0.5 * (open + std::sqrt(std::max(0.0, open * open - 4.0 * b.resistance * power)));
   state.current = power / state.voltage;
-  state.used += state.current * dt / kHour;
+  state.used = std::min(b.capacity, state.used + state.current * dt / kHour);
   return std::min(1.0, state.voltage / (b.cells * kFullCell));
+}
+
+double Battery::charge(const BatteryState& state) const {
+  return std::max(0.0, 1.0 - state.used / settings_.battery.capacity);
 }
 
 }  // namespace pointflight

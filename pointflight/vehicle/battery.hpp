@@ -16,11 +16,15 @@ struct BatteryState {
 /// left; the current is the rotors' shaft power (sum of k_m w^3) by efficiency and voltage.
 class Battery {
  public:
+  /// `step` and `charge` are for vehicles whose file has a battery.
   explicit Battery(const VehicleSettings& settings) : settings_(settings) {}
 
   /// Advances by `dt` seconds at the rotors' speeds. Returns the share of the rotors' greatest
   /// speed that is left: they turn in proportion to the voltage, all of it at 4.2 V a cell.
   double step(BatteryState& state, const VehicleState& vehicle, double dt) const;
+
+  /// Share of the capacity that is left, 0 to 1.
+  [[nodiscard]] double charge(const BatteryState& state) const;
 
  private:
   VehicleSettings settings_;

@@ -2,7 +2,9 @@
 
 #include <cstddef>
 #include <memory>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "pointflight/vehicle/airframe.hpp"
@@ -11,14 +13,26 @@
 
 namespace pointflight {
 
+/// Which limits a controller cut a demand to.
+struct LimitsReached {
+  bool speed = false;
+  bool acceleration = false;
+  bool tilt = false;
+  bool rotors = false;  ///< Another thrust than demanded.
+};
+
 /// What a controller remembers from one period to the next: a value, so that a run can be saved,
 /// restored and branched.
 struct ControllerMemory {
-  Vector3d position_integral = Vector3d::Zero();  ///< In m/s^2: gain included.
+  Vector3d disturbance = Vector3d::Zero();  ///< What else accelerates it, as learnt, m/s^2, world.
+  /// Velocity (m/s) when the position loop last acted, and the acceleration that it asked for
+  /// (m/s^2); world.
+  std::optional<std::pair<Vector3d, Vector3d>> expected;
   Vector3d attitude_integral = Vector3d::Zero();  ///< In rad/s^2: gain included.
   Vector3d velocity_integral = Vector3d::Zero();  ///< In m/s^2: gain included.
   double yaw_torque = 0.0;                        ///< Filtered, N m.
   std::size_t level = std::variant_npos;          ///< Of the last setpoint.
+  LimitsReached limits;                           ///< Over the last period.
 };
 
 /// Turns setpoints into rotor speeds. It sees the true state.

@@ -1,6 +1,7 @@
 #include "pointflight/vehicle/mission.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 
 #include "pointflight/core/constants.hpp"
@@ -27,6 +28,8 @@ Ramp ramp_to(double speed, const MotionLimits& limits) {
 
 SmoothMove::SmoothMove(double distance, const MotionLimits& limits)
     : distance_(distance), jerk_(limits.jerk) {
+  assert(distance >= 0.0 && std::isfinite(distance));
+  assert(limits.speed > 0.0 && limits.acceleration > 0.0 && limits.jerk > 0.0);
   if (distance <= 0.0) return;
   // a ramp up and one down at peak speed v cover v * ramp duration; shrink v until they fit
   double speed = limits.speed;
@@ -70,13 +73,18 @@ Mission::Mission(const Vector3d& start, double yaw, const MissionSettings& setti
   for (const Vector3d& waypoint : settings.waypoints) {
     const Vector3d way = waypoint - goal_;
     const double distance = way.norm();
-    if (distance < 1e-9) continue;
     Leg leg;
     leg.start = duration_;
     leg.from = goal_;
-    leg.direction = way / distance;
+    leg.direction = Vector3d::Zero();
     leg.yaw_from = yaw_;
     leg.yaw_sign = 1.0;
+    if (distance < 1e-9) {  // it is there, and rests there
+      legs_.push_back(leg);
+      duration_ += settings.hold;
+      continue;
+    }
+    leg.direction = way / distance;
     const bool steep = std::hypot(way.x(), way.y()) < 0.1 * distance;
     if (settings.yaw == "along_path" && !steep) {
       const double turn = wrap_angle(math::atan2(way.y(), way.x()) - yaw_);

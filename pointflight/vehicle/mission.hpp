@@ -58,6 +58,7 @@ struct MissionSettings {
 class Mission : public Trajectory {
  public:
   Mission() = default;
+  /// Everything finite, the limits positive.
   Mission(const Vector3d& start, double yaw, const MissionSettings& settings);
 
   [[nodiscard]] PositionCommand at(double t) const override;

@@ -4,6 +4,7 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 
 #include "pointflight/core/input_error.hpp"
@@ -81,6 +82,7 @@ std::vector<double> Mixer::speeds(const Wrench& wrench) const {
 }
 
 Wrench Mixer::wrench(const std::vector<double>& speeds) const {
+  assert(static_cast<Eigen::Index>(speeds.size()) == allocation_.cols());
   Eigen::VectorXd thrusts(static_cast<Eigen::Index>(speeds.size()));
   for (std::size_t i = 0; i < speeds.size(); ++i) {
     thrusts[static_cast<Eigen::Index>(i)] = thrust_coefficient_ * speeds[i] * speeds[i];

@@ -26,6 +26,7 @@ class Mixer {
   [[nodiscard]] std::vector<double> speeds(const Wrench& wrench) const;
 
   /// Wrench of given speeds (without drag and lag): the inverse of `speeds` inside the limits.
+  /// One speed a rotor.
   [[nodiscard]] Wrench wrench(const std::vector<double>& speeds) const;
 
  private:

@@ -18,7 +18,9 @@ struct Multirotor::Rate {
   Vector3d torque_body;   ///< What changes the momentum of body and rotors, with w x (J w + h).
 };
 
-Multirotor::Multirotor(const VehicleSettings& settings) : settings_(settings) {}
+Multirotor::Multirotor(const VehicleSettings& settings) : settings_(settings) {
+  check_settings(settings, settings.path.empty() ? "vehicle" : settings.path);
+}
 
 VehicleState Multirotor::hover_at(const Vector3d& p_world, double yaw) const {
   VehicleState state;
@@ -28,10 +30,11 @@ VehicleState Multirotor::hover_at(const Vector3d& p_world, double yaw) const {
   return state;
 }
 
-double Multirotor::clamped(double command, double speed_share) const {
+double Multirotor::target(std::size_t i, double command, const FlightConditions& conditions) const {
   if (!(command > 0.0)) return 0.0;
-  const double most = speed_share * settings_.rotor.speed_max;
-  return std::min(std::max(command, settings_.rotor.speed_min), most);
+  const double most = conditions.speed_share * settings_.rotor.speed_max;
+  const double whole = std::min(std::max(command, settings_.rotor.speed_min), most);
+  return conditions.rotor_shares.empty() ? whole : conditions.rotor_shares[i] * whole;
 }
 
 double Multirotor::ground_effect(double height) const {
@@ -45,7 +48,7 @@ double Multirotor::ground_effect(double height) const {
 void Multirotor::advance(std::span<RotorState> rotors,
                          std::span<const double> commands,
                          double dt,
-                         double speed_share) const {
+                         const FlightConditions& conditions) const {
   const double wn = settings_.rotor.natural_frequency;
   const double z = settings_.rotor.damping;
   if (wn <= 0.0) return;
@@ -66,7 +69,7 @@ void Multirotor::advance(std::span<RotorState> rotors,
     s = 0.5 * (grow - 1.0 / grow) / wd;
   }
   for (std::size_t i = 0; i < rotors.size(); ++i) {
-    const double command = clamped(commands[i], speed_share);
+    const double command = target(i, commands[i], conditions);
     const double x = rotors[i].speed - command;
     const double v = rotors[i].acceleration;
     rotors[i].speed = command + decay * (x * c + (v + z * wn * x) * s);
@@ -127,7 +130,9 @@ void Multirotor::step(VehicleState& state,
                       std::span<const double> commands,
                       double dt,
                       const FlightConditions& conditions) const {
-  assert(commands.size() == state.rotors.size());
+  assert(commands.size() == settings_.rotors.size() && state.rotors.size() == commands.size());
+  assert(conditions.rotor_shares.empty() || conditions.rotor_shares.size() == commands.size());
+  assert(std::isfinite(dt));
   // in two halves: a vehicle that tumbles at 7 rad/s then stays within 1e-9 m of the exact motion
   // over 10 s of 1 ms steps, not only within 1e-8
   for (int half = 0; half < 2; ++half) runge_kutta(state, commands, 0.5 * dt, conditions);
@@ -137,17 +142,16 @@ void Multirotor::runge_kutta(VehicleState& state,
                              std::span<const double> commands,
                              double dt,
                              const FlightConditions& conditions) const {
-  const double share = conditions.speed_share;
   if (settings_.rotor.natural_frequency <= 0.0) {
     for (std::size_t i = 0; i < commands.size(); ++i) {
-      state.rotors[i] = {clamped(commands[i], share), 0.0};
+      state.rotors[i] = {target(i, commands[i], conditions), 0.0};
     }
   }
   const std::vector<RotorState>& begin = state.rotors;
   std::vector<RotorState> middle = state.rotors;
-  advance(middle, commands, 0.5 * dt, share);
+  advance(middle, commands, 0.5 * dt, conditions);
   std::vector<RotorState> end = state.rotors;
-  advance(end, commands, dt, share);
+  advance(end, commands, dt, conditions);
 
   // the momentum of body and rotors together is what is integrated: what a rotor gains by speeding
   // up the body loses, to the last bit

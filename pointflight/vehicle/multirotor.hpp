@@ -15,6 +15,8 @@ struct FlightConditions {
   /// Height of the ground below the body's origin, world z, m.
   double ground_z = -std::numeric_limits<double>::infinity();
   double speed_share = 1.0;  ///< Of the rotors' greatest speed that the battery allows.
+  /// Of its commanded speed that each rotor reaches, 0 to 1; empty: all of it.
+  std::vector<double> rotor_shares;
 };
 
 /// Rigid body with rotors (Lee, Leok, McClamroch 2010, with rotor dynamics, drag and gyroscopic
@@ -30,6 +32,7 @@ struct FlightConditions {
 /// 1955).
 class Multirotor {
  public:
+  /// Throws InputError where a figure is not finite or beyond what a vehicle file may say.
   explicit Multirotor(const VehicleSettings& settings);
 
   /// At rest at a pose, rotors at hover speed.
@@ -62,10 +65,13 @@ class Multirotor {
   void advance(std::span<RotorState> rotors,
                std::span<const double> commands,
                double dt,
-               double speed_share) const;
+               const FlightConditions& conditions) const;
   [[nodiscard]] double rotor_momentum(std::span<const RotorState> rotors,
                                       double RotorState::*member) const;
-  [[nodiscard]] double clamped(double command, double speed_share) const;
+  /// The speed that rotor i goes to.
+  [[nodiscard]] double target(std::size_t i,
+                              double command,
+                              const FlightConditions& conditions) const;
   [[nodiscard]] double ground_effect(double height) const;
 
   VehicleSettings settings_;

@@ -15,6 +15,7 @@ namespace pointflight {
 namespace {
 
 constexpr double kLongest = 1e6;  // s
+constexpr double kLargest = 1e9;  // of any coefficient or coordinate
 
 /// Value and first three derivatives of a polynomial.
 std::array<double, 4> derivatives_at(const std::vector<double>& coefficients, double t) {
@@ -40,8 +41,9 @@ PolynomialTrajectory::PolynomialTrajectory(std::vector<Piece> pieces) : pieces_(
     }
     for (const auto& axis : piece.coefficients) {
       for (const double c : axis) {
-        if (!std::isfinite(c)) {
-          throw InputError(fmt::format("piece {} of the trajectory: a number is not finite", i));
+        if (!(std::abs(c) <= kLargest)) {
+          throw InputError(fmt::format(
+              "piece {} of the trajectory: {} is not a number up to {:g}", i, c, kLargest));
         }
       }
     }
@@ -122,7 +124,10 @@ BSplineTrajectory::BSplineTrajectory(std::vector<Eigen::Vector4d> points,
                     p + 1));
   }
   for (const auto& point : points) {
-    if (!point.allFinite()) throw InputError("a point of the B-spline is not finite");
+    if (!(point.cwiseAbs().maxCoeff() <= kLargest)) {
+      throw InputError(
+          fmt::format("a point of the B-spline has a number beyond {:g}, or none", kLargest));
+    }
   }
   for (std::size_t i = 0; i < knots.size(); ++i) {
     if (!std::isfinite(knots[i]) || (i > 0 && knots[i] < knots[i - 1])) {
@@ -159,8 +164,9 @@ std::shared_ptr<const BSplineTrajectory> BSplineTrajectory::read(const std::stri
                                 table.at(row, columns[1]),
                                 table.at(row, columns[2]),
                                 yaw < 0 ? 0.0 : kDegree * table.at(row, yaw));
-    if (!point.allFinite()) {
-      throw InputError(fmt::format("{}: a number is missing", table.place(row)));
+    if (!(point.cwiseAbs().maxCoeff() <= kLargest)) {
+      throw InputError(
+          fmt::format("{}: a number is missing or beyond {:g}", table.place(row), kLargest));
     }
     points.push_back(point);
   }

@@ -11,6 +11,7 @@
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/mapped_file.hpp"
 #include "pointflight/core/math.hpp"
+#include "pointflight/core/number_text.hpp"
 #include "pointflight/core/output_file.hpp"
 #include "pointflight/core/parallel.hpp"
 #include "pointflight/core/random.hpp"
@@ -25,6 +26,18 @@ using testing::expect_contains;
 using testing::read_file;
 using testing::TemporaryFolder;
 using testing::write_file;
+
+TEST(NumberText, SaysNumbersAsPeopleDo) {
+  EXPECT_EQ(fixed_text(-0.004, 2), "0.00");
+  EXPECT_EQ(fixed_text(-0.0, 0), "0");
+  EXPECT_EQ(fixed_text(-0.006, 2), "-0.01");
+  EXPECT_EQ(fixed_text(1234.5678, 1), "1234.6");
+  EXPECT_EQ(fixed_text(-INFINITY, 1), "-inf");
+  EXPECT_EQ(plain_text(0.036000000000000004), "0.036");
+  EXPECT_EQ(plain_text(-0.0), "0");
+  EXPECT_EQ(plain_text(-2.5), "-2.5");
+  EXPECT_EQ(plain_text(0.1 + 0.2), "0.3");
+}
 
 TEST(Schedule, RatesThatDoNotDivideASecondDoNotDrift) {
   const Schedule thirty(30.0);

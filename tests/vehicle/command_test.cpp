@@ -55,9 +55,10 @@ std::vector<double> linear_model(const StepResponse& r, const VehicleSettings& v
         held += wn * wn * (1.0 - dx) * h;
         wanted = (held - 2 * z * wn * dx) / kGravity;
       } else if (r.name == "position x") {
-        const double ki = r.design.integral * wn * wn * wn;
-        wanted = (wn * wn * (1.0 - x) - 2 * z * wn * dx + integral) / kGravity;
-        integral += ki * (1.0 - x) * h;
+        // with a disturbance observer: control_test.cpp
+        const double pd = wn * wn * (1.0 - x) - 2 * z * wn * dx;
+        wanted = (pd + r.design.integral * wn * (integral - dx)) / kGravity;
+        integral += pd * h;
       }
       double command = 0.0;
       if (r.name == "roll rate") {
@@ -213,6 +214,17 @@ TEST(Autopilot, RefusesWhatIsNotFiniteOrNotForThisVehicleAndCounts) {
   expect_contains(*flight.give(VelocityCommand{{nan, 0, 0}, 0.0, 0.0}), "velocity");
   expect_contains(*flight.give(PositionCommand{{0, 0, INFINITY}}), "not finite");
   expect_contains(*flight.give(TrajectoryCommand{}), "trajectory");
+  // a trajectory of the user's own that goes wrong on its way
+  class Wrong : public Trajectory {
+   public:
+    [[nodiscard]] PositionCommand at(double t) const override {
+      PositionCommand command;
+      command.p_world.x() = t > 5.0 ? 1e300 : t;
+      return command;
+    }
+    [[nodiscard]] double duration() const override { return 10.0; }
+  };
+  expect_contains(*flight.give(TrajectoryCommand{std::make_shared<Wrong>()}), "not finite");
   expect_contains(*flight.give(RotorSpeedCommand{{1, 2, 3}}), "3 rotor speeds");
   expect_contains(*flight.give(BodyRateCommand{}), "takes no body_rates");
   expect_contains(*flight.give(AccelerationCommand{}), "the innermost are velocity");
@@ -221,7 +233,7 @@ TEST(Autopilot, RefusesWhatIsNotFiniteOrNotForThisVehicleAndCounts) {
   still.mission.waypoints = {{1, 0, 10}};
   still.mission.motion.speed = 0.0;
   expect_contains(*flight.give(still), "waypoints");
-  EXPECT_EQ(flight.pilot.rejected, 8u);
+  EXPECT_EQ(flight.pilot.rejected, 9u);
   flight.fly(1.0);
   EXPECT_LT((flight.state.body.p_world - Vector3d(0, 0, 10)).norm(), 1e-6);
   EXPECT_FALSE(flight.give(VelocityCommand{}));
@@ -378,6 +390,11 @@ TEST(Trajectory, PolynomialsDerivativesAreThoseOfItsPositions) {
       "p.csv:2: ");
   expect_contains(error_of([] { PolynomialTrajectory::parse("duration,x^0\n1,0\n", "p.csv"); }),
                   "'y^");
+  expect_contains(error_of([] {
+                    PolynomialTrajectory::parse("duration,x^0,y^0,z^0\n1,0,0,0\n1,1e300,0,0\n",
+                                                "p.csv");
+                  }),
+                  "p.csv:3: ");
 }
 
 TEST(Trajectory, BSplinesInterpolateLinesAndDifferentiate) {
@@ -410,6 +427,13 @@ TEST(Trajectory, BSplinesInterpolateLinesAndDifferentiate) {
     EXPECT_LT((at.jerk_world - (after.a_world - before.a_world) / (2 * h)).norm(), 1e-3);
   }
   EXPECT_THROW(BSplineTrajectory::uniform({line[0], line[1]}, 3, 0.5), InputError);
+  auto far = line;
+  far[3].x() = 1e300;
+  expect_contains(error_of([&] { BSplineTrajectory::uniform(far, 3, 0.5); }), "beyond 1e+09");
+  const testing::TemporaryFolder folder;
+  testing::write_file(folder / "far.csv", "x,y,z\n0,0,1\n1e300,0,1\n2,0,1\n3,0,1\n");
+  expect_contains(error_of([&] { BSplineTrajectory::read(folder / "far.csv", 3, 1.0); }),
+                  "far.csv:3: a number is missing or beyond 1e+09");
   EXPECT_THROW(BSplineTrajectory(line, 3, std::vector<double>(12, 0.0)), InputError);
 }
 

@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -124,6 +125,24 @@ TEST(Multirotor, RotorSpeedFollowsItsCommandAsASecondOrderSystem) {
     const double response =
         1.0 - std::exp(-25.0 * t) * (std::cos(wd * t) + 25.0 / wd * std::sin(wd * t));
     ASSERT_NEAR(state.rotors[2].speed, from + 100.0 * response, 1e-4) << t;
+  }
+}
+
+TEST(Multirotor, AWeakRotorTurnsWithItsShareOfTheCommand) {
+  for (const char* name : {"quad_330", "marsim_quad"}) {  // with and without a lag
+    const VehicleSettings settings = load_vehicle(name);
+    const Multirotor vehicle(settings);
+    for (const double share : {0.0, 0.05, 0.5, 1.0}) {
+      SCOPED_TRACE(fmt::format("{} {}", name, share));
+      VehicleState state = vehicle.hover_at({0, 0, 0}, 0.0);
+      const double wanted = settings.hover_speed();
+      FlightConditions conditions;
+      conditions.rotor_shares = {1.0, share, 1.0, 1.0};
+      const std::vector<double> commands(4, wanted);
+      for (int i = 0; i < 1000; ++i) vehicle.step(state, commands, 1e-3, conditions);
+      EXPECT_NEAR(state.rotors[1].speed, share * wanted, 1e-6);
+      EXPECT_NEAR(state.rotors[0].speed, wanted, 1e-6);
+    }
   }
 }
 

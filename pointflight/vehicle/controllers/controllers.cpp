@@ -30,6 +30,7 @@ constexpr Entry kControllers[] = {
 
 std::unique_ptr<Controller> make_controller(const std::string& name,
                                             const VehicleSettings& settings) {
+  check_settings(settings, settings.path.empty() ? "vehicle" : settings.path);
   std::vector<std::string> names;
   for (const Entry& entry : kControllers) {
     if (name == entry.name) return entry.make(settings);

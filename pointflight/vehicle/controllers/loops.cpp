@@ -9,11 +9,13 @@
 namespace pointflight {
 namespace {
 
-constexpr double kIntegralZone = 1.5;  // m: farther away an integral only winds up
-
 Vector3d limited(const Vector3d& v, double length) {
   const double norm = v.norm();
   return norm > length ? Vector3d(v * (length / norm)) : v;
+}
+
+bool differ(const Vector3d& a, const Vector3d& b) {
+  return (a - b).cwiseAbs().maxCoeff() > 1e-9;
 }
 
 /// One number for each axis from the horizontal and the vertical loop.
@@ -51,6 +53,8 @@ std::vector<double> LoopController::update(const RigidBodyState& state,
                                                  double yaw,
                                                  double yaw_rate) const {
       const AttitudeDemand demand = self.demanded_attitude(state, a, jerk, yaw, yaw_rate);
+      const Vector3d f = a + Vector3d(0, 0, kGravity);
+      memory.limits.tilt = differ(f, self.tilt_limited(f));
       const Vector3d torque = self.demanded_torque(state, demand, dt, memory);
       return self.speeds(demand.thrust, torque, dt, memory);
     }
@@ -64,25 +68,31 @@ std::vector<double> LoopController::update(const RigidBodyState& state,
       return self.speeds(demand.thrust, torque, dt, memory);
     }
     std::vector<double> operator()(const AccelerationCommand& c) const {
-      return accelerate(self.limited_acceleration(c.a_world), Vector3d::Zero(), c.yaw, c.yaw_rate);
+      const Vector3d a = self.allowed(c.a_world, memory);
+      return accelerate(a, Vector3d::Zero(), c.yaw, c.yaw_rate);
     }
     std::vector<double> operator()(const VelocityCommand& c) const {
       const Vector3d a = self.velocity_loop(state, c.v_world, dt, memory);
       return accelerate(a, Vector3d::Zero(), c.yaw, c.yaw_rate);
     }
     std::vector<double> operator()(const PositionCommand& c) const {
-      const Vector3d a = self.position_loop(state, c, dt, memory);
-      return accelerate(a, c.jerk_world, c.yaw, c.yaw_rate);
+      self.observe(state, dt, memory);
+      const Vector3d a = self.position_loop(state, c, memory);
+      std::vector<double> speeds = accelerate(a, c.jerk_world, c.yaw, c.yaw_rate);
+      memory.expected = {state.v_world, self.expected_acceleration(state, a, speeds)};
+      return speeds;
     }
   };
   if (memory.level != setpoint.index()) {
     // no jump when the level changes in flight: the velocity loop starts from zero acceleration,
-    // the position loop from what its integral knew
+    // the position loop from the disturbance that it knew
     memory.velocity_integral = by_axis(settings_.controller, &LoopDesign::damping)
                                    .cwiseProduct(velocity_frequency(settings_.controller))
                                    .cwiseProduct(2.0 * state.v_world);
+    memory.expected.reset();
     memory.level = setpoint.index();
   }
+  memory.limits = {};
   return std::visit(Visitor{*this, state, dt, memory}, setpoint);
 }
 
@@ -96,44 +106,74 @@ std::vector<double> LoopController::speeds(double thrust,
   const double slope = 2.0 * rotor.torque_coefficient * settings_.hover_speed();
   const double lag = slope > 0.0 ? rotor.inertia / slope : 0.0;
   memory.yaw_torque += dt / (lag + dt) * (torque.z() - memory.yaw_torque);
-  return mixer_.speeds({thrust, {torque.x(), torque.y(), memory.yaw_torque}});
+  std::vector<double> speeds = mixer_.speeds({thrust, {torque.x(), torque.y(), memory.yaw_torque}});
+  const double weight = settings_.mass * kGravity;
+  memory.limits.rotors = std::abs(mixer_.wrench(speeds).thrust - thrust) > 1e-3 * weight;
+  return speeds;
 }
 
-Vector3d LoopController::limited_acceleration(const Vector3d& a) const {
+Vector3d LoopController::allowed(const Vector3d& a, ControllerMemory& memory) const {
   // sideways, up, and down to a fifth of gravity so that the rotors keep authority
   const ControllerSettings& c = settings_.controller;
   const Vector3d sideways = limited(Vector3d(a.x(), a.y(), 0.0), c.acceleration_max);
-  return {sideways.x(), sideways.y(), std::clamp(a.z(), -0.8 * kGravity, c.climb_acceleration_max)};
+  const Vector3d within(
+      sideways.x(), sideways.y(), std::clamp(a.z(), -0.8 * kGravity, c.climb_acceleration_max));
+  memory.limits.acceleration = differ(a, within);
+  return within;
 }
 
-/// a = a_ff + 2 z wn (v_ref - v) + integral with v_ref = v_ff + wn / (2 z) e_p, no faster than the
-/// limit: the second-order loop a = a_ff + wn^2 e_p + 2 z wn e_v as long as it is not cut.
+/// What comes of a demand (without gravity) once the attitude is there: tilt and thrust are cut,
+/// and the vehicle's own motion has drag, which is no disturbance.
+Vector3d LoopController::expected_acceleration(const RigidBodyState& state,
+                                               const Vector3d& a_world,
+                                               const std::vector<double>& speeds) const {
+  const Vector3d gravity(0, 0, kGravity);
+  const Vector3d f = tilt_limited(a_world + gravity);
+  const double wanted = settings_.mass * f.dot(state.q_world_body * Vector3d::UnitZ());
+  const double share = wanted > 0.0 ? mixer_.wrench(speeds).thrust / wanted : 1.0;
+  return std::min(share, 1.0) * f - gravity + drag_of(state, state.v_world);
+}
+
+/// Of motion through still air, world, m/s^2.
+Vector3d LoopController::drag_of(const RigidBodyState& state, const Vector3d& v_world) const {
+  return state.q_world_body * settings_.drag_in_still_air(state.q_world_body.conjugate() * v_world);
+}
+
+/// Disturbance observer (Ohnishi, Shibata, Murakami, Motion control for advanced mechatronics,
+/// IEEE/ASME Trans. Mechatronics 1, 1996): d' = l (v' - a_expected - d). Wind, a wrong mass or a
+/// weak rotor make the vehicle accelerate otherwise than demanded; an integral of the error would
+/// take every step of the setpoint for one of them, and pay it back by overshooting. With
+/// l = integral wn steady disturbances are learnt as quickly as with an integral gain of
+/// integral wn^3. What is cut is not expected, so nothing winds up.
+void LoopController::observe(const RigidBodyState& state,
+                             double dt,
+                             ControllerMemory& memory) const {
+  if (!memory.expected) return;
+  const ControllerSettings& c = settings_.controller;
+  const auto& [v_before, a_expected] = *memory.expected;
+  const Vector3d rate =
+      by_axis(c, &LoopDesign::integral).cwiseProduct(by_axis(c, &LoopDesign::natural_frequency));
+  const Vector3d unexplained = state.v_world - v_before - (a_expected + memory.disturbance) * dt;
+  memory.disturbance += rate.cwiseProduct(unexplained);
+  memory.disturbance = memory.disturbance.cwiseMax(-c.integral_max).cwiseMin(c.integral_max);
+}
+
+/// a = a_ff + 2 z wn (v_ref - v) - d with v_ref = v_ff + wn / (2 z) e_p, no faster than the limit:
+/// the second-order loop a = a_ff + wn^2 e_p + 2 z wn e_v - d as long as it is not cut. d is the
+/// disturbance and the drag at the speed v_ff that is asked for.
 Vector3d LoopController::position_loop(const RigidBodyState& state,
                                        const PositionCommand& command,
-                                       double dt,
                                        ControllerMemory& memory) const {
   const ControllerSettings& c = settings_.controller;
   const Vector3d wn = by_axis(c, &LoopDesign::natural_frequency);
   const Vector3d z = by_axis(c, &LoopDesign::damping);
-  const Vector3d ki =
-      by_axis(c, &LoopDesign::integral).cwiseProduct(wn.cwiseProduct(wn).cwiseProduct(wn));
   const Vector3d e_p = limited(command.p_world - state.p_world, c.error_max);
-  const Vector3d v_ref =
-      limited(command.v_world + 0.5 * wn.cwiseProduct(e_p).cwiseQuotient(z), c.speed_max);
-  const Vector3d a = command.a_world +
-                     2.0 * z.cwiseProduct(wn).cwiseProduct(v_ref - state.v_world) +
-                     memory.position_integral;
-  const Vector3d allowed = limited_acceleration(a);
-  // anti-windup: integrate where the demand is not cut, and never beyond its own limit
-  for (int axis = 0; axis < 3; ++axis) {
-    const bool cut = std::abs(a[axis] - allowed[axis]) > 1e-9;
-    if (cut || std::abs(e_p[axis]) > kIntegralZone) continue;
-    memory.position_integral[axis] =
-        std::clamp(memory.position_integral[axis] + ki[axis] * e_p[axis] * dt,
-                   -c.integral_max,
-                   c.integral_max);
-  }
-  return allowed;
+  const Vector3d v_wanted = command.v_world + 0.5 * wn.cwiseProduct(e_p).cwiseQuotient(z);
+  const Vector3d v_ref = limited(v_wanted, c.speed_max);
+  memory.limits.speed = differ(v_wanted, v_ref);
+  const Vector3d d = memory.disturbance + drag_of(state, limited(command.v_world, c.speed_max));
+  const Vector3d a = 2.0 * z.cwiseProduct(wn).cwiseProduct(v_ref - state.v_world);
+  return allowed(command.a_world + a - d, memory);
 }
 
 /// a = wn^2 integral(v_cmd - v) - 2 z wn v: v follows v_cmd as a second-order system without a
@@ -145,14 +185,16 @@ Vector3d LoopController::velocity_loop(const RigidBodyState& state,
   const ControllerSettings& c = settings_.controller;
   const Vector3d wn = velocity_frequency(c);
   const Vector3d z = by_axis(c, &LoopDesign::damping);
-  const Vector3d e_v = limited(v_world, c.speed_max) - state.v_world;
+  const Vector3d v_ref = limited(v_world, c.speed_max);
+  memory.limits.speed = differ(v_world, v_ref);
+  const Vector3d e_v = v_ref - state.v_world;
   Vector3d& integral = memory.velocity_integral;
   const Vector3d next = integral + dt * wn.cwiseProduct(wn).cwiseProduct(e_v);
   const Vector3d damping = 2.0 * z.cwiseProduct(wn).cwiseProduct(state.v_world);
-  const Vector3d allowed = limited_acceleration(next - damping);
+  const Vector3d a = allowed(next - damping, memory);
   // anti-windup: the integral is what the allowed acceleration needs
-  integral = allowed + damping;
-  return allowed;
+  integral = a + damping;
+  return a;
 }
 
 Vector3d velocity_frequency(const ControllerSettings& c) {

@@ -51,8 +51,13 @@ class LoopController : public Controller {
                                   double yaw_rate) const;
   [[nodiscard]] Vector3d position_loop(const RigidBodyState& state,
                                        const PositionCommand& command,
-                                       double dt,
                                        ControllerMemory& memory) const;
+  /// Learns the disturbance from what the velocity has done since the last period.
+  void observe(const RigidBodyState& state, double dt, ControllerMemory& memory) const;
+  [[nodiscard]] Vector3d expected_acceleration(const RigidBodyState& state,
+                                               const Vector3d& a_world,
+                                               const std::vector<double>& speeds) const;
+  [[nodiscard]] Vector3d drag_of(const RigidBodyState& state, const Vector3d& v_world) const;
   [[nodiscard]] Vector3d velocity_loop(const RigidBodyState& state,
                                        const Vector3d& v_world,
                                        double dt,
@@ -62,7 +67,8 @@ class LoopController : public Controller {
                                            const Vector3d& torque,
                                            double dt,
                                            ControllerMemory& memory) const;
-  [[nodiscard]] Vector3d limited_acceleration(const Vector3d& a_world) const;
+  /// A demand cut to the limits of the vehicle.
+  [[nodiscard]] Vector3d allowed(const Vector3d& a_world, ControllerMemory& memory) const;
   [[nodiscard]] Vector3d rate_torque(const RigidBodyState& state, const Vector3d& omega) const;
 
   VehicleSettings settings_;

@@ -1,0 +1,72 @@
+#include "pointflight/vehicle/feasibility.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "pointflight/core/constants.hpp"
+#include "pointflight/core/math.hpp"
+#include "pointflight/geometry/rotation.hpp"
+
+namespace pointflight {
+namespace {
+
+constexpr double kStep = 0.01;         // s
+constexpr double kInstants = 20000.0;  // at most
+constexpr double kTolerance = 1.01;    // of a limit: rounding is no reason to speak
+constexpr double kStartAway = 0.5;     // m
+constexpr double kStartLeap = 1.0;     // m/s
+
+}  // namespace
+
+MotionDemand demand_of(const Trajectory& trajectory, const VehicleSettings& vehicle) {
+  MotionDemand most;
+  const double duration = trajectory.duration();
+  const double instants = std::clamp(std::ceil(duration / kStep), 1.0, kInstants);
+  for (double i = 0.0; i <= instants; ++i) {
+    const PositionCommand c = trajectory.at(duration * i / instants);
+    const Quaterniond level = quaternion_from_rpy(0.0, 0.0, c.yaw);
+    const Vector3d drag = level * vehicle.drag_in_still_air(level.conjugate() * c.v_world);
+    const Vector3d a = c.a_world - drag;
+    const double sideways = std::hypot(a.x(), a.y());
+    most.speed = std::max(most.speed, c.v_world.norm());
+    most.acceleration = std::max(most.acceleration, sideways);
+    most.climb_acceleration = std::max(most.climb_acceleration, a.z());
+    most.tilt = std::max(most.tilt, math::atan2(sideways, a.z() + kGravity));
+    most.thrust = std::max(most.thrust, vehicle.mass * (a + Vector3d(0, 0, kGravity)).norm());
+  }
+  return most;
+}
+
+std::optional<std::string> beyond_limits(const Trajectory& trajectory,
+                                         const VehicleSettings& vehicle,
+                                         const RigidBodyState* from) {
+  const MotionDemand most = demand_of(trajectory, vehicle);
+  const ControllerSettings& c = vehicle.controller;
+  std::vector<std::string> beyond;
+  const auto compare = [&](const char* what, double needed, double limit, const char* unit) {
+    if (needed <= kTolerance * limit) return;
+    beyond.push_back(fmt::format("{} of {:.3g}{} (limit {:.3g})", what, needed, unit, limit));
+  };
+  compare("a speed", most.speed, c.speed_max, " m/s");
+  if (c.tilt_max_deg < 90.0) compare("a tilt", most.tilt / kDegree, c.tilt_max_deg, " degrees");
+  compare("a horizontal acceleration", most.acceleration, c.acceleration_max, " m/s^2");
+  compare("an acceleration up", most.climb_acceleration, c.climb_acceleration_max, " m/s^2");
+  const double weight = vehicle.mass * kGravity;
+  compare("a thrust", most.thrust, vehicle.thrust_to_weight() * weight, " N");
+  if (from != nullptr) {
+    const PositionCommand first = trajectory.at(0.0);
+    const double away = (first.p_world - from->p_world).norm();
+    if (away > kStartAway) beyond.push_back(fmt::format("a start {:.1f} m away", away));
+    const double leap = (first.v_world - from->v_world).norm();
+    if (leap > kStartLeap) beyond.push_back(fmt::format("a leap in speed of {:.1f} m/s", leap));
+  }
+  if (beyond.empty()) return std::nullopt;
+  return fmt::format("the trajectory asks for {}; it will be flown beside its path",
+                     fmt::join(beyond, ", "));
+}
+
+}  // namespace pointflight
