@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
@@ -19,6 +20,7 @@
 #include "apps/scenario_command.hpp"
 #include "apps/terminal.hpp"
 #include "pointflight/core/input_error.hpp"
+#include "pointflight/core/number_text.hpp"
 #include "pointflight/core/output_file.hpp"
 #include "pointflight/core/resources.hpp"
 #include "pointflight/sim/flight_recorder.hpp"
@@ -50,7 +52,12 @@ struct FlyFlags {
   RosFlags ros;
 };
 
-/// Says collisions as they happen.
+std::string place_text(const Vector3d& p) {
+  return fmt::format(
+      "({}, {}, {})", fixed_text(p.x(), 2), fixed_text(p.y(), 2), fixed_text(p.z(), 2));
+}
+
+/// Says collisions and what happens on board as they happen.
 class CollisionLog : public SampleSink {
  public:
   explicit CollisionLog(const Simulation& simulation) : simulation_(simulation) {}
@@ -58,24 +65,29 @@ class CollisionLog : public SampleSink {
   void on_collision(const CollisionEvent& event) override {
     constexpr int kSaid = 20;
     if (!event.entered || said_ > kSaid) return;
-    log(said_++ == kSaid
-            ? std::string("more collisions: see events.csv")
-            : fmt::format("warning: collision at {:.3f} s, {} at ({:.2f}, {:.2f}, {:.2f}), "
-                          "with {} at ({:.2f}, {:.2f}, {:.2f})",
-                          to_seconds(event.time),
-                          simulation_.vehicle(event.vehicle).setup().name,
-                          event.vehicle_world.x(),
-                          event.vehicle_world.y(),
-                          event.vehicle_world.z(),
-                          label_name(simulation_, event.partner),
-                          event.place_world.x(),
-                          event.place_world.y(),
-                          event.place_world.z()));
+    log(said_++ == kSaid ? std::string("more collisions: see events.csv")
+                         : fmt::format("warning: collision at {:.3f} s, {} at {}, with {} at {}",
+                                       to_seconds(event.time),
+                                       simulation_.vehicle(event.vehicle).setup().name,
+                                       place_text(event.vehicle_world),
+                                       label_name(simulation_, event.partner),
+                                       place_text(event.place_world)));
+  }
+
+  void on_vehicle_event(const VehicleEvent& event) override {
+    if (events_ > kEventsSaid) return;
+    log(events_++ == kEventsSaid ? std::string("more on board: see events.csv")
+                                 : fmt::format("warning: {} at {:.3f} s: {}",
+                                               simulation_.vehicle(event.vehicle).setup().name,
+                                               to_seconds(event.time),
+                                               event.words));
   }
 
  private:
+  static constexpr int kEventsSaid = 20;
   const Simulation& simulation_;
   int said_ = 0;
+  int events_ = 0;
 };
 
 /// Holds the run back to `rate` simulated seconds a second; 0: as fast as it goes.
@@ -235,6 +247,20 @@ void check_folder(const FlyFlags& flags) {
   }
 }
 
+/// Which limits cut what was asked for, and for how long.
+void print_limits(const VehicleSummary& s) {
+  std::vector<std::string> reached;
+  const auto add = [&](const char* what, Duration time) {
+    if (time.count() > 0) reached.push_back(fmt::format("{} for {:.2f} s", what, to_seconds(time)));
+  };
+  add("speed", s.speed_limited);
+  add("acceleration", s.acceleration_limited);
+  add("tilt", s.tilt_limited);
+  add("thrust", s.rotors_limited);
+  if (reached.empty()) return;
+  fmt::print("  limits reached    {}\n", fmt::join(reached, ", "));
+}
+
 void print_vehicle(const Simulation& simulation, std::size_t v) {
   const VehicleSummary& s = simulation.summary(v);
   const VehicleStatus& status = simulation.status(v);
@@ -248,21 +274,24 @@ void print_vehicle(const Simulation& simulation, std::size_t v) {
              short_count(static_cast<double>(s.points)),
              short_count(static_cast<double>(s.beams)));
   fmt::print("  closest approach  {}\n",
-             s.closest_approach ? fmt::format("{:.2f} m to {} at ({:.2f}, {:.2f}, {:.2f})",
-                                              *s.closest_approach,
+             s.closest_approach ? fmt::format("{} m to {} at {}",
+                                              fixed_text(*s.closest_approach, 2),
                                               label_name(simulation, s.closest_label),
-                                              s.closest_place_world.x(),
-                                              s.closest_place_world.y(),
-                                              s.closest_place_world.z())
+                                              place_text(s.closest_place_world))
                                 : std::string("over 10 m"));
   fmt::print("  collisions        {}\n", s.collisions);
   fmt::print("  tracking error    {:.0f} mm RMS, {:.0f} mm at most\n",
              s.tracking_error_rms * 1e3,
              s.tracking_error_max * 1e3);
+  print_limits(s);
   if (simulation.vehicle(v).setup().battery) {
-    fmt::print("  battery           {:.2f} Ah used, {:.1f} V now\n",
+    fmt::print("  battery           {:.2f} Ah used, {:.1f} V now{}{}\n",
                status.battery.used,
-               status.battery.voltage);
+               status.battery.voltage,
+               s.battery_low ? fmt::format("; low at {:.1f} s", to_seconds(*s.battery_low)) : "",
+               s.battery_empty
+                   ? fmt::format("; rotors off at {:.1f} s", to_seconds(*s.battery_empty))
+                   : "");
   }
   if (status.autopilot.rejected > 0) {
     fmt::print("  commands          {} rejected; the last: {}\n",
@@ -280,9 +309,11 @@ void print_result(const FlyFlags& flags, const Simulation& simulation, double wa
     return;
   }
   fmt::print("{}\n", flags.output.empty() ? flags.input : flags.output);
-  fmt::print("  end               {}, after {:.1f} s\n",
+  const std::string reason = reason_of(simulation.end());
+  fmt::print("  end               {}, after {:.1f} s{}\n",
              to_string(simulation.end()),
-             to_seconds(simulation.time()));
+             to_seconds(simulation.time()),
+             reason.empty() ? "" : ": " + reason);
   for (std::size_t v = 0; v < simulation.vehicle_count(); ++v) print_vehicle(simulation, v);
   fmt::print("  real-time factor  {:.1f}\n", to_seconds(simulation.time()) / wall);
   if (flags.output.empty()) return;
@@ -292,6 +323,7 @@ void print_result(const FlyFlags& flags, const Simulation& simulation, double wa
 int exit_code_of(RunEnd end) {
   switch (end) {
     case RunEnd::kCompleted:
+    case RunEnd::kIdle:
       return kDone;
     case RunEnd::kInterrupted:
       return kInterrupted;

@@ -10,6 +10,7 @@
 
 #include "apps/commands.hpp"
 #include "pointflight/core/constants.hpp"
+#include "pointflight/core/number_text.hpp"
 #include "pointflight/core/resources.hpp"
 #include "pointflight/lidar/lidar.hpp"
 
@@ -51,16 +52,16 @@ void show_lidar(const std::string& name) {
     last = std::max(last, beam.time_offset);
   }
   fmt::print(
-      "# {}\n# first scan: {} beams over {:.2f} ms, {} rings or lines; azimuth {:.2f} to "
-      "{:.2f} deg, elevation {:.2f} to {:.2f} deg\n",
+      "# {}\n# first scan: {} beams over {:.2f} ms, {} rings or lines; azimuth {} to {} deg, "
+      "elevation {} to {} deg\n",
       s.path,
       beams.size(),
       to_seconds(last) * 1e3,
       rings.size(),
-      az_low / kDegree,
-      az_high / kDegree,
-      el_low / kDegree,
-      el_high / kDegree);
+      fixed_text(az_low / kDegree, 2),
+      fixed_text(az_high / kDegree, 2),
+      fixed_text(el_low / kDegree, 2),
+      fixed_text(el_high / kDegree, 2));
   SettingsWriter writer;
   describe(writer, s);
   fmt::print("{}", writer.text());

@@ -104,6 +104,9 @@ void check_scenario(const std::string& path) {
   output_streams(simulation, profile);
   warn_about(scenario, *map);
   for (const std::string& warning : start_warnings(simulation, executor)) log(warning);
+  for (std::size_t v = 0; v < simulation.vehicle_count(); ++v) {
+    for (const std::string& line : simulation.vehicle(v).foreseen()) log("warning: " + line);
+  }
   fmt::print("{}: ready: {:.1f} s\n", path, to_seconds(simulation.end_time()));
   for (std::size_t v = 0; v < simulation.vehicle_count(); ++v) {
     const VehicleAgent& agent = simulation.vehicle(v);

@@ -23,19 +23,17 @@ constexpr std::array<std::string_view, 14> kKinds = {"rotor_speeds",
                                                      "hover",
                                                      "arm",
                                                      "disarm"};
-constexpr double kFar = 1e7;  // m
+constexpr double kFar = kFarthest;
 
 }  // namespace
 
 void describe(SettingsVisitor& v, CommandSettings& s) {
   v.value({"time", "s", "when it is given", 0, 1e6}, s.time);
   v.choice({"kind", "", "what is commanded"}, s.kind, kKinds);
-  v.value({"vector",
-           "",
-           "body rates deg/s, acceleration m/s^2, velocity m/s, position or waypoint m",
-           -kFar,
-           kFar},
+  v.value({"vector", "", "acceleration m/s^2, velocity m/s, position or waypoint m", -kFar, kFar},
           s.vector);
+  v.value({"rates_deg", "deg/s", "about the body's axes, of body_rates", -36000, 36000},
+          s.rates_deg);
   v.value({"feed_forward", "m/s", "velocity of a position command", -100, 100}, s.feed_forward);
   v.value({"rpy_deg", "deg", "of an attitude command", -360, 360}, s.rpy_deg);
   v.value({"yaw_deg", "deg", "heading of acceleration, velocity, position", -360, 360}, s.yaw_deg);
@@ -57,7 +55,7 @@ Command command_of(const CommandSettings& s,
   const double yaw_rate = s.yaw_rate_deg * kDegree;
   const double thrust = s.thrust > 0.0 ? s.thrust : vehicle.mass * kGravity;
   if (s.kind == "rotor_speeds") return RotorSpeedCommand{s.rotors};
-  if (s.kind == "body_rates") return BodyRateCommand{s.vector * kDegree, thrust};
+  if (s.kind == "body_rates") return BodyRateCommand{s.rates_deg * kDegree, thrust};
   if (s.kind == "attitude") {
     const Vector3d rpy = s.rpy_deg * kDegree;
     return AttitudeCommand{

@@ -10,12 +10,16 @@
 
 namespace pointflight {
 
+/// Coordinates of a scenario are no larger, m: those of a UTM zone fit.
+inline constexpr double kFarthest = 1e7;
+
 /// One line of a scenario's `commands`: what a vehicle is told, and when. Levels that must be
 /// repeated are, until the next one.
 struct CommandSettings {
   double time = 0.0;           ///< s
   std::string kind = "hover";  ///< `name_of`, with "polynomial" and "b_spline" for trajectories
-  Vector3d vector = Vector3d::Zero();  ///< Body rates in deg/s, acceleration, velocity or position.
+  Vector3d vector = Vector3d::Zero();        ///< Acceleration, velocity or position.
+  Vector3d rates_deg = Vector3d::Zero();     ///< Of body rates, deg/s.
   Vector3d feed_forward = Vector3d::Zero();  ///< Velocity of a position command, m/s.
   Vector3d rpy_deg = Vector3d::Zero();       ///< Of an attitude command.
   double yaw_deg = 0.0;

@@ -1,7 +1,10 @@
 #include "pointflight/sim/faults.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
+#include <cassert>
 
 namespace pointflight {
 namespace {
@@ -40,6 +43,17 @@ void describe(SettingsVisitor& v, FaultSettings& s) {
           s.value);
 }
 
+void check(const FaultSettings& s,
+           const std::function<void(const char* key, const std::string& what)>& fail) {
+  if (s.until > 0.0 && s.until <= s.from) {
+    fail("until", fmt::format("{} s is not after {} s (from); 0 means for good", s.until, s.from));
+  }
+  const bool is_share = s.kind == "rotor" || s.kind == "scan_drop";
+  if (is_share && s.value > 1.0) {
+    fail("value", fmt::format("{} of kind {}; a share, from 0 to 1", s.value, s.kind));
+  }
+}
+
 double Faults::rotor_share(std::size_t rotor, SimTime time) const {
   double share = 1.0;
   for (const FaultSettings& fault : settings_) {
@@ -55,6 +69,7 @@ bool Faults::is_dead(std::size_t lidar, SimTime time) const {
 }
 
 bool Faults::is_stuck(std::size_t axis, SimTime time) const {
+  assert(axis < kAxes.size());
   return std::any_of(settings_.begin(), settings_.end(), [&](const FaultSettings& fault) {
     return fault.kind == "imu" && fault.axis == kAxes[axis] && is_on(fault, time);
   });

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -21,6 +22,10 @@ struct FaultSettings {
 };
 
 void describe(SettingsVisitor& visitor, FaultSettings& settings);
+
+/// Calls `fail` with the key and what is wrong where values make no sense together.
+void check(const FaultSettings& settings,
+           const std::function<void(const char* key, const std::string& what)>& fail);
 
 /// The faults of one vehicle as functions of time.
 class Faults {

@@ -86,7 +86,19 @@ nlohmann::ordered_json json_of(const Simulation& simulation, std::size_t number)
   }
   json["commands_rejected"] = status.autopilot.rejected;
   json["command_timeouts"] = status.autopilot.timeouts;
-  if (agent.setup().battery) json["battery_used_ah"] = status.battery.used;
+  const auto time_or_null = [](const std::optional<SimTime>& time) {
+    return time ? nlohmann::ordered_json(to_seconds(*time)) : nlohmann::ordered_json(nullptr);
+  };
+  if (agent.setup().battery) {
+    json["battery_used_ah"] = status.battery.used;
+    json["battery_low_at"] = time_or_null(s.battery_low);
+    json["battery_empty_at"] = time_or_null(s.battery_empty);
+  }
+  json["trajectories_beyond_limits"] = s.beyond_limits;
+  json["limited_time"] = {{"speed", to_seconds(s.speed_limited)},
+                          {"acceleration", to_seconds(s.acceleration_limited)},
+                          {"tilt", to_seconds(s.tilt_limited)},
+                          {"rotors", to_seconds(s.rotors_limited)}};
   return json;
 }
 
@@ -242,6 +254,15 @@ void FlightRecorder::on_collision(const CollisionEvent& event) {
                             event.penetration));
 }
 
+void FlightRecorder::on_vehicle_event(const VehicleEvent& event) {
+  // no partner, no place, no depth
+  events_.write(fmt::format("{},{},{},,{},,,,\n",
+                            seconds(event.time),
+                            event.kind,
+                            names_[event.vehicle],
+                            csv(event.vehicle_world)));
+}
+
 void FlightRecorder::on_obstacle(const ObstacleSample& sample) {
   if (!obstacles_) return;
   const Pose& pose = sample.T_world_body;
@@ -271,6 +292,8 @@ std::string summary_json(const Simulation& simulation) {
   nlohmann::ordered_json json;
   json["pointflight"] = kVersion;
   json["end"] = to_string(simulation.end());
+  const std::string reason = reason_of(simulation.end());
+  if (!reason.empty()) json["end_reason"] = reason;
   json["seed"] = scenario.seed;
   json["map"] = fs::path(scenario.map).filename().string();
   json["map_bytes"] = simulation.map().file_size();

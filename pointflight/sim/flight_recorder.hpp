@@ -30,6 +30,7 @@ class FlightRecorder : public SampleSink {
   void on_imu(std::uint32_t vehicle, const ImuSample& sample) override;
   void on_scan(const Scan& scan, const PoseAt& pose_at) override;
   void on_collision(const CollisionEvent& event) override;
+  void on_vehicle_event(const VehicleEvent& event) override;
   void on_obstacle(const ObstacleSample& sample) override;
 
   /// Where to write a file that shall be part of the run, before `finish`.

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "pointflight/lidar/lidar.hpp"
@@ -40,6 +41,15 @@ struct CollisionEvent {
   double penetration = 0.0;                 ///< At the end of the step, m.
 };
 
+/// Something that happened on board a vehicle.
+struct VehicleEvent {
+  std::uint32_t vehicle = 0;
+  SimTime time;
+  std::string kind;   ///< "battery_low", "battery_empty" or "beyond_limits".
+  std::string words;  ///< One line for users.
+  Vector3d vehicle_world = Vector3d::Zero();
+};
+
 /// Where obstacles are, for records.
 struct ObstacleSample {
   SimTime time;
@@ -59,6 +69,7 @@ class SampleSink {
   /// `pose_at` gives T_world_sensor during the scan.
   virtual void on_scan(const Scan& /*scan*/, const PoseAt& /*pose_at*/) {}
   virtual void on_collision(const CollisionEvent& /*event*/) {}
+  virtual void on_vehicle_event(const VehicleEvent& /*event*/) {}
   virtual void on_obstacle(const ObstacleSample& /*sample*/) {}
 };
 
@@ -82,6 +93,9 @@ class SampleSplitter : public SampleSink {
   }
   void on_collision(const CollisionEvent& event) override {
     for (SampleSink* sink : sinks_) sink->on_collision(event);
+  }
+  void on_vehicle_event(const VehicleEvent& event) override {
+    for (SampleSink* sink : sinks_) sink->on_vehicle_event(event);
   }
   void on_obstacle(const ObstacleSample& sample) override {
     for (SampleSink* sink : sinks_) sink->on_obstacle(sample);

@@ -13,9 +13,10 @@ namespace {
 
 constexpr std::array<std::string_view, 2> kRenderers = {"beam", "paper"};
 constexpr std::array<std::string_view, 3> kReactions = {"report", "stop", "crash"};
+constexpr std::array<std::string_view, 3> kLowBattery = {"land", "fall", "report"};
 constexpr std::array<std::string_view, 3> kControllers = {"vehicle", "cascade", "geometric"};
 constexpr std::array<std::string_view, 2> kYawModes = {"along_path", "fixed"};
-constexpr double kFar = 1e7;  // m: coordinates of a UTM zone fit
+constexpr double kFar = kFarthest;
 
 Key required(Key key) {
   key.required = true;
@@ -68,6 +69,12 @@ void describe_airframe(SettingsVisitor& v, VehicleSetup& s) {
   v.value({"command_timeout", "s", "hover without a command for so long; 0: never", 0, 3600},
           s.command_timeout);
   v.value({"battery", "", "fly on the vehicle's battery"}, s.battery);
+  v.choice({"on_low_battery",
+            "",
+            "at the battery's reserve: land and take no more commands, stop the rotors, or go on "
+            "until it is empty, when the rotors stop in any case"},
+           s.on_low_battery,
+           kLowBattery);
   v.section({"limits", "", "instead of the vehicle file's; 0: its own"},
             [&](SettingsVisitor& w) { describe_limits(w, s.limits); });
 }

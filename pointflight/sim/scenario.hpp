@@ -52,6 +52,7 @@ struct VehicleSetup {
   std::string controller = "vehicle";   ///< As its file says; or "cascade", ...
   double command_timeout = 0.5;         ///< s; 0: commands hold for ever.
   bool battery = false;                 ///< Fly on the vehicle's battery.
+  std::string on_low_battery = "land";  ///< At its reserve; or "fall", "report".
   LimitSetup limits;
   std::vector<LidarMount> lidars = {LidarMount{}};
   MissionSettings mission;

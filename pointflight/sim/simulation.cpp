@@ -3,9 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cassert>
 #include <cmath>
 #include <map>
+#include <stdexcept>
 #include <tuple>
 
 #include "pointflight/core/constants.hpp"
@@ -16,8 +16,8 @@
 namespace pointflight {
 namespace {
 
-constexpr double kHoverDuration = 10.0;     // s, where nobody has anything to do
 constexpr double kGoalTolerance = 0.5;      // m
+constexpr double kBeamOrigin = 1.0;         // m: beams start no farther from their sensor
 constexpr double kStartRoom = 1.0;          // m that random obstacles keep from starts
 constexpr std::size_t kVehiclesAChunk = 4;  // that one thread steps
 
@@ -48,7 +48,17 @@ const char* to_string(RunEnd end) {
       return "left the map";
     case RunEnd::kInterrupted:
       return "interrupted";
+    case RunEnd::kIdle:
+      return "idle";
   }
+  return "";
+}
+
+const char* reason_of(RunEnd end) {
+  if (end == RunEnd::kIdle) {
+    return "nothing left to do, no command for 10 s, and the scenario has no duration";
+  }
+  if (end == RunEnd::kLeftMap) return "over 50 m beside or below it, or 500 m above";
   return "";
 }
 
@@ -56,6 +66,8 @@ Simulation::Simulation(const Scenario& scenario,
                        std::shared_ptr<const SurfelMap> map,
                        const Executor& executor)
     : executor_(&executor) {
+  if (!map) throw std::invalid_argument("a simulation needs a map");
+  check_settings(scenario, scenario.path.empty() ? "scenario" : scenario.path);
   auto setup = std::make_shared<Setup>();
   setup->scenario = scenario;
   setup->map = std::move(map);
@@ -74,6 +86,7 @@ Simulation::Simulation(const Scenario& scenario,
         "{}: {} vehicles; 1 to {}", scenario.place("vehicles"), fleet.size(), kFirstObstacle - 1));
   }
   check_names(scenario, fleet);
+  check_reach(scenario, fleet);
   ObstacleWorld world;
   world.map = setup->map;
   world.seed = static_cast<std::uint64_t>(scenario.seed);
@@ -92,7 +105,7 @@ Simulation::Simulation(const Scenario& scenario,
     busy = std::max(busy, agent.busy_time());
   }
   setup->obstacles = Obstacles(scenario.obstacles, world, executor);
-  const double natural = busy > 0.0 ? busy : kHoverDuration;
+  const double natural = busy > 0.0 ? busy : kIdleTime;
   setup->end_time = SimTime(from_seconds(scenario.duration > 0.0 ? scenario.duration : natural));
   sources_.resize(fleet.size());
   setup_ = std::move(setup);
@@ -100,7 +113,14 @@ Simulation::Simulation(const Scenario& scenario,
 }
 
 SimTime Simulation::end_time() const {
-  return setup_->end_time;
+  return setup_->scenario.duration > 0.0 ? setup_->end_time
+                                         : std::max(setup_->end_time, state_.busy_until);
+}
+
+void Simulation::require_vehicle(std::size_t number) const {
+  if (number < vehicle_count()) return;
+  throw std::out_of_range(
+      fmt::format("vehicle {} of a run with {}; they count from 0", number, vehicle_count()));
 }
 
 const Scenario& Simulation::scenario() const {
@@ -112,11 +132,17 @@ const SurfelMap& Simulation::map() const {
 }
 
 const VehicleAgent& Simulation::vehicle(std::size_t number) const {
+  require_vehicle(number);
   return *setup_->agents[number];
 }
 
 std::shared_ptr<const SurfelMap> Simulation::shared_map() const {
   return setup_->map;
+}
+
+const VehicleStatus& Simulation::status(std::size_t number) const {
+  require_vehicle(number);
+  return state_.vehicles[number];
 }
 
 std::size_t Simulation::obstacle_count() const {
@@ -139,21 +165,29 @@ void Simulation::check_start(std::size_t number) const {
 }
 
 std::optional<std::string> Simulation::command(std::size_t vehicle_number, const Command& command) {
-  assert(vehicle_number < vehicle_count());
+  const VehicleAgent& agent = vehicle(vehicle_number);
   VehicleStatus& status = state_.vehicles[vehicle_number];
-  auto reason = vehicle(vehicle_number)
-                    .autopilot()
-                    .give(status.autopilot, command, state_.time, status.state.body);
-  if (!reason) status.scripted = false;
-  return reason;
+  if (auto reason = agent.command(status, command, state_.time)) return reason;
+  status.scripted = false;
+  status.commanded = true;
+  // a landing takes as long as it takes: its trajectory goes on through the ground
+  const bool lands = std::holds_alternative<LandCommand>(command);
+  const auto& trajectory = status.autopilot.trajectory;
+  const double lasts = trajectory && !lands ? trajectory->duration() : 0.0;
+  state_.busy_until = std::max(state_.busy_until, state_.time + from_seconds(lasts + kIdleTime));
+  return std::nullopt;
 }
 
 void Simulation::follow(std::size_t vehicle, std::shared_ptr<StateSource> source) {
-  assert(vehicle < vehicle_count());
+  require_vehicle(vehicle);
   sources_[vehicle] = std::move(source);
 }
 
 void Simulation::restore(const SimulationState& state) {
+  if (state.vehicles.size() != vehicle_count()) {
+    throw std::invalid_argument(fmt::format(
+        "a state with {} vehicles for a run with {}", state.vehicles.size(), vehicle_count()));
+  }
   state_ = state;
 }
 
@@ -176,27 +210,17 @@ bool Simulation::advance_to(SimTime time, SampleSink& sink) {
 void Simulation::sense(std::vector<StepSamples>& samples) {
   const SimTime now = state_.time;
   const SimTime before = state_.step_number > 0 ? now - setup_->step : now;
-  const std::vector<Body> bodies = obstacles(before, now);
-  std::vector<PlacedBody> placed;
-  placed.reserve(vehicle_count() + bodies.size());
+  std::vector<PlacedBody> vehicles;
+  vehicles.reserve(vehicle_count());
   for (std::size_t i = 0; i < vehicle_count(); ++i) {
     const VehicleAgent& agent = vehicle(i);
     const Pose pose = status(i).state.body.T_world_body();
     const ProximityState& known = status(i).proximity;
-    placed.push_back({agent.label(),
-                      &agent.shape(),
-                      bounding_radius(agent.hull()),
-                      known.started ? known.T_world_body : pose,
-                      pose});
-  }
-  for (const Body& body : bodies) {
-    if (body.until <= now || body.from > now) continue;  // was replaced within the step
-    const Pose pose = body.T_world_body(now);
-    placed.push_back({body.label,
-                      &body.shape,
-                      bounding_radius(body.shape),
-                      body.from > before ? pose : body.T_world_body(before),
-                      pose});
+    vehicles.push_back({agent.label(),
+                        &agent.shape(),
+                        bounding_radius(agent.hull()),
+                        known.started ? known.T_world_body : pose,
+                        pose});
   }
   executor_->parallel_for(
       vehicle_count(), kVehiclesAChunk, [&](std::size_t begin, std::size_t end) {
@@ -207,12 +231,30 @@ void Simulation::sense(std::vector<StepSamples>& samples) {
           query.vehicle = agent.number();
           query.own_label = agent.label();
           query.hull = &agent.hull();
-          query.T_world_body = placed[i].now;
+          query.T_world_body = vehicles[i].now;
           query.now = now;
           query.step = setup_->step;
           query.reach = kClearanceReach;
           query.ignores_map = status.landed || status.crashed;
-          sense_proximity(query, *setup_->map, placed, status.proximity, samples[i].collisions);
+          // obstacles that are near enough to be met or to be the nearest
+          const double moved =
+              (vehicles[i].now.translation - vehicles[i].before.translation).norm();
+          const std::vector<Body> bodies =
+              setup_->obstacles.near(query.T_world_body.translation,
+                                     vehicles[i].radius + query.reach + moved,
+                                     before,
+                                     now);
+          std::vector<PlacedBody> others = vehicles;
+          for (const Body& body : bodies) {
+            if (body.until <= now || body.from > now) continue;  // was replaced within the step
+            const Pose pose = body.T_world_body(now);
+            others.push_back({body.label,
+                              &body.shape,
+                              bounding_radius(body.shape),
+                              body.from > before ? pose : body.T_world_body(before),
+                              pose});
+          }
+          sense_proximity(query, *setup_->map, others, status.proximity, samples[i].collisions);
           const auto& nearest = status.proximity.nearest;
           VehicleSummary& summary = status.summary;
           if (nearest && !status.crashed &&
@@ -249,7 +291,7 @@ bool Simulation::step(SampleSink& sink) {
   std::vector<StepSamples> samples(vehicle_count());
   sense(samples);
   const bool stops = react(samples);
-  const bool last = now >= setup_->end_time;
+  const bool last = now >= end_time() && !is_landing();
   const SimTime samples_end = stops || last ? now + Duration{1} : now + setup_->step;
   executor_->parallel_for(
       vehicle_count(), kVehiclesAChunk, [&](std::size_t begin, std::size_t end) {
@@ -262,13 +304,13 @@ bool Simulation::step(SampleSink& sink) {
       });
   deliver(samples, sink);
   sample_obstacles(samples_end, sink);
-  take_due_scans(now, sink);
+  take_due_scans(sink);
   if (stops) {
     state_.end = RunEnd::kCollision;
     return false;
   }
   if (last) {
-    finish_run(sink);
+    finish_run();
     return false;
   }
   if (has_left_map()) {
@@ -303,24 +345,42 @@ bool Simulation::step(SampleSink& sink) {
   return true;
 }
 
-/// The last scans end with the run; their late channels need poses of one step more.
-void Simulation::finish_run(SampleSink& sink) {
-  const SimTime beyond = state_.time + setup_->step;
-  for (std::size_t i = 0; i < vehicle_count(); ++i) {
-    VehicleStatus& status = state_.vehicles[i];
-    const VehicleState next = vehicle(i).state_after(status, to_seconds(setup_->step));
-    status.history.record(beyond, next.body.T_world_body());
+void Simulation::finish_run() {
+  if (!arrived()) {
+    state_.end = RunEnd::kMissionUnfinished;
+  } else {
+    state_.end = is_idle() ? RunEnd::kIdle : RunEnd::kCompleted;
   }
-  take_due_scans(beyond, sink);
-  state_.end = arrived() ? RunEnd::kCompleted : RunEnd::kMissionUnfinished;
 }
 
-/// All that have a mission and nothing else to do are at their goals; nobody lies broken.
+/// True while a vehicle comes down at a program's word in a run without a duration.
+bool Simulation::is_landing() const {
+  if (setup_->scenario.duration > 0.0) return false;
+  return std::any_of(
+      state_.vehicles.begin(), state_.vehicles.end(), [](const VehicleStatus& status) {
+        return status.commanded && status.autopilot.armed &&
+               std::holds_alternative<LandCommand>(status.autopilot.command);
+      });
+}
+
+/// True where nothing but the lack of commands ends the run: programs gave some, or nobody did.
+bool Simulation::is_idle() const {
+  if (setup_->scenario.duration > 0.0) return false;
+  bool had_plan = false;
+  for (std::size_t i = 0; i < vehicle_count(); ++i) {
+    if (status(i).commanded) return true;
+    had_plan = had_plan || vehicle(i).busy_time() > 0.0;
+  }
+  return !had_plan;
+}
+
+/// All that have a mission and nothing else to do are at their goals; nobody lies broken or empty.
 bool Simulation::arrived() const {
   for (std::size_t i = 0; i < vehicle_count(); ++i) {
     const VehicleSetup& setup = vehicle(i).setup();
-    if (status(i).crashed) return false;
-    if (setup.mission.waypoints.empty() || !setup.commands.empty()) continue;
+    if (status(i).crashed || status(i).summary.battery_empty) return false;
+    const bool elsewhere = status(i).commanded || !setup.commands.empty();
+    if (setup.mission.waypoints.empty() || elsewhere) continue;
     const Mission& mission = vehicle(i).mission();
     const double away = (status(i).state.body.p_world - mission.goal()).norm();
     if (away >= kGoalTolerance || to_seconds(state_.time) < mission.duration()) return false;
@@ -356,11 +416,12 @@ void Simulation::deliver(std::vector<StepSamples>& samples, SampleSink& sink) {
     for (std::size_t i = 0; i < s.collisions.size(); ++i) {
       due.push_back({s.collisions[i].time, 0, v, i});
     }
-    for (std::size_t i = 0; i < s.states.size(); ++i) due.push_back({s.states[i].time, 1, v, i});
+    for (std::size_t i = 0; i < s.events.size(); ++i) due.push_back({s.events[i].time, 1, v, i});
+    for (std::size_t i = 0; i < s.states.size(); ++i) due.push_back({s.states[i].time, 2, v, i});
     for (std::size_t i = 0; i < s.odometry.size(); ++i) {
-      due.push_back({s.odometry[i].delivered, 2, v, i});
+      due.push_back({s.odometry[i].delivered, 3, v, i});
     }
-    for (std::size_t i = 0; i < s.imu.size(); ++i) due.push_back({s.imu[i].time, 3, v, i});
+    for (std::size_t i = 0; i < s.imu.size(); ++i) due.push_back({s.imu[i].time, 4, v, i});
   }
   std::stable_sort(due.begin(), due.end(), [](const Due& a, const Due& b) {
     return std::tie(a.time, a.kind, a.vehicle) < std::tie(b.time, b.kind, b.vehicle);
@@ -368,9 +429,10 @@ void Simulation::deliver(std::vector<StepSamples>& samples, SampleSink& sink) {
   for (const Due& d : due) {
     const StepSamples& s = samples[d.vehicle];
     if (d.kind == 0) sink.on_collision(s.collisions[d.index]);
-    if (d.kind == 1) sink.on_state(s.states[d.index]);
-    if (d.kind == 2) sink.on_odometry(s.odometry[d.index]);
-    if (d.kind == 3) sink.on_imu(static_cast<std::uint32_t>(d.vehicle), s.imu[d.index]);
+    if (d.kind == 1) sink.on_vehicle_event(s.events[d.index]);
+    if (d.kind == 2) sink.on_state(s.states[d.index]);
+    if (d.kind == 3) sink.on_odometry(s.odometry[d.index]);
+    if (d.kind == 4) sink.on_imu(static_cast<std::uint32_t>(d.vehicle), s.imu[d.index]);
   }
 }
 
@@ -393,9 +455,20 @@ void Simulation::sample_obstacles(SimTime end, SampleSink& sink) {
   }
 }
 
-std::vector<Body> Simulation::bodies_for_scan(SimTime from, SimTime until) const {
-  std::vector<Body> bodies = obstacles(from, until);
+/// What a scan of a vehicle's lidar can meet: everybody else, and the obstacles that are near
+/// enough.
+std::vector<Body> Simulation::bodies_for_scan(std::size_t number,
+                                              const MountedLidar& mounted,
+                                              SimTime from,
+                                              SimTime until) const {
+  const StateHistory& own = status(number).history;
+  const SimTime middle = from + (until - from) / 2;
+  const double moved = own.speed_max(from, until) * to_seconds(until - middle);
+  const double reach =
+      mounted.lidar->reach() + mounted.T_body_sensor.translation.norm() + moved + kBeamOrigin;
+  std::vector<Body> bodies = setup_->obstacles.near(own.at(middle).translation, reach, from, until);
   for (std::size_t i = 0; i < vehicle_count(); ++i) {
+    if (i == number) continue;
     Body body;
     body.label = vehicle(i).label();
     body.shape = vehicle(i).shape();
@@ -407,9 +480,8 @@ std::vector<Body> Simulation::bodies_for_scan(SimTime from, SimTime until) const
   return bodies;
 }
 
-/// Scans whose last beam lies before `known`, the newest record: rendered in arrears, those that
-/// end together at the same time.
-void Simulation::take_due_scans(SimTime known, SampleSink& sink) {
+/// Scans that have ended: rendered in arrears, those that end together at the same time.
+void Simulation::take_due_scans(SampleSink& sink) {
   struct Due {
     std::size_t vehicle, lidar;
   };
@@ -423,8 +495,7 @@ void Simulation::take_due_scans(SimTime known, SampleSink& sink) {
         const std::int64_t number = status(v).next_scan[l];
         const SimTime end = schedule.at(number + 1);
         oldest_needed = std::min(oldest_needed, schedule.at(number));
-        // a step later than the scan's end: late channels fire up to 0.1 ms after it
-        if (end + setup_->step > known || end > first_end) continue;
+        if (end > state_.time || end > first_end) continue;
         if (end < first_end) due.clear();
         first_end = end;
         due.push_back({v, l});
@@ -447,9 +518,7 @@ void Simulation::take_due_scans(SimTime known, SampleSink& sink) {
                                 StreamId::kDroppedScans,
                                 agent.number() << 8 | static_cast<std::uint32_t>(l));
       if (lost > 0.0 && chance.uniform(static_cast<std::uint64_t>(number)) < lost) return;
-      // late channels fire up to a step after the scan's end
-      std::vector<Body> bodies = bodies_for_scan(start, first_end + setup_->step);
-      std::erase_if(bodies, [&](const Body& body) { return body.label == agent.label(); });
+      const std::vector<Body> bodies = bodies_for_scan(v, mounted, start, first_end);
       const ScanRequest request{static_cast<std::uint64_t>(number),
                                 start,
                                 mounted.snapshot,

@@ -14,8 +14,19 @@
 
 namespace pointflight {
 
-enum class RunEnd { kRunning, kCompleted, kMissionUnfinished, kCollision, kLeftMap, kInterrupted };
+enum class RunEnd {
+  kRunning,
+  kCompleted,
+  kMissionUnfinished,
+  kCollision,
+  kLeftMap,  ///< `is_lost` (sim/start_check.hpp).
+  kInterrupted,
+  kIdle  ///< Nothing to do and no commands for `Simulation::kIdleTime`; the scenario has no
+         ///< duration.
+};
 const char* to_string(RunEnd end);
+/// Why, where the word alone does not say it: half a sentence, or empty.
+const char* reason_of(RunEnd end);
 
 /// Everything of a run that changes: a value. What it holds by pointer (trajectories that are
 /// flown) is immutable.
@@ -24,6 +35,7 @@ struct SimulationState {
   std::uint64_t step_number = 0;
   std::int64_t next_obstacle_sample = 0;
   RunEnd end = RunEnd::kRunning;
+  SimTime busy_until;  ///< That commands from the program last and what is waited after them.
   std::vector<VehicleStatus> vehicles;
 };
 
@@ -36,9 +48,12 @@ class Simulation {
  public:
   /// Clearance is known up to here, m.
   static constexpr double kClearanceReach = 10.0;
+  /// A run without a duration ends so long after all is done and the last command came, s.
+  static constexpr double kIdleTime = 10.0;
 
   /// Throws InputError where the scenario cannot be flown (unknown models, start inside the map,
-  /// far outside of it or in each other, obstacles without room). The executor must outlive it.
+  /// far outside of it or in each other, obstacles without room), std::invalid_argument without a
+  /// map. The executor must outlive it.
   Simulation(const Scenario& scenario,
              std::shared_ptr<const SurfelMap> map,
              const Executor& executor);
@@ -50,7 +65,9 @@ class Simulation {
   bool advance_to(SimTime time, SampleSink& sink);
 
   /// Tells a vehicle what to do from now on. Returns why it does not, if so: such commands are
-  /// counted, and change nothing.
+  /// counted, and change nothing. A run without a duration goes on while commands come, until
+  /// `kIdleTime` after the last (and its trajectory). Throws std::out_of_range without such a
+  /// vehicle, as all functions do that take its number.
   std::optional<std::string> command(std::size_t vehicle, const Command& command);
 
   /// From now on the vehicle's states come from elsewhere; null: from the local dynamics again.
@@ -64,6 +81,7 @@ class Simulation {
 
   [[nodiscard]] const SimulationState& state() const { return state_; }
   /// Goes on from a state of this simulation or a copy of it: the same bytes as the first time.
+  /// Throws std::invalid_argument where it is of another fleet.
   void restore(const SimulationState& state);
 
   [[nodiscard]] SimTime time() const { return state_.time; }
@@ -75,11 +93,9 @@ class Simulation {
 
   [[nodiscard]] std::size_t vehicle_count() const { return state_.vehicles.size(); }
   [[nodiscard]] const VehicleAgent& vehicle(std::size_t number) const;
-  [[nodiscard]] const VehicleStatus& status(std::size_t number) const {
-    return state_.vehicles[number];
-  }
+  [[nodiscard]] const VehicleStatus& status(std::size_t number) const;
   [[nodiscard]] const VehicleSummary& summary(std::size_t number) const {
-    return state_.vehicles[number].summary;
+    return status(number).summary;
   }
 
   [[nodiscard]] std::size_t obstacle_count() const;
@@ -89,16 +105,22 @@ class Simulation {
  private:
   struct Setup;
 
+  void require_vehicle(std::size_t number) const;
   void check_start(std::size_t number) const;
   void sense(std::vector<StepSamples>& samples);
   [[nodiscard]] bool react(std::vector<StepSamples>& samples);
   void deliver(std::vector<StepSamples>& samples, SampleSink& sink);
   void sample_obstacles(SimTime end, SampleSink& sink);
-  void take_due_scans(SimTime known, SampleSink& sink);
-  void finish_run(SampleSink& sink);
-  [[nodiscard]] std::vector<Body> bodies_for_scan(SimTime from, SimTime until) const;
+  void take_due_scans(SampleSink& sink);
+  void finish_run();
+  [[nodiscard]] std::vector<Body> bodies_for_scan(std::size_t number,
+                                                  const MountedLidar& mounted,
+                                                  SimTime from,
+                                                  SimTime until) const;
   [[nodiscard]] bool arrived() const;
   [[nodiscard]] bool has_left_map() const;
+  [[nodiscard]] bool is_idle() const;
+  [[nodiscard]] bool is_landing() const;
 
   std::shared_ptr<const Setup> setup_;
   const Executor* executor_;

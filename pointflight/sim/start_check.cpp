@@ -8,6 +8,7 @@
 #include <set>
 
 #include "pointflight/core/input_error.hpp"
+#include "pointflight/core/number_text.hpp"
 #include "pointflight/render/renderer.hpp"
 #include "pointflight/sim/simulation.hpp"
 #include "pointflight/world/free_space.hpp"
@@ -19,7 +20,8 @@ constexpr double kBeside = 50.0;  // m outside of the map's bounds, and below
 constexpr double kAbove = 500.0;  // m
 
 std::string text_of(const Vector3d& p) {
-  return fmt::format("({:.2f}, {:.2f}, {:.2f})", p.x(), p.y(), p.z());
+  return fmt::format(
+      "({}, {}, {})", fixed_text(p.x(), 2), fixed_text(p.y(), 2), fixed_text(p.z(), 2));
 }
 
 std::string free_place_text(const SurfelMap& map,
@@ -75,6 +77,25 @@ void check_names(const Scenario& scenario, const std::vector<VehicleSetup>& flee
   }
 }
 
+void check_reach(const Scenario& scenario, const std::vector<VehicleSetup>& fleet) {
+  for (std::size_t i = 0; i < fleet.size(); ++i) {
+    std::vector<Vector3d> places = fleet[i].mission.waypoints;
+    places.push_back(fleet[i].start);
+    for (const CommandSettings& command : fleet[i].commands) places.push_back(command.vector);
+    for (const Vector3d& p : places) {
+      if (p.cwiseAbs().maxCoeff() <= kFarthest) continue;
+      throw InputError(fmt::format(
+          "{}: copy_offset takes {} to ({:g}, {:g}, {:g}); {:g} m from the origin at most",
+          scenario.place(scenario.vehicle_key(i, "copy_offset")),
+          fleet[i].name,
+          p.x(),
+          p.y(),
+          p.z(),
+          kFarthest));
+    }
+  }
+}
+
 void check_start_is_free(const Scenario& scenario,
                          const SurfelMap& map,
                          const StartingVehicle& vehicle,
@@ -101,11 +122,11 @@ void check_start_is_free(const Scenario& scenario,
   const auto here = contact_with_map(map, agent.hull(), pose, 0.0);
   if (here && here->distance < 0.0) {
     fail(fmt::format(
-        "({:.2f}, {:.2f}, {:.2f}) of {} is {:.2f} m inside the map for a hull that "
+        "({}, {}, {}) of {} is {:.2f} m inside the map for a hull that "
         "reaches {:.2f} m; move it, or let `pointflight scenario new` find a free place",
-        p.x(),
-        p.y(),
-        p.z(),
+        fixed_text(p.x(), 2),
+        fixed_text(p.y(), 2),
+        fixed_text(p.z(), 2),
         name,
         -here->distance,
         bounding_radius(agent.hull())));

@@ -14,6 +14,9 @@ class Simulation;
 /// Names make folders and topics: each its own, and nothing but plain letters. Throws InputError.
 void check_names(const Scenario& scenario, const std::vector<VehicleSetup>& fleet);
 
+/// Copies stay where numbers in files are taken, too. Throws InputError.
+void check_reach(const Scenario& scenario, const std::vector<VehicleSetup>& fleet);
+
 /// A vehicle where it starts.
 struct StartingVehicle {
   const VehicleAgent* agent = nullptr;

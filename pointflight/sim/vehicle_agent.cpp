@@ -4,10 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/geometry/rotation.hpp"
+#include "pointflight/vehicle/feasibility.hpp"
 
 namespace pointflight {
 namespace {
@@ -106,6 +108,10 @@ VehicleAgent::VehicleAgent(const Scenario& scenario,
         count));
   };
   for (std::size_t i = 0; i < setup_.faults.size(); ++i) {
+    const std::string name = scenario.vehicle_key(number, fmt::format("faults[{}].", i));
+    check(setup_.faults[i], [&](const char* key, const std::string& what) {
+      throw InputError(fmt::format("{}: {}{}: {}", scenario.place(name + key), name, key, what));
+    });
     const std::string& kind = setup_.faults[i].kind;
     if (kind == "rotor") check_index(i, "rotor", settings().rotors.size());
     if (kind == "lidar" || kind == "scan_drop") check_index(i, "lidar", lidars_.size());
@@ -123,6 +129,11 @@ void VehicleAgent::read_commands(const Scenario& scenario) {
     const auto key = [&](const char* name) {
       return scenario.vehicle_key(number_, fmt::format("commands[{}].{}", i, name));
     };
+    if (s.kind == "body_rates" && !s.vector.isZero(0.0)) {
+      throw InputError(fmt::format("{}: {}: body rates are given as rates_deg: [x, y, z], in deg/s",
+                                   scenario.place(key("vector")),
+                                   key("vector")));
+    }
     const Command command = scenario.at(key(s.file.empty() ? "kind" : "file"), [&] {
       Command made = command_of(s, settings(), setup_.mission.motion, scenario.folder());
       if (const auto reason = autopilot_.objection(made)) throw InputError(*reason);
@@ -181,17 +192,19 @@ void VehicleAgent::control(VehicleStatus& status,
   const double dt = to_seconds(step);
   if (!status.landed && touches_down(status)) status.landed = true;
   while (status.next_command < commands_.size() && commands_[status.next_command].time <= now) {
-    autopilot_.give(status.autopilot, commands_[status.next_command++].command, now, body);
+    command(status, commands_[status.next_command++].command, now);
     status.scripted = true;
   }
-  if (status.crashed) status.autopilot.armed = false;  // whatever it is told
+  // whatever it is told
+  if (status.crashed || status.summary.battery_empty) status.autopilot.armed = false;
   // a level that must be repeated is, by the scenario
   if (status.scripted && status.autopilot.command.index() < std::variant_size_v<Setpoint>) {
     status.autopilot.since = now;
   }
   status.rotor_commands = autopilot_.rotor_speeds(status.autopilot, body, status.landed, now, dt);
+  status.conditions.rotor_shares.clear();
   for (std::size_t i = 0; i < status.rotor_commands.size() && faults_.any(); ++i) {
-    status.rotor_commands[i] *= faults_.rotor_share(i, now);
+    status.conditions.rotor_shares.push_back(faults_.rotor_share(i, now));
   }
 
   const double error = (body.p_world - status.autopilot.reference.p_world).norm();
@@ -202,6 +215,7 @@ void VehicleAgent::control(VehicleStatus& status,
   summary.tracking_error_rms =
       std::sqrt(status.squared_error_sum / static_cast<double>(status.steps));
   summary.speed_max = std::max(summary.speed_max, body.v_world.norm());
+  if (status.autopilot.armed && !status.landed) watch_limits(status, step);
 
   status.conditions.ground_z = ground_below(status);
   if (!wind_.is_calm()) {
@@ -211,7 +225,83 @@ void VehicleAgent::control(VehicleStatus& status,
   }
   if (setup_.battery) {
     status.conditions.speed_share = battery_.step(status.battery, status.state, dt);
+    watch_battery(status, now);
   }
+}
+
+void VehicleAgent::note(VehicleStatus& status,
+                        SimTime now,
+                        const char* kind,
+                        const std::string& words) const {
+  status.events.push_back({number_, now, kind, words, status.state.body.p_world});
+}
+
+std::optional<std::string> VehicleAgent::command(VehicleStatus& status,
+                                                 const Command& command,
+                                                 SimTime now) const {
+  AutopilotState& pilot = status.autopilot;
+  if (status.summary.battery_low && setup_.on_low_battery == "land") {
+    return pilot.reject("the battery is low: it lands");
+  }
+  const auto before = pilot.trajectory;
+  if (auto reason = autopilot_.give(pilot, command, now, status.state.body)) return reason;
+  const bool given = std::holds_alternative<TrajectoryCommand>(command);
+  const bool made = std::holds_alternative<WaypointCommand>(command);
+  if ((!given && !made) || pilot.trajectory == before) return std::nullopt;
+  const RigidBodyState* from = given ? &status.state.body : nullptr;
+  if (const auto words = beyond_limits(*pilot.trajectory, settings(), from)) {
+    ++status.summary.beyond_limits;
+    note(status, now, "beyond_limits", *words);
+  }
+  return std::nullopt;
+}
+
+std::vector<std::string> VehicleAgent::foreseen() const {
+  std::vector<std::string> lines;
+  for (const TimedCommand& timed : commands_) {
+    const auto* command = std::get_if<TrajectoryCommand>(&timed.command);
+    if (command == nullptr) continue;
+    const auto words = beyond_limits(*command->trajectory, settings(), nullptr);
+    if (!words) continue;
+    lines.push_back(fmt::format(
+        "{} at {:g} s: {}", setup_.name, to_seconds(timed.time.time_since_epoch()), *words));
+  }
+  return lines;
+}
+
+void VehicleAgent::watch_limits(VehicleStatus& status, Duration step) const {
+  const LimitsReached& reached = status.autopilot.memory.limits;
+  VehicleSummary& summary = status.summary;
+  if (reached.speed) summary.speed_limited += step;
+  if (reached.acceleration) summary.acceleration_limited += step;
+  if (reached.tilt) summary.tilt_limited += step;
+  if (reached.rotors) summary.rotors_limited += step;
+}
+
+void VehicleAgent::watch_battery(VehicleStatus& status, SimTime now) const {
+  VehicleSummary& summary = status.summary;
+  const double charge = battery_.charge(status.battery);
+  const std::string& action = setup_.on_low_battery;
+  if (!summary.battery_low && charge <= settings().battery.reserve) {
+    summary.battery_low = now;
+    note(status,
+         now,
+         "battery_low",
+         fmt::format("the battery is down to {:.0f} % after {:.2f} Ah: {}",
+                     100.0 * charge,
+                     status.battery.used,
+                     action == "land"   ? "it lands"
+                     : action == "fall" ? "its rotors stop"
+                                        : "it flies on"));
+    if (action == "land") {
+      autopilot_.give(status.autopilot, LandCommand{}, now, status.state.body);
+      status.scripted = false;
+    }
+  }
+  const bool stops = charge <= 0.0 || (summary.battery_low && action == "fall");
+  if (summary.battery_empty || !stops) return;
+  summary.battery_empty = now;
+  note(status, now, "battery_empty", "the battery gives nothing more: its rotors are off");
 }
 
 /// True where something below is as good as touched by a vehicle that is meant to land, or that has
@@ -284,6 +374,7 @@ void VehicleAgent::sample(VehicleStatus& status,
                           SimTime now,
                           SimTime end,
                           StepSamples& samples) const {
+  samples.events = std::exchange(status.events, {});
   for (;;) {
     const SimTime state_time = state_schedule_.at(status.next_state);
     const SimTime odometry_time = odometry_schedule_.at(status.next_odometry);

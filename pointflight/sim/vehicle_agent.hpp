@@ -30,6 +30,13 @@ struct VehicleSummary {
   std::uint64_t beams = 0;
   std::uint64_t points = 0;
   std::uint64_t collisions = 0;
+  Duration speed_limited{0};  ///< How long its speed limit cut what was asked for.
+  Duration acceleration_limited{0};
+  Duration tilt_limited{0};
+  Duration rotors_limited{0};              ///< How long the rotors could not give the thrust.
+  std::uint64_t beyond_limits = 0;         ///< Trajectories that asked for more than it has.
+  std::optional<SimTime> battery_low;      ///< When it came to its reserve.
+  std::optional<SimTime> battery_empty;    ///< When its rotors stopped.
   std::optional<double> closest_approach;  ///< Of the hull to anything, m; negative inside.
   Vector3d closest_place_world = Vector3d::Zero();
   Label closest_label = kMapLabel;
@@ -47,11 +54,13 @@ struct VehicleStatus {
   std::vector<double> rotor_commands;
   StateHistory history;
   ProximityState proximity;
-  bool landed = false;           ///< The ground carries it.
-  bool crashed = false;          ///< Rotors off for good.
-  bool at_rest = false;          ///< A wreck on the ground.
-  std::size_t next_command = 0;  ///< Of the scenario's.
-  bool scripted = false;         ///< What it does is the scenario's last command.
+  bool landed = false;               ///< The ground carries it.
+  bool crashed = false;              ///< Rotors off for good.
+  bool at_rest = false;              ///< A wreck on the ground.
+  bool commanded = false;            ///< A program has told it something.
+  std::vector<VehicleEvent> events;  ///< Not yet delivered.
+  std::size_t next_command = 0;      ///< Of the scenario's.
+  bool scripted = false;             ///< What it does is the scenario's last command.
   std::int64_t next_state = 0;
   std::int64_t next_imu = 0;
   std::int64_t next_odometry = 0;
@@ -68,6 +77,7 @@ struct StepSamples {
   std::vector<ImuSample> imu;
   std::vector<OdometrySample> odometry;
   std::vector<CollisionEvent> collisions;
+  std::vector<VehicleEvent> events;
 };
 
 /// A LiDAR on a vehicle.
@@ -93,6 +103,11 @@ class VehicleAgent {
                const RendererByName& renderer);
 
   [[nodiscard]] VehicleStatus start() const;
+
+  /// Takes a command; returns why not, if so. A trajectory that is beyond the vehicle is an event.
+  std::optional<std::string> command(VehicleStatus& status,
+                                     const Command& command,
+                                     SimTime now) const;
 
   /// Takes the scenario's commands that are due, then control: rotor commands, wind, ground,
   /// battery for the step that starts now.
@@ -126,6 +141,9 @@ class VehicleAgent {
   [[nodiscard]] const Faults& faults() const { return faults_; }
   [[nodiscard]] std::uint64_t seed() const { return seed_; }
 
+  /// What of the scenario's mission and trajectories is beyond the vehicle, a line each.
+  [[nodiscard]] std::vector<std::string> foreseen() const;
+
   /// How long its mission and commands take, s; 0: nothing to do.
   [[nodiscard]] double busy_time() const { return busy_time_; }
 
@@ -135,6 +153,9 @@ class VehicleAgent {
     Command command;
   };
   void read_commands(const Scenario& scenario);
+  void note(VehicleStatus& status, SimTime now, const char* kind, const std::string& words) const;
+  void watch_limits(VehicleStatus& status, Duration step) const;
+  void watch_battery(VehicleStatus& status, SimTime now) const;
   [[nodiscard]] bool touches_down(const VehicleStatus& status) const;
   [[nodiscard]] double ground_below(const VehicleStatus& status) const;
   [[nodiscard]] ImuSample imu_sample(VehicleStatus& status,

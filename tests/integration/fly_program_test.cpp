@@ -75,6 +75,33 @@ TEST_F(Program, AScenarioFindsItsFilesFromItsOwnFolder) {
   EXPECT_EQ(check.code, 0) << check.err;
 }
 
+TEST_F(Program, SaysBeforeAndAfterWhatAVehicleCannotFly) {
+  const TemporaryFolder folder;
+  const auto scenario = [&](const char* rest) {
+    return fmt::format("map: {}\nlidars: []\nvehicle:\n  start: [12, 10, 12]\n{}", map(), rest);
+  };
+  write_file(folder / "s.yaml",
+             scenario("mission:\n  speed: 15\n  acceleration: 14\n  jerk: 100\n"
+                      "  waypoints: [[2, 10, 12]]\n"));
+  const Result check = run(fmt::format("scenario check {}", folder / "s.yaml"));
+  EXPECT_EQ(check.code, 0) << check.err;
+  expect_contains(check.err, "warning: drone0 at 0 s: the trajectory asks for a tilt of");
+  const Result fly = run(fmt::format("fly {} -o {}", folder / "s.yaml", folder / "run"));
+  expect_contains(fly.err, "warning: drone0 at 0.000 s: the trajectory asks for a tilt of");
+  expect_contains(fly.out, "limits reached");
+  expect_contains(read_file(folder / "run/events.csv"), ",beyond_limits,drone0,,12,10,12,,,,\n");
+  const auto summary = nlohmann::json::parse(read_file(folder / "run/summary.json"));
+  EXPECT_EQ(summary["vehicles"][0]["trajectories_beyond_limits"], 1);
+  EXPECT_GT(summary["vehicles"][0]["limited_time"]["acceleration"].get<double>(), 0.1);
+  // the picture of a run with such events can be drawn again
+  EXPECT_EQ(run(fmt::format("picture {} --map {}", folder / "run", map())).code, 0);
+  // nothing to do and no duration: it says why it ends
+  write_file(folder / "idle.yaml", scenario(""));
+  const Result idle = run(fmt::format("fly {} -o {}", folder / "idle.yaml", folder / "idle"));
+  EXPECT_EQ(idle.code, 0) << idle.err;
+  expect_contains(idle.out, "idle, after 10.0 s: nothing left to do");
+}
+
 TEST_F(Program, BadScenariosSayFileAndLine) {
   const TemporaryFolder folder;
   const auto check = [&](const std::string& text) {

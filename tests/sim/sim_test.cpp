@@ -76,6 +76,19 @@ TEST(Mission, PassesThroughItsWaypointsAndTurnsFirst) {
   EXPECT_EQ(mission.at(1e4).p_world, settings.waypoints.back());
 }
 
+TEST(Mission, HoldsAtEveryWaypointAlsoWhereItStarts) {
+  MissionSettings settings;
+  settings.hold = 2.0;
+  settings.waypoints = {{0, 0, 1}, {4, 0, 1}, {4, 0, 1}};
+  const Mission mission({0, 0, 1}, 0.0, settings);
+  const double travel = SmoothMove(4.0, settings.motion).duration();
+  EXPECT_DOUBLE_EQ(mission.duration(), 2.0 + travel + 2.0 + 2.0);
+  EXPECT_EQ(mission.at(1.99).p_world, Vector3d(0, 0, 1));
+  EXPECT_GT(mission.at(2.5).p_world.x(), 0.01);
+  EXPECT_EQ(mission.at(2.0 + travel + 1.0).p_world, Vector3d(4, 0, 1));
+  EXPECT_DOUBLE_EQ(mission.length(), 4.0);
+}
+
 TEST(StateHistory, InterpolatesOnTheWayAndForgetsWhatIsOld) {
   StateHistory history;
   const Quaterniond turned = quaternion_from_rpy(0, 0, 0.01);

@@ -194,6 +194,22 @@ TEST(Scenario, MistakesInASwarmSayWhere) {
   expect_contains(error("vehicle: {start: [10, 6, 3], model: lee2010, battery: true}\n"),
                   "no battery");
   expect_contains(error("vehicles: []\n"), "0 vehicles");
+  const std::string start = "vehicle: {start: [10, 6, 3]}\n";
+  expect_contains(error(start + "faults:\n  - {kind: scan_drop, value: 2}\n"),
+                  "s.yaml:4: faults[0].value: 2 of kind scan_drop; a share");
+  expect_contains(error(start + "faults:\n  - {kind: rotor, value: 60}\n"),
+                  "s.yaml:4: faults[0].value: 60 of kind rotor");
+  expect_contains(error(start + "faults:\n  - kind: imu\n    from: 3\n    until: 2\n"),
+                  "s.yaml:6: faults[0].until: 2 s is not after 3 s");
+  expect_contains(error(start + "commands:\n  - kind: body_rates\n    vector: [10, 0, 0]\n"),
+                  "s.yaml:5: commands[0].vector: body rates are given as rates_deg");
+  expect_contains(error(start + "commands:\n  - {kind: waypoint, vector: [1e300, 0, 0]}\n"),
+                  "s.yaml:4: commands[0].vector: 1e300 is out of range");
+  expect_contains(error(start + "mission:\n  waypoints:\n    - [1e300, 0, 0]\n"),
+                  "s.yaml:5: mission.waypoints: 1e300 is out of range");
+  expect_contains(
+      error("vehicles:\n  - start: [10, 6, 3]\n    copies: 3\n    copy_offset: [9e6, 0, 0]\n"),
+      "s.yaml:5: copy_offset takes drone2 to (1.8e+07, 6, 3); 1e+07 m");
 }
 
 TEST(Scenario, BothFormsAreOne) {

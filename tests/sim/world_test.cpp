@@ -1,6 +1,8 @@
 // What happens to vehicles in a run: collisions, obstacles, commands, faults, wind.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <set>
@@ -169,6 +171,61 @@ TEST(Obstacles, BounceWhereTheyAreToldTo) {
     EXPECT_GE((p - ball.bounds_min).minCoeff(), 0.0);
     EXPECT_GE((ball.bounds_max - p).minCoeff(), 0.0);
     last = p;
+  }
+}
+
+TEST(Obstacles, ThoseThatAreNearAreFoundWithoutLookingAtAll) {
+  std::vector<ObstacleSettings> settings(4);
+  settings[0].count = 300;
+  settings[0].radius = 0.1;
+  settings[0].radius_max = 0.4;
+  settings[0].speed = 0.5;
+  settings[0].speed_max = 30.0;  // many are replaced within a slice of time
+  settings[1].count = 50;
+  settings[1].at_border = "bounce";
+  settings[1].speed = 20.0;
+  settings[2] = passing(3.0);
+  settings[3].motion = "still";
+  settings[3].shape = "box";
+  settings[3].position = {4, 4, 2};
+  ObstacleWorld world;
+  world.map = hall();
+  world.place = [](std::size_t, const char*) { return std::string(); };
+  const Executor executor(1);
+  const Obstacles all(settings, world, executor);
+  // forwards, backwards and over several slices; the same set whatever was asked before
+  for (const double at : {0.0, 0.1999, 0.2, 0.7, 3.05, 1.0, 0.15}) {
+    for (const double lasts : {0.0, 0.001, 0.1, 0.45}) {
+      SCOPED_TRACE(fmt::format("{} {}", at, lasts));
+      const SimTime from{from_seconds(at)};
+      const SimTime until = from + from_seconds(lasts);
+      const Vector3d place(12.0 + at, 9.0, 2.5);
+      const std::vector<Body> near = all.near(place, 3.0, from, until);
+      const auto is_same = [](const Body& a, const Body& b) {
+        return a.label == b.label && a.from == b.from;
+      };
+      for (std::size_t i = 1; i < near.size(); ++i) {
+        ASSERT_LE(near[i - 1].label, near[i].label);
+        ASSERT_FALSE(is_same(near[i - 1], near[i]));
+      }
+      std::size_t wanted = 0;
+      for (const Body& body : all.bodies(from, until)) {
+        double closest = 1e9;
+        for (int k = 0; k <= 20; ++k) {
+          const SimTime t = from + from_seconds(lasts * k / 20);
+          if (t < body.from || t >= body.until) continue;
+          closest = std::min(closest, (body.T_world_body(t).translation - place).norm());
+        }
+        if (closest > 3.0 + bounding_radius(body.shape)) continue;
+        ++wanted;
+        ASSERT_TRUE(std::any_of(near.begin(), near.end(), [&](const Body& b) {
+          return is_same(body, b) &&
+                 b.T_world_body(from).translation == body.T_world_body(from).translation;
+        })) << body.label;
+      }
+      EXPECT_GT(wanted, 0u);
+      EXPECT_LT(near.size(), 200u);
+    }
   }
 }
 
@@ -341,6 +398,16 @@ TEST(Faults, DoWhatTheySay) {
   const Simulation simulation = run(scenario, sink, Executor(1));
   EXPECT_LT(simulation.status(0).state.rotors[2].speed, 1.0);
   EXPECT_GT(sink.events.size(), 0u);
+  // a weak one turns with its share of the command, which may be less than the least commanded
+  // speed
+  scenario.vehicles[0].faults[0].value = 0.05;
+  scenario.vehicles[0].faults[0].until = 1.3;
+  scenario.duration = 1.25;
+  const Simulation weak = run(scenario, sink, Executor(1));
+  const double turns = weak.status(0).state.rotors[2].speed;
+  EXPECT_LT(turns, 0.06 * weak.vehicle(0).settings().rotor.speed_max);
+  EXPECT_GT(turns, 0.0);
+  EXPECT_LT(turns, 0.8 * weak.vehicle(0).settings().rotor.speed_min);
 }
 
 TEST(Air, WindIsHeldAgainstAndABatterySags) {

@@ -1,0 +1,307 @@
+// What ends or spoils a flight without a collision: batteries, demands beyond the vehicle, silence.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include "pointflight/core/constants.hpp"
+#include "pointflight/sim/flight_recorder.hpp"
+#include "pointflight/vehicle/feasibility.hpp"
+#include "tests/sim/runs.hpp"
+
+namespace pointflight {
+namespace {
+
+using namespace testing;
+
+/// Keeps what happens on board.
+class EventSink : public ByteSink {
+ public:
+  void on_vehicle_event(const VehicleEvent& event) override { on_board.push_back(event); }
+  std::vector<VehicleEvent> on_board;
+};
+
+/// quad_330 with so small a battery, in a file of its own.
+std::string with_battery(const TemporaryFolder& folder, double capacity, double reserve) {
+  VehicleSettings settings = load_vehicle("quad_330");
+  settings.battery.capacity = capacity;
+  settings.battery.reserve = reserve;
+  SettingsWriter writer;
+  describe(writer, settings);
+  write_file(folder / "small.yaml", writer.text());
+  return folder / "small.yaml";
+}
+
+Scenario on_battery(const std::string& model, const char* action) {
+  Scenario scenario = hovering();
+  scenario.vehicles[0].model = model;
+  scenario.vehicles[0].battery = true;
+  scenario.vehicles[0].on_low_battery = action;
+  scenario.duration = 20.0;
+  return scenario;
+}
+
+TEST(Battery, LandsTheVehicleAtItsReserveAndTakesNoMoreCommands) {
+  const TemporaryFolder folder;
+  Scenario scenario = on_battery(with_battery(folder, 0.08, 0.5), "land");
+  scenario.vehicles[0].mission.waypoints = {{30, 6, 3}};
+  scenario.vehicles[0].mission.motion.speed = 0.5;
+  EventSink sink;
+  const Executor executor(1);
+  Simulation simulation(scenario, hall(), executor);
+  std::optional<std::string> refused;
+  while (simulation.step(sink)) {
+    if (!sink.on_board.empty() && !refused) refused = simulation.command(0, TakeOffCommand{});
+  }
+  const VehicleStatus& status = simulation.status(0);
+  ASSERT_EQ(sink.on_board.size(), 1u);
+  EXPECT_EQ(sink.on_board[0].kind, "battery_low");
+  expect_contains(sink.on_board[0].words, "it lands");
+  ASSERT_TRUE(refused);
+  expect_contains(*refused, "battery");
+  EXPECT_TRUE(status.landed);
+  EXPECT_FALSE(status.autopilot.armed);
+  EXPECT_EQ(simulation.end(), RunEnd::kMissionUnfinished);
+  EXPECT_NEAR(status.state.body.p_world.z(), 0.27, 0.03);
+  EXPECT_EQ(simulation.summary(0).battery_low, sink.on_board[0].time);
+  EXPECT_FALSE(simulation.summary(0).battery_empty);
+  EXPECT_TRUE(sink.events.empty());
+  expect_contains(summary_json(simulation), "\"battery_low_at\": ");
+}
+
+TEST(Battery, StopsTheRotorsWhenEmptyWhateverTheScenarioSays) {
+  const TemporaryFolder folder;
+  const std::string model = with_battery(folder, 0.04, 0.5);
+  for (const char* action : {"report", "fall"}) {
+    SCOPED_TRACE(action);
+    EventSink sink;
+    const Simulation simulation = run(on_battery(model, action), sink, Executor(1));
+    const VehicleStatus& status = simulation.status(0);
+    ASSERT_EQ(sink.on_board.size(), 2u);
+    EXPECT_EQ(sink.on_board[0].kind, "battery_low");
+    EXPECT_EQ(sink.on_board[1].kind, "battery_empty");
+    // reported, it flies on with the half that is left
+    const double between = to_seconds(sink.on_board[1].time - sink.on_board[0].time);
+    if (std::string(action) == "fall") {
+      EXPECT_EQ(between, 0.0);
+      EXPECT_NEAR(status.battery.used, 0.02, 0.002);  // rotors run down
+    } else {
+      EXPECT_NEAR(between, to_seconds(sink.on_board[0].time.time_since_epoch()), 0.6);
+      EXPECT_DOUBLE_EQ(status.battery.used, 0.04);
+    }
+    EXPECT_TRUE(status.landed);  // it fell
+    EXPECT_LT(status.state.rotors[0].speed, 1.0);
+    EXPECT_EQ(simulation.end(), RunEnd::kMissionUnfinished);
+  }
+}
+
+/// A circle at constant speed: the analytic demand is v^2 / r.
+class Circle : public Trajectory {
+ public:
+  Circle(const Vector3d& centre, double radius, double speed)
+      : centre_(centre), radius_(radius), rate_(speed / radius) {}
+  [[nodiscard]] PositionCommand at(double t) const override {
+    const double a = rate_ * std::clamp(t, 0.0, duration());
+    PositionCommand c;
+    const Vector3d out(std::cos(a), std::sin(a), 0.0);
+    c.p_world = centre_ + radius_ * out;
+    c.v_world = radius_ * rate_ * Vector3d(-std::sin(a), std::cos(a), 0.0);
+    c.a_world = -radius_ * rate_ * rate_ * out;
+    c.jerk_world = -rate_ * rate_ * c.v_world;
+    return c;
+  }
+  [[nodiscard]] double duration() const override { return 10.0; }
+
+ private:
+  Vector3d centre_;
+  double radius_;
+  double rate_;
+};
+
+TEST(Feasibility, DemandsOfACircleAreThoseOnPaper) {
+  VehicleSettings vehicle = load_vehicle("quad_330");
+  vehicle.drag_area.setZero();
+  vehicle.rotor.drag_coefficient = 0.0;
+  const MotionDemand most = demand_of(Circle({0, 0, 0}, 3.0, 6.0), vehicle);
+  EXPECT_NEAR(most.speed, 6.0, 1e-9);
+  EXPECT_NEAR(most.acceleration, 12.0, 1e-9);
+  EXPECT_NEAR(most.climb_acceleration, 0.0, 1e-9);
+  EXPECT_NEAR(most.tilt, std::atan2(12.0, kGravity), 1e-9);
+  EXPECT_NEAR(most.thrust, vehicle.mass * std::hypot(12.0, kGravity), 1e-9);
+  // with drag along the way the force is the hypotenuse of both
+  vehicle.rotor.drag_coefficient = 2e-5;
+  const double drag = 4 * 2e-5 * vehicle.hover_speed() * 6.0 / vehicle.mass;
+  EXPECT_NEAR(
+      demand_of(Circle({0, 0, 0}, 3.0, 6.0), vehicle).acceleration, std::hypot(12.0, drag), 1e-6);
+}
+
+TEST(Feasibility, SaysWhatIsBeyondWithBothNumbers) {
+  VehicleSettings vehicle = load_vehicle("quad_330");
+  vehicle.drag_area.setZero();
+  vehicle.rotor.drag_coefficient = 0.0;
+  const auto words = beyond_limits(Circle({0, 0, 0}, 3.0, 6.0), vehicle, nullptr);
+  ASSERT_TRUE(words);
+  expect_contains(*words, "a tilt of 50.7 degrees (limit 35)");
+  expect_contains(*words, "a horizontal acceleration of 12 m/s^2 (limit 7)");
+  EXPECT_FALSE(beyond_limits(Circle({0, 0, 0}, 3.0, 3.0), vehicle, nullptr));
+  RigidBodyState body;
+  body.p_world = {3, 0, 4};
+  body.v_world = {0, 3, 0};
+  const auto away = beyond_limits(Circle({0, 0, 0}, 3.0, 3.0), vehicle, &body);
+  ASSERT_TRUE(away);
+  expect_contains(*away, "a start 4.0 m away");
+  body.p_world = {3, 0, 0};
+  body.v_world.setZero();
+  const auto leap = beyond_limits(Circle({0, 0, 0}, 3.0, 3.0), vehicle, &body);
+  ASSERT_TRUE(leap);
+  expect_contains(*leap, "a leap in speed of 3.0 m/s");
+}
+
+TEST(Feasibility, IsSaidWhenTheCommandIsTakenAndInTheSummary) {
+  Scenario scenario = hovering();
+  scenario.duration = 12.0;
+  const Executor executor(1);
+  Simulation simulation(scenario, hall(), executor);
+  EventSink sink;
+  simulation.advance_to(SimTime{} + std::chrono::seconds(1), sink);
+  EXPECT_TRUE(sink.on_board.empty());
+  const auto circle = std::make_shared<Circle>(Vector3d(10, 3.5, 3), 2.5, 6.0);
+  EXPECT_FALSE(simulation.command(0, TrajectoryCommand{circle}));
+  while (simulation.step(sink)) {
+  }
+  ASSERT_EQ(sink.on_board.size(), 1u);
+  EXPECT_EQ(sink.on_board[0].kind, "beyond_limits");
+  EXPECT_EQ(sink.on_board[0].time, SimTime{} + std::chrono::seconds(1));
+  expect_contains(sink.on_board[0].words, "a tilt of");
+  const VehicleSummary& summary = simulation.summary(0);
+  EXPECT_EQ(summary.beyond_limits, 1u);
+  EXPECT_GT(to_seconds(summary.tilt_limited + summary.acceleration_limited), 5.0);
+  EXPECT_GT(summary.tracking_error_max, 0.5);
+  expect_contains(summary_json(simulation), "\"trajectories_beyond_limits\": 1");
+  // a mission within the limits reaches none of them
+  scenario.vehicles[0].mission.waypoints = {{14, 6, 3}};
+  EventSink quiet;
+  const Simulation easy = run(scenario, quiet, executor);
+  EXPECT_TRUE(quiet.on_board.empty());
+  EXPECT_EQ(easy.summary(0).tilt_limited, Duration{0});
+  EXPECT_EQ(easy.summary(0).acceleration_limited, Duration{0});
+  EXPECT_EQ(easy.summary(0).rotors_limited, Duration{0});
+  EXPECT_LT(easy.summary(0).tracking_error_max, 0.05);
+  // one beyond them is said before anything moves
+  scenario.vehicles[0].mission.motion = {20.0, 15.0, 60.0};
+  EventSink said;
+  run(scenario, said, executor);
+  ASSERT_EQ(said.on_board.size(), 1u);
+  EXPECT_EQ(said.on_board[0].time, SimTime{});
+}
+
+TEST(Idle, ARunGoesOnWhileAProgramCommandsIt) {
+  Scenario scenario = hovering();
+  scenario.duration = 0.0;
+  const Executor executor(1);
+  Simulation simulation(scenario, hall(), executor);
+  ByteSink sink;
+  // a planner that says where to be for 14 s, and then nothing more
+  SimTime next;
+  while (simulation.step(sink)) {
+    if (simulation.time() < next || to_seconds(simulation.time()) > 14.0) continue;
+    PositionCommand place;
+    place.p_world = {11, 6, 3};
+    EXPECT_FALSE(simulation.command(0, place));
+    next = simulation.time() + std::chrono::milliseconds(100);
+  }
+  EXPECT_EQ(simulation.end(), RunEnd::kIdle);
+  EXPECT_STREQ(to_string(simulation.end()), "idle");
+  EXPECT_NEAR(to_seconds(simulation.time()), 24.0, 0.11);
+  expect_contains(summary_json(simulation), "\"end_reason\": \"nothing left to do");
+  // a trajectory is waited for, refused commands are not
+  Simulation other(scenario, hall(), executor);
+  WaypointCommand goal;
+  goal.mission.waypoints = {{18, 6, 3}};
+  goal.mission.motion.speed = 1.0;
+  EXPECT_FALSE(other.command(0, goal));
+  while (other.step(sink)) other.command(0, RotorSpeedCommand{});
+  EXPECT_EQ(other.end(), RunEnd::kIdle);
+  EXPECT_NEAR(
+      to_seconds(other.time()), 10.0 + Mission({10, 6, 3}, 0, goal.mission).duration(), 0.01);
+  EXPECT_NEAR(other.status(0).state.body.p_world.x(), 18.0, 0.05);
+}
+
+TEST(Idle, ALandingIsWaitedForAndSilenceIsNoCompletion) {
+  Scenario scenario = hovering();
+  scenario.duration = 0.0;
+  const Executor executor(1);
+  ByteSink sink;
+  Simulation landing(scenario, hall(), executor);
+  EXPECT_FALSE(landing.command(0, LandCommand{0.2}));
+  while (landing.step(sink)) {
+  }
+  EXPECT_TRUE(landing.status(0).landed);
+  EXPECT_GT(to_seconds(landing.time()), 13.0);
+  EXPECT_EQ(landing.end(), RunEnd::kIdle);
+  const Simulation silent = run(scenario, sink, executor);
+  EXPECT_EQ(silent.end(), RunEnd::kIdle);
+  EXPECT_NEAR(to_seconds(silent.time()), Simulation::kIdleTime, 0.002);
+  // with a duration the scenario says when it is over
+  scenario.duration = 1.0;
+  EXPECT_EQ(run(scenario, sink, executor).end(), RunEnd::kCompleted);
+}
+
+TEST(SimulationCalls, WithoutSuchAVehicleAMapOrAStateOfThisRunAreRefused) {
+  const Executor executor(1);
+  Simulation simulation(hovering(), hall(), executor);
+  EXPECT_THROW(simulation.command(3, HoverCommand{}), std::out_of_range);
+  EXPECT_THROW(simulation.follow(1, nullptr), std::out_of_range);
+  EXPECT_THROW(static_cast<void>(simulation.status(1)), std::out_of_range);
+  EXPECT_THROW(static_cast<void>(simulation.summary(1)), std::out_of_range);
+  EXPECT_THROW(static_cast<void>(simulation.vehicle(1)), std::out_of_range);
+  try {
+    simulation.command(3, HoverCommand{});
+  } catch (const std::out_of_range& error) {
+    expect_contains(error.what(), "vehicle 3 of a run with 1");
+  }
+  EXPECT_THROW(Simulation(hovering(), nullptr, executor), std::invalid_argument);
+  SimulationState other = simulation.state();
+  other.vehicles.clear();
+  EXPECT_THROW(simulation.restore(other), std::invalid_argument);
+  EXPECT_FALSE(simulation.command(0, HoverCommand{}));
+}
+
+TEST(SimulationCalls, ScenariosThatAProgramFilledInAreHeldToWhatFilesMaySay) {
+  const Executor executor(1);
+  const auto error = [&](const std::function<void(Scenario&)>& spoil) {
+    Scenario scenario = hovering();
+    scenario.path.clear();
+    spoil(scenario);
+    return error_of([&] { Simulation(scenario, hall(), executor); });
+  };
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  expect_contains(error([&](Scenario& s) { s.vehicles[0].start.y() = nan; }),
+                  "scenario: vehicles[0].start: nan m is not between -10000000 and 10000000");
+  expect_contains(error([&](Scenario& s) { s.physics_step = 0.0; }), "physics_step: 0 s is not");
+  expect_contains(error([&](Scenario& s) { s.output.trajectory_rate = 0.0; }),
+                  "output.trajectory_rate: 0 Hz");
+  expect_contains(error([&](Scenario& s) { s.vehicles[0].on_collision = "explode"; }),
+                  "'explode' is unknown; one of: report, stop, crash");
+  expect_contains(error([&](Scenario& s) {
+                    s.vehicles[0].mission.waypoints = {{0, INFINITY, 1}};
+                  }),
+                  "vehicles[0].mission.waypoints: inf m");
+  expect_contains(error([&](Scenario& s) {
+                    s.obstacles = {passing(1.0)};
+                    s.obstacles[0].speed = 0.0;
+                  }),
+                  "needs one above 0");
+  LidarSettings lidar = load_lidar("mid360");
+  lidar.rate = 0.0;
+  expect_contains(error_of([&] { Lidar(lidar, 0); }), "rate: 0 Hz is not between");
+  VehicleSettings vehicle = load_vehicle("quad_330");
+  vehicle.mass = nan;
+  expect_contains(error_of([&] { Multirotor{vehicle}; }), "mass: nan kg");
+  expect_contains(error_of([&] { static_cast<void>(make_controller("cascade", vehicle)); }),
+                  "mass");
+}
+
+}  // namespace
+}  // namespace pointflight
