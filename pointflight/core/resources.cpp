@@ -45,14 +45,36 @@ std::string data_folder() {
   return POINTFLIGHT_SOURCE_DATA;
 }
 
-std::vector<std::string> model_names(const std::string& kind) {
+namespace {
+
+/// Names of the files of a folder with an extension, without it, sorted.
+std::vector<std::string> names_in(const fs::path& folder, const char* extension) {
   std::vector<std::string> names;
   std::error_code error;
-  for (const auto& entry : fs::directory_iterator(fs::path(data_folder()) / kind, error)) {
-    if (entry.path().extension() == ".yaml") names.push_back(entry.path().stem().string());
+  for (const auto& entry : fs::directory_iterator(folder, error)) {
+    if (entry.path().extension() == extension) names.push_back(entry.path().stem().string());
   }
   std::sort(names.begin(), names.end());
   return names;
+}
+
+bool is_file(const fs::path& path) {
+  std::error_code error;
+  return fs::is_regular_file(path, error);
+}
+
+}  // namespace
+
+std::vector<std::string> model_names(const std::string& kind) {
+  const fs::path folder = fs::path(data_folder()) / kind;
+  auto names = names_in(folder, ".yaml");
+  if (!names.empty()) return names;
+  throw InputError(fmt::format(
+      "{}: no {} here: the program's data are not found; set POINTFLIGHT_DATA to the "
+      "folder that holds lidars/ and vehicles/ (<prefix>/share/pointflight, or data/ of "
+      "the source tree)",
+      folder.string(),
+      kind));
 }
 
 std::string resolve_path(const std::string& path, const std::string& base) {
@@ -70,8 +92,7 @@ std::string find_model(const std::string& kind,
                        const std::string& base) {
   if (is_model_path(name_or_path)) return resolve_path(name_or_path, base);
   const std::string path = (fs::path(data_folder()) / kind / (name_or_path + ".yaml")).string();
-  std::error_code error;
-  if (fs::is_regular_file(path, error)) return path;
+  if (is_file(path)) return path;
   const auto known = model_names(kind);
   const std::string guess = closest_word(name_or_path, known);
   throw InputError(
@@ -81,6 +102,28 @@ std::string find_model(const std::string& kind,
                   kind,
                   fmt::join(known, ", "),
                   guess.empty() ? "" : fmt::format(", did you mean '{}'?", guess)));
+}
+
+std::string find_table(const std::string& kind,
+                       const std::string& name_or_path,
+                       const std::string& base) {
+  const fs::path beside = resolve_path(name_or_path, base);
+  if (fs::path(name_or_path).is_absolute()) return beside.string();
+  const fs::path shipped = fs::path(data_folder()) / kind;
+  const bool is_name = name_or_path.find('/') == std::string::npos;
+  const std::string file =
+      is_name && !name_or_path.ends_with(".csv") ? name_or_path + ".csv" : name_or_path;
+  const fs::path among_tables = (is_name ? shipped / "tables" : shipped) / file;
+  for (const fs::path& path : {beside, among_tables}) {
+    if (is_file(path)) return path.string();
+  }
+  throw InputError(
+      fmt::format("'{}' is neither {} nor {}; give a path from this file's folder, or "
+                  "one of the shipped tables: {}",
+                  name_or_path,
+                  beside.string(),
+                  among_tables.string(),
+                  fmt::join(names_in(shipped / "tables", ".csv"), ", ")));
 }
 
 }  // namespace pointflight

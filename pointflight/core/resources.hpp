@@ -25,7 +25,15 @@ std::string find_model(const std::string& kind,
                        const std::string& name_or_path,
                        const std::string& base = {});
 
-/// Names of the shipped models of a kind ("lidars", "vehicles"), sorted.
+/// The path of a table that a model's file names: a path from the file's folder `base`, or one of
+/// the tables shipped with a kind ("velodyne_vlp32c" or "tables/velodyne_vlp32c.csv" ->
+/// "<data>/lidars/tables/velodyne_vlp32c.csv"). Throws InputError that says where it looked.
+std::string find_table(const std::string& kind,
+                       const std::string& name_or_path,
+                       const std::string& base);
+
+/// Names of the shipped models of a kind ("lidars", "vehicles"), sorted. Throws InputError where
+/// there are none: it says where it looked and what to do.
 std::vector<std::string> model_names(const std::string& kind);
 
 /// `path` as it is if absolute, else below `base` (a folder; empty = the working directory).

@@ -52,6 +52,16 @@ class SettingsVisitor {
     leave();
   }
 
+  /// Keys that matter only under a condition on what was described before, written as the file
+  /// would have it ("convention: ouster"). Elsewhere the reader refuses them, for they would have
+  /// no effect, and the writer leaves them out; required ones are required under it alone.
+  template <class Describe>
+  void only_if(bool holds, std::string_view condition, const Describe& describe_keys) {
+    if (!enter_condition(holds, condition)) return;
+    describe_keys(*this);
+    leave_condition();
+  }
+
   /// A list of sections; the reader resizes `items` to what the file has.
   template <class T, class Describe>
   void list(const Key& key, std::vector<T>& items, const Describe& describe_item) {
@@ -67,6 +77,9 @@ class SettingsVisitor {
   }
 
  protected:
+  /// Returns false to skip the keys.
+  virtual bool enter_condition(bool holds, std::string_view condition) = 0;
+  virtual void leave_condition() {}
   /// Returns false to skip the section (absent from the file: its defaults stay).
   virtual bool enter(const Key& key) = 0;
   virtual void leave() = 0;
@@ -109,6 +122,8 @@ class SettingsReader : public SettingsVisitor {
               std::span<const std::string_view> choices) override;
 
  protected:
+  bool enter_condition(bool holds, std::string_view condition) override;
+  void leave_condition() override;
   bool enter(const Key& key) override;
   void leave() override;
   std::size_t enter_list(const Key& key, std::size_t size) override;
@@ -177,6 +192,7 @@ class SettingsWriter : public SettingsVisitor {
               std::span<const std::string_view> choices) override;
 
  protected:
+  bool enter_condition(bool holds, std::string_view condition) override;
   bool enter(const Key& key) override;
   void leave() override;
   std::size_t enter_list(const Key& key, std::size_t size) override;
@@ -207,6 +223,8 @@ class SettingsTable : public SettingsVisitor {
               std::span<const std::string_view> choices) override;
 
  protected:
+  bool enter_condition(bool holds, std::string_view condition) override;
+  void leave_condition() override;
   bool enter(const Key& key) override;
   void leave() override;
   std::size_t enter_list(const Key& key, std::size_t size) override;
@@ -217,6 +235,7 @@ class SettingsTable : public SettingsVisitor {
   void row(const Key& key, const std::string& value, const std::string& range);
   std::string text_;
   std::vector<std::string> path_;
+  std::vector<std::string> conditions_;
 };
 
 /// The word of `known` closest to `word` (edit distance at most a third of its length), or "".

@@ -76,6 +76,13 @@ struct SettingsReader::Document {
   };
   std::vector<List> lists;
 
+  /// Conditions that the keys being described stand under, the innermost last.
+  struct Condition {
+    bool holds;
+    std::string text;
+  };
+  std::vector<Condition> conditions;
+
   [[nodiscard]] std::string place(const YAML::Node& node) const {
     return fmt::format("{}:{}", name, node.Mark().line + 1);
   }
@@ -118,7 +125,16 @@ struct SettingsReader::Document {
     level.asked.insert(std::string(key.name));
     const YAML::Node& parent = level.node;
     YAML::Node node = parent[std::string(key.name)];
-    if (node.IsDefined() && !node.IsNull()) return node;
+    const bool given = node.IsDefined() && !node.IsNull();
+    for (const Condition& condition : conditions) {
+      if (condition.holds) continue;
+      if (!given) return std::nullopt;
+      fail(
+          node,
+          level.path + std::string(key.name),
+          fmt::format("has no effect here: it is for `{}`; remove it or set that", condition.text));
+    }
+    if (given) return node;
     if (key.required) {
       fail(parent,
            level.path + std::string(key.name),
@@ -199,6 +215,15 @@ void SettingsReader::leave() {
                         : fmt::format("unknown key; did you mean '{}'?", guess));
   }
   document_->levels.pop_back();
+}
+
+bool SettingsReader::enter_condition(bool holds, std::string_view condition) {
+  document_->conditions.push_back({holds, std::string(condition)});
+  return true;  // also where it does not hold: what stands there is refused
+}
+
+void SettingsReader::leave_condition() {
+  document_->conditions.pop_back();
 }
 
 bool SettingsReader::enter(const Key& key) {

@@ -92,6 +92,9 @@ void SettingsWriter::choice(const Key& key,
   line(key, value, fmt::format(" ({})", fmt::join(choices, ", ")));
 }
 
+bool SettingsWriter::enter_condition(bool holds, std::string_view /*condition*/) {
+  return holds;
+}
 bool SettingsWriter::enter(const Key& key) {
   if (depth_ == 0) text_ += "\n";
   line(key, "");
@@ -120,7 +123,9 @@ void SettingsWriter::leave_list() {
 void SettingsTable::row(const Key& key, const std::string& value, const std::string& range) {
   std::string path;
   for (const std::string& part : path_) path += part.empty() ? "" : part + ".";
-  text_ += fmt::format("| `{}{}` | {} | {} | {} | {} |\n",
+  const std::string condition =
+      conditions_.empty() ? "" : fmt::format(" (only `{}`)", fmt::join(conditions_, "`, `"));
+  text_ += fmt::format("| `{}{}` | {} | {} | {} | {}{} |\n",
                        path,
                        key.name,
                        key.unit,
@@ -128,7 +133,8 @@ void SettingsTable::row(const Key& key, const std::string& value, const std::str
                        : value.empty() ? ""
                                        : "`" + value + "`",
                        range,
-                       key.help);
+                       key.help,
+                       condition);
 }
 
 void SettingsTable::value(const Key& key, double& value) {
@@ -158,6 +164,13 @@ void SettingsTable::choice(const Key& key,
   row(key, value, fmt::format("{}", fmt::join(choices, ", ")));
 }
 
+bool SettingsTable::enter_condition(bool /*holds*/, std::string_view condition) {
+  conditions_.emplace_back(condition);
+  return true;
+}
+void SettingsTable::leave_condition() {
+  conditions_.pop_back();
+}
 bool SettingsTable::enter(const Key& key) {
   if (path_.empty()) text_ += fmt::format("| **{}** | | | | {} |\n", key.name, key.help);
   path_.emplace_back(key.name);

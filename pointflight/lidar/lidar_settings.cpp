@@ -45,28 +45,58 @@ void describe_prisms(SettingsVisitor& v, PrismsSettings& s) {
          });
 }
 
+void describe_channels(SettingsVisitor& v, RingsSettings& s) {
+  v.value({"table",
+           "",
+           "CSV of the channels: a path from this file's folder, or the name of a shipped table"},
+          s.table);
+  v.value({"elevations_deg", "deg", "of the channels, instead of a table", -90, 90},
+          s.elevations_deg);
+  v.only_if(!s.elevations_deg.empty(), "elevations_deg", [&](SettingsVisitor& w) {
+    w.value({"azimuth_offsets_deg", "deg", "of the same channels; empty: none", -180, 180},
+            s.azimuth_offsets_deg);
+  });
+  v.value({"channels", "", "so many, evenly spaced, instead of a table; 0: none", 0, 1024},
+          s.channels);
+  v.only_if(s.channels > 0, "channels", [&](SettingsVisitor& w) {
+    w.value({"elevation_min_deg", "deg", "of the lowest channel", -90, 90}, s.elevation_min_deg);
+    w.value({"elevation_max_deg", "deg", "of the highest channel", -90, 90}, s.elevation_max_deg);
+  });
+}
+
 void describe_rings(SettingsVisitor& v, RingsSettings& s) {
-  v.value({"table", "", "CSV of the channels, beside this file"}, s.table);
-  v.choice({"convention", "", "how the table's angles are meant"}, s.convention, kConventions);
-  v.value({"cycle_us", "us", "velodyne: between firings of one channel", 1, 1e6}, s.cycle_us);
-  v.value({"channel_interval_us", "us", "velodyne: between channels without times", 0, 1e5},
-          s.channel_interval_us);
-  v.value({"columns", "", "ouster: a turn", 1, 65536}, s.columns);
-  v.value({"beam_origin_radius", "m", "ouster: of the beams' origin from the axis", 0, 1},
-          s.beam_origin_radius);
-  v.value({"origin_z", "m", "ouster: height of the beams' origin", -1, 1}, s.origin_z);
+  v.choice({"convention", "", "how channels fire and how a table's angles are meant"},
+           s.convention,
+           kConventions);
+  describe_channels(v, s);
+  v.only_if(s.convention == "velodyne", "convention: velodyne", [&](SettingsVisitor& w) {
+    w.value({"cycle_us", "us", "between firings of one channel", 1, 1e6}, s.cycle_us);
+    w.value(
+        {"channel_interval_us", "us", "from channel to channel, without times in a table", 0, 1e5},
+        s.channel_interval_us);
+  });
+  v.only_if(s.convention == "ouster", "convention: ouster", [&](SettingsVisitor& w) {
+    w.value({"columns", "", "a turn", 1, 65536}, s.columns);
+    w.value({"beam_origin_radius", "m", "of the beams' origin from the axis", 0, 1},
+            s.beam_origin_radius);
+    w.value({"origin_z", "m", "height of the beams' origin", -1, 1}, s.origin_z);
+  });
 }
 
 void describe_grid(SettingsVisitor& v, GridSettings& s) {
   v.choice({"projection", "", "how rows and columns lie"}, s.projection, kProjections);
   v.value({"columns", "", "beams in a row", 1, 16384}, s.columns);
   v.value({"rows", "", "rows", 1, 16384}, s.rows);
-  v.value({"fov_horizontal_deg", "deg", "angular: width", 0.001, 360}, s.fov_horizontal_deg);
-  v.value({"fov_vertical_deg", "deg", "angular: height", 0.001, 180}, s.fov_vertical_deg);
-  v.value({"fx", "px", "pinhole: focal length", 0, 1e6}, s.fx);
-  v.value({"fy", "px", "pinhole: focal length", 0, 1e6}, s.fy);
-  v.value({"cx", "px", "pinhole: principal point", -1e5, 1e5}, s.cx);
-  v.value({"cy", "px", "pinhole: principal point", -1e5, 1e5}, s.cy);
+  v.only_if(s.projection == "angular", "projection: angular", [&](SettingsVisitor& w) {
+    w.value({"fov_horizontal_deg", "deg", "width", 0.001, 360}, s.fov_horizontal_deg);
+    w.value({"fov_vertical_deg", "deg", "height", 0.001, 180}, s.fov_vertical_deg);
+  });
+  v.only_if(s.projection == "pinhole", "projection: pinhole", [&](SettingsVisitor& w) {
+    w.value({"fx", "px", "focal length", 0, 1e6}, s.fx);
+    w.value({"fy", "px", "focal length", 0, 1e6}, s.fy);
+    w.value({"cx", "px", "principal point", -1e5, 1e5}, s.cx);
+    w.value({"cy", "px", "principal point", -1e5, 1e5}, s.cy);
+  });
 }
 
 void describe_csv(SettingsVisitor& v, CsvSettings& s) {
@@ -97,6 +127,35 @@ void describe_optics(SettingsVisitor& v, OpticsSettings& s) {
 }
 
 constexpr std::int64_t kMostBeams = 16'000'000;
+constexpr std::size_t kMostChannels = 1024;
+
+/// Channels come from one of table, list and number.
+template <class Fail>
+void check_channels(const RingsSettings& s, const Fail& fail) {
+  const bool has_list = !s.elevations_deg.empty();
+  const int ways = (s.table.empty() ? 0 : 1) + (has_list ? 1 : 0) + (s.channels > 0 ? 1 : 0);
+  if (ways == 0) {
+    fail("rings", "no channels; give a table, elevations_deg or channels");
+  } else if (ways > 1) {
+    const char* second = has_list && !s.table.empty() ? "rings.elevations_deg" : "rings.channels";
+    fail(second,
+         fmt::format("has no effect beside rings.{}; remove one of them",
+                     s.table.empty() ? "elevations_deg" : "table"));
+  } else if (!s.azimuth_offsets_deg.empty() &&
+             s.azimuth_offsets_deg.size() != s.elevations_deg.size()) {
+    fail(
+        "rings.azimuth_offsets_deg",
+        fmt::format(
+            "{} offsets for {} elevations", s.azimuth_offsets_deg.size(), s.elevations_deg.size()));
+  } else if (s.elevations_deg.size() > kMostChannels) {
+    fail("rings.elevations_deg", fmt::format("more than {} channels", kMostChannels));
+  } else if (s.channels > 1 && s.elevation_min_deg >= s.elevation_max_deg) {
+    fail("rings.elevation_min_deg",
+         fmt::format("{} deg is not below elevation_max_deg {} deg",
+                     s.elevation_min_deg,
+                     s.elevation_max_deg));
+  }
+}
 
 LidarSettings read(SettingsReader& reader, const std::string& path) {
   LidarSettings settings;
@@ -116,8 +175,8 @@ LidarSettings read(SettingsReader& reader, const std::string& path) {
     fail("rotor.line_angles_deg", "no lines; at least one is needed");
   } else if (settings.pattern == "prisms" && settings.prisms.line_heights.empty()) {
     fail("prisms.line_heights", "no lines; at least one is needed");
-  } else if (settings.pattern == "rings" && settings.rings.table.empty()) {
-    fail("rings.table", "missing; name the CSV of channels");
+  } else if (settings.pattern == "rings") {
+    check_channels(settings.rings, fail);
   } else if (settings.pattern == "csv" && settings.csv.file.empty()) {
     fail("csv.file", "missing; name the CSV of directions");
   } else if (settings.pattern == "grid") {
@@ -156,23 +215,34 @@ void describe(SettingsVisitor& v, LidarSettings& s) {
   Key pattern{"pattern", "", "scan principle; its figures stand in the section of this name"};
   pattern.required = true;
   v.choice(pattern, s.pattern, kPatterns);
-  // one section, of the pattern's name: another one in the file is a mistake
-  if (s.pattern == "rotor") {
-    v.section({"rotor", "", "prism, mirror and wedge on one shaft (Mid-360)"},
+  v.only_if(s.pattern == "rotor", "pattern: rotor", [&](SettingsVisitor& u) {
+    u.section({"rotor", "", "prism, mirror and wedge on one shaft (Mid-360)"},
               [&](SettingsVisitor& w) { describe_rotor(w, s.rotor); });
-  } else if (s.pattern == "prisms") {
-    v.section({"prisms", "", "refracting wedges on one axis (Avia, Mid-40, Mid-70)"},
+  });
+  v.only_if(s.pattern == "prisms", "pattern: prisms", [&](SettingsVisitor& u) {
+    u.section({"prisms", "", "refracting wedges on one axis (Avia, Mid-40, Mid-70)"},
               [&](SettingsVisitor& w) { describe_prisms(w, s.prisms); });
-  } else if (s.pattern == "rings") {
-    v.section({"rings", "", "spinning channels (Velodyne, Ouster)"},
+  });
+  v.only_if(s.pattern == "rings", "pattern: rings", [&](SettingsVisitor& u) {
+    u.section({"rings", "", "spinning channels (Velodyne, Ouster)"},
               [&](SettingsVisitor& w) { describe_rings(w, s.rings); });
-  } else if (s.pattern == "grid") {
-    v.section({"grid", "", "depth camera or dense angular grid"},
+  });
+  v.only_if(s.pattern == "grid", "pattern: grid", [&](SettingsVisitor& u) {
+    u.section({"grid", "", "depth camera or dense angular grid"},
               [&](SettingsVisitor& w) { describe_grid(w, s.grid); });
-  } else if (s.pattern == "csv") {
-    v.section({"csv", "", "a table of directions of your own"},
+  });
+  v.only_if(s.pattern == "csv", "pattern: csv", [&](SettingsVisitor& u) {
+    u.section({"csv", "", "a table of directions of your own"},
               [&](SettingsVisitor& w) { describe_csv(w, s.csv); });
-  }
+  });
+}
+
+std::string lidar_reference() {
+  LidarSettings defaults;  // with one of each, so that all keys are listed
+  defaults.prisms.wedges.resize(1);
+  SettingsTable table;
+  describe(table, defaults);
+  return table.text();
 }
 
 std::string LidarSettings::place(const std::string& key) const {

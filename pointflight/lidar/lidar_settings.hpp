@@ -43,9 +43,14 @@ struct PrismsSettings {
   std::vector<WedgeSettings> wedges;
 };
 
-/// Spinning LiDARs: a table of channels.
+/// Spinning LiDARs: channels from a table, as a list or evenly spaced.
 struct RingsSettings {
-  std::string table;  ///< CSV beside the sensor's file.
+  std::string table;  ///< CSV: a path from the sensor file's folder, or a shipped table's name.
+  std::vector<double> elevations_deg;       ///< Instead of a table, in the order of firing.
+  std::vector<double> azimuth_offsets_deg;  ///< Of the same channels, as a table has them.
+  std::int64_t channels = 0;                ///< Instead of both: so many, from the lowest up.
+  double elevation_min_deg = -15.0;
+  double elevation_max_deg = 15.0;
   std::string convention = "velodyne";
   double cycle_us = 55.296;          ///< velodyne: from one firing of all channels to the next.
   double channel_interval_us = 0.0;  ///< velodyne: between channels, where the table has no times.
@@ -122,6 +127,9 @@ struct LidarSettings {
 
 /// The one list of keys of a sensor file.
 void describe(SettingsVisitor& visitor, LidarSettings& settings);
+
+/// Markdown table of all keys.
+std::string lidar_reference();
 
 /// Reads a sensor by name ("mid360") or path; relative paths are taken from `base`.
 LidarSettings load_lidar(const std::string& name_or_path, const std::string& base = {});

@@ -1,6 +1,11 @@
 #include "pointflight/sim/command_script.hpp"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
 #include <array>
+#include <initializer_list>
 
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/resources.hpp"
@@ -30,21 +35,47 @@ constexpr double kFar = kFarthest;
 void describe(SettingsVisitor& v, CommandSettings& s) {
   v.value({"time", "s", "when it is given", 0, 1e6}, s.time);
   v.choice({"kind", "", "what is commanded"}, s.kind, kKinds);
-  v.value({"vector", "", "acceleration m/s^2, velocity m/s, position or waypoint m", -kFar, kFar},
-          s.vector);
-  v.value({"rates_deg", "deg/s", "about the body's axes, of body_rates", -36000, 36000},
-          s.rates_deg);
-  v.value({"feed_forward", "m/s", "velocity of a position command", -100, 100}, s.feed_forward);
-  v.value({"rpy_deg", "deg", "of an attitude command", -360, 360}, s.rpy_deg);
-  v.value({"yaw_deg", "deg", "heading of acceleration, velocity, position", -360, 360}, s.yaw_deg);
-  v.value({"yaw_rate_deg", "deg/s", "feed-forward", -720, 720}, s.yaw_rate_deg);
-  v.value({"thrust", "N", "of body_rates and attitude; 0: the weight", 0, 1e5}, s.thrust);
-  v.value({"rotors", "rad/s", "speeds of rotor_speeds", 0, 1e5}, s.rotors);
-  v.value({"height", "m", "of take_off", 0.01, 1e4}, s.height);
-  v.value({"speed", "m/s", "of take_off and land", 0.01, 20}, s.speed);
-  v.value({"file", "", "CSV of a polynomial or of a B-spline's control points"}, s.file);
-  v.value({"degree", "", "of the B-spline", 1, 7}, s.degree);
-  v.value({"interval", "s", "between the B-spline's knots", 0.001, 1000}, s.interval);
+  // the keys of each kind
+  const auto for_kinds = [&](std::initializer_list<std::string_view> kinds, const auto& keys) {
+    const bool holds = std::find(kinds.begin(), kinds.end(), s.kind) != kinds.end();
+    v.only_if(holds, fmt::format("kind: {}", fmt::join(kinds, ", ")), keys);
+  };
+  for_kinds({"acceleration", "velocity", "position", "waypoint"}, [&](SettingsVisitor& w) {
+    w.value({"vector", "", "acceleration m/s^2, velocity m/s, position or waypoint m", -kFar, kFar},
+            s.vector);
+  });
+  for_kinds({"body_rates"}, [&](SettingsVisitor& w) {
+    w.value({"rates_deg", "deg/s", "about the body's axes", -36000, 36000}, s.rates_deg);
+  });
+  for_kinds({"position"}, [&](SettingsVisitor& w) {
+    w.value({"feed_forward", "m/s", "velocity of the command", -100, 100}, s.feed_forward);
+  });
+  for_kinds({"attitude"}, [&](SettingsVisitor& w) {
+    w.value({"rpy_deg", "deg", "the attitude", -360, 360}, s.rpy_deg);
+  });
+  for_kinds({"acceleration", "velocity", "position"}, [&](SettingsVisitor& w) {
+    w.value({"yaw_deg", "deg", "heading", -360, 360}, s.yaw_deg);
+    w.value({"yaw_rate_deg", "deg/s", "feed-forward", -720, 720}, s.yaw_rate_deg);
+  });
+  for_kinds({"body_rates", "attitude"}, [&](SettingsVisitor& w) {
+    w.value({"thrust", "N", "0: the weight", 0, 1e5}, s.thrust);
+  });
+  for_kinds({"rotor_speeds"}, [&](SettingsVisitor& w) {
+    w.value({"rotors", "rad/s", "of each", 0, 1e5}, s.rotors);
+  });
+  for_kinds({"take_off"}, [&](SettingsVisitor& w) {
+    w.value({"height", "m", "to rise by", 0.01, 1e4}, s.height);
+  });
+  for_kinds({"take_off", "land"}, [&](SettingsVisitor& w) {
+    w.value({"speed", "m/s", "up or down", 0.01, 20}, s.speed);
+  });
+  for_kinds({"polynomial", "b_spline"}, [&](SettingsVisitor& w) {
+    w.value({"file", "", "CSV of a polynomial or of a B-spline's control points"}, s.file);
+  });
+  for_kinds({"b_spline"}, [&](SettingsVisitor& w) {
+    w.value({"degree", "", "of the B-spline", 1, 7}, s.degree);
+    w.value({"interval", "s", "between the B-spline's knots", 0.001, 1000}, s.interval);
+  });
 }
 
 Command command_of(const CommandSettings& s,

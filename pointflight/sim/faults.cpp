@@ -33,14 +33,27 @@ void describe(SettingsVisitor& v, FaultSettings& s) {
            kKinds);
   v.value({"from", "s", "when it starts", 0, 1e6}, s.from);
   v.value({"until", "s", "when it ends; 0: never", 0, 1e6}, s.until);
-  v.value({"index", "", "of the rotor or lidar", 0, 255}, s.index);
-  v.choice({"axis", "", "of the IMU that repeats its last value"}, s.axis, kAxes);
-  v.value({"value",
-           "",
-           "rotor: share of speed left; odometry_delay: seconds; scan_drop: share of scans lost",
-           0,
-           60},
-          s.value);
+  const auto is = [&](const char* kind) { return s.kind == kind; };
+  v.only_if(is("rotor") || is("lidar") || is("scan_drop"),
+            "kind: rotor, lidar, scan_drop",
+            [&](SettingsVisitor& w) {
+              w.value({"index", "", "of the rotor or lidar", 0, 255}, s.index);
+            });
+  v.only_if(is("imu"), "kind: imu", [&](SettingsVisitor& w) {
+    w.choice({"axis", "", "of the IMU that repeats its last value"}, s.axis, kAxes);
+  });
+  v.only_if(is("rotor") || is("odometry_delay") || is("scan_drop"),
+            "kind: rotor, odometry_delay, scan_drop",
+            [&](SettingsVisitor& w) {
+              w.value(
+                  {"value",
+                   "",
+                   "rotor: share of speed left; odometry_delay: seconds; scan_drop: share of scans "
+                   "lost",
+                   0,
+                   60},
+                  s.value);
+            });
 }
 
 void check(const FaultSettings& s,

@@ -16,21 +16,35 @@ void describe(SettingsVisitor& v, RosOutput& s) {
   v.value({"kind", "", "what it says: odometry, imu, cloud, ... (docs/ros.md)"}, s.kind);
   v.value({"topic", "", "{vehicle}, {id}, {lidar} are written out; '-': not sent"}, s.topic);
   v.value({"frame", "", "header.frame_id; empty: the profile's for its kind"}, s.frame);
-  v.value({"child_frame", "", "of odometry and tf; '-': none"}, s.child_frame);
+  const bool has_child = s.kind == "odometry" || s.kind == "tf" || s.kind == "tf_scan";
+  v.only_if(has_child, "kind: odometry, tf, tf_scan", [&](SettingsVisitor& w) {
+    w.value({"child_frame", "", "what is posed; '-': none"}, s.child_frame);
+  });
   v.value({"rate", "Hz", "at most; 0: each sample; -1: as the profile has it", -1, 10000}, s.rate);
-  v.value({"layout", "", "of clouds: livox, livox_custom, velodyne, ouster, xyzi, ..."}, s.layout);
-  v.value({"resolution", "m", "of the map's cloud; 0: the map's own", 0, 100}, s.resolution);
+  const bool has_points = s.kind == "map" || s.kind.find("cloud") != std::string::npos;
+  v.only_if(has_points, "a kind of cloud, or map", [&](SettingsVisitor& w) {
+    w.value({"layout", "", "livox, livox_custom, velodyne, ouster, xyzi, ..."}, s.layout);
+  });
+  v.only_if(s.kind == "map", "kind: map", [&](SettingsVisitor& w) {
+    w.value({"resolution", "m", "0: the map's own", 0, 100}, s.resolution);
+  });
 }
 
 void describe(SettingsVisitor& v, RosInput& s) {
   v.value({"kind", "", "what it is taken for: position, goal, velocity, ... (docs/ros.md)"},
           s.kind);
   v.value({"topic", "", "{vehicle} and {id} are written out; '-': not read"}, s.topic);
-  v.choice({"unit", "", "of rotor speeds: rad/s or rpm"}, s.unit, kRotorUnits);
-  v.choice({"frame", "", "of velocities that name no frame"}, s.frame, kFrames);
-  v.choice({"package", "", "of a PositionCommand on ROS 2; ROS 1 takes any"},
-           s.package,
-           kCommandPackages);
+  v.only_if(s.kind == "rotors", "kind: rotors", [&](SettingsVisitor& w) {
+    w.choice({"unit", "", "rad/s or rpm"}, s.unit, kRotorUnits);
+  });
+  v.only_if(s.kind == "velocity", "kind: velocity", [&](SettingsVisitor& w) {
+    w.choice({"frame", "", "of velocities that name no frame"}, s.frame, kFrames);
+  });
+  v.only_if(s.kind == "position", "kind: position", [&](SettingsVisitor& w) {
+    w.choice({"package", "", "of a PositionCommand on ROS 2; ROS 1 takes any"},
+             s.package,
+             kCommandPackages);
+  });
 }
 
 void describe(SettingsVisitor& v, RosSetup& s) {

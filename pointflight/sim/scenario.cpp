@@ -29,7 +29,10 @@ void describe_lidar(SettingsVisitor& v, LidarMount& s) {
   v.value({"rotation_rpy_deg", "deg", "roll, pitch, yaw of its axes in the body", -360, 360},
           s.rotation_rpy_deg);
   v.choice({"renderer", "", "how points are made"}, s.renderer, kRenderers);
-  v.value({"snapshot", "", "all beams of a scan from one pose"}, s.snapshot);
+  v.only_if(s.renderer != "paper", "renderer: beam", [&](SettingsVisitor& w) {
+    w.value({"snapshot", "", "all beams of a scan from one pose, as the paper's always"},
+            s.snapshot);
+  });
   v.value({"noise", "", "range noise of the sensor file"}, s.noise);
 }
 

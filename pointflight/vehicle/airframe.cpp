@@ -34,7 +34,9 @@ void describe_rotor(SettingsVisitor& v, RotorModel& r) {
   v.value(required({"speed_max", "rad/s", "greatest commanded speed", 1, 1e5}), r.speed_max);
   v.value({"natural_frequency", "rad/s", "of the speed's response; 0: follows at once", 0, 1e4},
           r.natural_frequency);
-  v.value({"damping", "", "of the speed's response", 0.1, 10}, r.damping);
+  v.only_if(r.natural_frequency > 0.0, "natural_frequency above 0", [&](SettingsVisitor& w) {
+    w.value({"damping", "", "of the speed's response", 0.1, 10}, r.damping);
+  });
   v.value({"radius", "m", "of the propeller, for ground effect; 0: none", 0, 10}, r.radius);
 }
 
@@ -43,11 +45,19 @@ void describe_loop(SettingsVisitor& v, LoopDesign& loop) {
   v.value({"damping", "", "of the closed loop", 0.1, 10}, loop.damping);
   v.value({"integral",
            "",
-           "position loops: how quickly wind and the like are learnt, in units of "
-           "natural_frequency; attitude loops: integral gain in units of its cube",
+           "how quickly wind and the like are learnt, in units of natural_frequency",
            0,
            1},
           loop.integral);
+}
+
+/// The attitude loops: only the cascade integrates.
+void describe_attitude_loop(SettingsVisitor& v, LoopDesign& loop, const ControllerSettings& c) {
+  v.value({"natural_frequency", "rad/s", "of the closed loop", 0.01, 1000}, loop.natural_frequency);
+  v.value({"damping", "", "of the closed loop", 0.1, 10}, loop.damping);
+  v.only_if(c.kind == "cascade", "controller.kind: cascade", [&](SettingsVisitor& w) {
+    w.value({"integral", "", "integral gain in units of natural_frequency^3", 0, 1}, loop.integral);
+  });
 }
 
 void describe_controller(SettingsVisitor& v, ControllerSettings& c) {
@@ -57,8 +67,9 @@ void describe_controller(SettingsVisitor& v, ControllerSettings& c) {
   v.section({"vertical", "", "position loop, z"},
             [&](SettingsVisitor& w) { describe_loop(w, c.vertical); });
   v.section({"roll_pitch", "", "attitude loop"},
-            [&](SettingsVisitor& w) { describe_loop(w, c.roll_pitch); });
-  v.section({"yaw", "", "heading loop"}, [&](SettingsVisitor& w) { describe_loop(w, c.yaw); });
+            [&](SettingsVisitor& w) { describe_attitude_loop(w, c.roll_pitch, c); });
+  v.section({"yaw", "", "heading loop"},
+            [&](SettingsVisitor& w) { describe_attitude_loop(w, c.yaw, c); });
   v.value({"speed_max", "m/s", "of velocity and position commands", 0.1, 200}, c.speed_max);
   v.value({"tilt_max_deg", "deg", "greatest tilt; from 90 on none (geometric)", 1, 180},
           c.tilt_max_deg);
@@ -87,10 +98,12 @@ void describe_imu(SettingsVisitor& v, ImuSettings& i) {
 
 void describe_battery(SettingsVisitor& v, BatterySettings& b) {
   v.value({"cells", "", "in series; 0: full power for ever", 0, 24}, b.cells);
-  v.value({"capacity", "Ah", "from full to empty", 0, 1000}, b.capacity);
-  v.value({"resistance", "ohm", "of all cells and leads", 0, 10}, b.resistance);
-  v.value({"efficiency", "", "shaft power by electrical power", 0.05, 1}, b.efficiency);
-  v.value({"reserve", "", "share of the capacity left when it counts as low", 0, 0.9}, b.reserve);
+  v.only_if(b.cells > 0.0, "cells above 0", [&](SettingsVisitor& w) {
+    w.value({"capacity", "Ah", "from full to empty", 0, 1000}, b.capacity);
+    w.value({"resistance", "ohm", "of all cells and leads", 0, 10}, b.resistance);
+    w.value({"efficiency", "", "shaft power by electrical power", 0.05, 1}, b.efficiency);
+    w.value({"reserve", "", "share of the capacity left when it counts as low", 0, 0.9}, b.reserve);
+  });
 }
 
 VehicleSettings read(SettingsReader& reader, const std::string& path) {
@@ -141,9 +154,15 @@ void describe(SettingsVisitor& v, VehicleSettings& s) {
   v.value(required({"inertia_diagonal", "kg m^2", "about the body axes", 1e-9, 1e4}),
           s.inertia_diagonal);
   v.choice({"shape", "", "of the hull, which must stay free"}, s.shape, kShapes);
-  v.value({"radius", "m", "of a sphere or capsule", 0.001, 100}, s.radius);
-  v.value({"size", "m", "of a box", 0.001, 100}, s.size);
-  v.value({"height", "m", "of a capsule along z, caps included", 0.001, 100}, s.height);
+  v.only_if(s.shape != "box", "shape: sphere or capsule", [&](SettingsVisitor& w) {
+    w.value({"radius", "m", "of the sphere or capsule", 0.001, 100}, s.radius);
+  });
+  v.only_if(s.shape == "box", "shape: box", [&](SettingsVisitor& w) {
+    w.value({"size", "m", "of the box", 0.001, 100}, s.size);
+  });
+  v.only_if(s.shape == "capsule", "shape: capsule", [&](SettingsVisitor& w) {
+    w.value({"height", "m", "along z, caps included", 0.001, 100}, s.height);
+  });
   v.value({"intensity", "", "of LiDAR returns from it", 0, 1e6}, s.intensity);
   v.value({"drag_area", "m^2", "c_d A along each body axis", 0, 100}, s.drag_area);
   v.section(required({"rotor", "", "all rotors are alike"}),
@@ -164,6 +183,14 @@ void describe(SettingsVisitor& v, VehicleSettings& s) {
             [&](SettingsVisitor& w) { describe_imu(w, s.imu); });
   v.section({"battery", "", "LiPo; flown with where the scenario says so"},
             [&](SettingsVisitor& w) { describe_battery(w, s.battery); });
+}
+
+std::string vehicle_reference() {
+  VehicleSettings defaults;
+  defaults.rotors.resize(1);  // so that their keys are listed
+  SettingsTable table;
+  describe(table, defaults);
+  return table.text();
 }
 
 Solid VehicleSettings::hull() const {

@@ -107,6 +107,9 @@ struct VehicleSettings {
 /// The one list of keys of a vehicle file.
 void describe(SettingsVisitor& visitor, VehicleSettings& settings);
 
+/// Markdown table of all keys.
+std::string vehicle_reference();
+
 /// Reads a vehicle by name ("quad_330") or path; relative paths are taken from `base`.
 VehicleSettings load_vehicle(const std::string& name_or_path, const std::string& base = {});
 

@@ -93,36 +93,73 @@ void check(const ObstacleSettings& s, const std::function<std::string(const char
   if ((s.bounds_max - s.bounds_min).minCoeff() < 0.0) fail("bounds_max", "is below bounds_min");
 }
 
+void describe_shape(SettingsVisitor& v, ObstacleSettings& s) {
+  const bool is_cloud = s.shape == "cloud";
+  v.only_if(s.shape == "sphere" || s.shape == "cylinder",
+            "shape: sphere, cylinder",
+            [&](SettingsVisitor& w) {
+              w.value({"radius", "m", "of the sphere or cylinder", 0.001, 1000}, s.radius);
+              w.only_if(s.motion == "random", "motion: random", [&](SettingsVisitor& x) {
+                x.value({"radius_max", "m", "above radius: each is drawn between the two", 0, 1000},
+                        s.radius_max);
+              });
+            });
+  v.only_if(s.shape == "cylinder", "shape: cylinder", [&](SettingsVisitor& w) {
+    w.value({"height", "m", "of the cylinder", 0.001, 1000}, s.height);
+  });
+  v.only_if(s.shape == "box", "shape: box", [&](SettingsVisitor& w) {
+    w.value({"size", "m", "of the box", 0.001, 1000}, s.size);
+  });
+  v.only_if(is_cloud, "shape: cloud", [&](SettingsVisitor& w) {
+    w.value({"file", "", "cloud, mesh or .pfmap, around its own origin"}, s.file);
+    w.only_if(!s.file.ends_with(".pfmap"), "a cloud or mesh as file", [&](SettingsVisitor& x) {
+      x.value({"resolution", "m", "at which it is imported", 0.001, 10}, s.resolution);
+    });
+  });
+  v.only_if(!is_cloud, "shape: sphere, box, cylinder", [&](SettingsVisitor& w) {
+    w.value({"intensity", "", "of returns from it", 0, 1e6}, s.intensity);
+  });
+}
+
+void describe_motion(SettingsVisitor& v, ObstacleSettings& s) {
+  v.only_if(
+      s.motion == "random" || s.motion == "loop", "motion: random, loop", [&](SettingsVisitor& w) {
+        w.value({"speed", "m/s", "along its way", 0, 100}, s.speed);
+      });
+  v.only_if(s.motion == "random", "motion: random", [&](SettingsVisitor& w) {
+    w.value({"count", "", "so many alike", 1, 50000}, s.count);
+    w.value({"speed_max", "m/s", "above speed: each is drawn between the two", 0, 100},
+            s.speed_max);
+    w.choice({"directions", "", "of flight"}, s.directions, kDirections);
+    w.choice({"at_border",
+              "",
+              "what happens at the bounds: another one at a random free place, or it turns back"},
+             s.at_border,
+             kBorders);
+    w.value({"bounds_min", "m", "both 0: the map's", -kFar, kFar}, s.bounds_min);
+    w.value({"bounds_max", "m", "upper corner", -kFar, kFar}, s.bounds_max);
+  });
+  v.only_if(s.motion == "still", "motion: still", [&](SettingsVisitor& w) {
+    w.value({"position", "m", "where it stands", -kFar, kFar}, s.position);
+    w.value({"yaw_deg", "deg", "how it stands", -360, 360}, s.yaw_deg);
+  });
+  v.only_if(s.motion == "loop", "motion: loop", [&](SettingsVisitor& w) {
+    w.value({"waypoints", "m", "of the loop, which closes by itself", -kFar, kFar}, s.waypoints);
+  });
+  v.only_if(s.motion == "keyframes", "motion: keyframes", [&](SettingsVisitor& w) {
+    w.value({"keyframes", "", "CSV: time,x,y,z and roll_deg,pitch_deg,yaw_deg or qw,qx,qy,qz"},
+            s.keyframes);
+    w.value({"repeat", "", "they start again after the last"}, s.repeat);
+  });
+}
+
 }  // namespace
 
 void describe(SettingsVisitor& v, ObstacleSettings& s) {
-  v.value({"count", "", "so many alike (motion: random)", 1, 50000}, s.count);
   v.choice({"shape", "", "exact shapes, or the points of a cloud or mesh"}, s.shape, kShapes);
-  v.value({"radius", "m", "of spheres and cylinders", 0.001, 1000}, s.radius);
-  v.value({"radius_max", "m", "above radius: each is drawn between the two", 0, 1000},
-          s.radius_max);
-  v.value({"height", "m", "of cylinders", 0.001, 1000}, s.height);
-  v.value({"size", "m", "of boxes", 0.001, 1000}, s.size);
-  v.value({"file", "", "cloud, mesh or .pfmap of shape 'cloud', around its own origin"}, s.file);
-  v.value({"resolution", "m", "at which it is imported", 0.001, 10}, s.resolution);
-  v.value({"intensity", "", "of returns from exact shapes", 0, 1e6}, s.intensity);
   v.choice({"motion", "", "how it moves: a function of seed and time"}, s.motion, kMotions);
-  v.value({"speed", "m/s", "of random and loop", 0, 100}, s.speed);
-  v.value({"speed_max", "m/s", "above speed: each is drawn between the two", 0, 100}, s.speed_max);
-  v.choice({"directions", "", "of random motion"}, s.directions, kDirections);
-  v.choice({"at_border",
-            "",
-            "what happens at the bounds: another one at a random free place, or it turns back"},
-           s.at_border,
-           kBorders);
-  v.value({"bounds_min", "m", "of random motion; both 0: the map's", -kFar, kFar}, s.bounds_min);
-  v.value({"bounds_max", "m", "of random motion", -kFar, kFar}, s.bounds_max);
-  v.value({"position", "m", "where a still one stands", -kFar, kFar}, s.position);
-  v.value({"yaw_deg", "deg", "of a still one", -360, 360}, s.yaw_deg);
-  v.value({"waypoints", "m", "of a loop, which closes by itself", -kFar, kFar}, s.waypoints);
-  v.value({"keyframes", "", "CSV: time,x,y,z and roll_deg,pitch_deg,yaw_deg or qw,qx,qy,qz"},
-          s.keyframes);
-  v.value({"repeat", "", "keyframes start again after the last"}, s.repeat);
+  describe_shape(v, s);
+  describe_motion(v, s);
 }
 
 Obstacles::Obstacles(const std::vector<ObstacleSettings>& settings,

@@ -62,11 +62,13 @@ double value_of(const std::array<double, 2>& z) {
 
 void describe(SettingsVisitor& v, WindSettings& s) {
   v.value({"mean", "m/s", "where the wind blows to, world frame", -100, 100}, s.mean);
-  v.choice({"turbulence", "", "Dryden gusts (MIL-F-8785C); custom: the two keys below"},
+  v.choice({"turbulence", "", "Dryden gusts (MIL-F-8785C); custom: gust_sigma and gust_length"},
            s.turbulence,
            kTurbulence);
-  v.value({"gust_sigma", "m/s", "deviations along, across, up", 0, 50}, s.gust_sigma);
-  v.value({"gust_length", "m", "scale lengths along, across, up", 0.1, 10000}, s.gust_length);
+  v.only_if(s.turbulence == "custom", "turbulence: custom", [&](SettingsVisitor& w) {
+    w.value({"gust_sigma", "m/s", "deviations along, across, up", 0, 50}, s.gust_sigma);
+    w.value({"gust_length", "m", "scale lengths along, across, up", 0.1, 10000}, s.gust_length);
+  });
 }
 
 GustScales low_altitude_gusts(double height, double wind_at_20_feet) {

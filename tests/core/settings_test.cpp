@@ -126,6 +126,61 @@ TEST(Settings, TheTableListsEveryKeyWithUnitDefaultAndRange) {
   expect_contains(table.text(), "| `wheels[].radius` | m | **required** | 0.1 .. 2 |");
 }
 
+struct Engine {
+  std::string fuel = "petrol";
+  double tank = 50.0;
+  double charge = 3.0;
+};
+
+void describe(SettingsVisitor& v, Engine& engine) {
+  constexpr std::array<std::string_view, 2> kFuels = {"petrol", "current"};
+  v.choice({"fuel", "", "what it burns"}, engine.fuel, kFuels);
+  v.only_if(engine.fuel == "petrol", "fuel: petrol", [&](SettingsVisitor& w) {
+    w.value({"tank", "l", "of the tank", 1, 100, true}, engine.tank);
+  });
+  v.only_if(engine.fuel == "current", "fuel: current", [&](SettingsVisitor& w) {
+    w.section({"cell", "", "its cell"}, [&](SettingsVisitor& x) {
+      x.value({"charge", "Ah", "when full", 0, 10}, engine.charge);
+    });
+  });
+}
+
+Engine parse_engine(std::string_view text) {
+  Engine engine;
+  SettingsReader reader(text, "engine.yaml");
+  describe(reader, engine);
+  reader.finish();
+  return engine;
+}
+
+TEST(Settings, KeysUnderAConditionAreRefusedElsewhere) {
+  EXPECT_EQ(parse_engine("fuel: petrol\ntank: 7\n").tank, 7.0);
+  EXPECT_EQ(parse_engine("fuel: current\ncell: {charge: 4}\n").charge, 4.0);
+  const auto error = [](std::string_view text) { return error_of([&] { parse_engine(text); }); };
+  expect_contains(error("fuel: current\ntank: 7\n"),
+                  "engine.yaml:2: tank: has no effect here: it is for `fuel: petrol`; remove it or "
+                  "set that");
+  expect_contains(error("tank: 7\ncell: {charge: 4}\n"), "engine.yaml:2: cell: has no effect here");
+  // required where the condition holds, and only there
+  expect_contains(error("fuel: petrol\n"), "tank: missing");
+  EXPECT_EQ(parse_engine("fuel: current\n").charge, 3.0);
+}
+
+TEST(Settings, KeysUnderAConditionAreWrittenWhereItHolds) {
+  Engine engine;
+  engine.fuel = "current";
+  SettingsWriter writer;
+  describe(writer, engine);
+  EXPECT_EQ(writer.text().find("tank"), std::string::npos) << writer.text();
+  EXPECT_EQ(parse_engine(writer.text()).fuel, "current");
+  // the table has all of them and says what for
+  SettingsTable table;
+  describe(table, engine);
+  expect_contains(table.text(), "of the tank (only `fuel: petrol`) |");
+  expect_contains(table.text(),
+                  "| `cell.charge` | Ah | `3` | 0 .. 10 | when full (only `fuel: current`) |");
+}
+
 TEST(Resources, AnUnknownModelNamesTheKnownOnes) {
   const std::string error = error_of([] { find_model("lidars", "mid36"); });
   expect_contains(error, "avia");

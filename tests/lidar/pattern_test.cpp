@@ -278,6 +278,67 @@ TEST(Hdl64e, HasItsPointsAndTheParallaxOfItsBlocks) {
   EXPECT_NEAR(highest, 0.215, 0.01);
 }
 
+TEST(Rings, ACopiedFileFindsItsTableByPathOrName) {
+  const auto shipped = scan_of("vlp32c");
+  const TemporaryFolder folder;
+  const std::string text = testing::read_file(data_folder() + "/lidars/vlp32c.yaml");
+  const std::size_t at = text.find("tables/velodyne_vlp32c.csv");
+  ASSERT_NE(at, std::string::npos);
+  for (const char* name :
+       {"tables/velodyne_vlp32c.csv", "velodyne_vlp32c.csv", "velodyne_vlp32c"}) {
+    std::string mine = text;
+    mine.replace(at, std::string("tables/velodyne_vlp32c.csv").size(), name);
+    testing::write_file(folder / "my32.yaml", mine);
+    const auto beams = scan_of(folder / "my32.yaml");
+    ASSERT_EQ(beams.size(), shipped.size()) << name;
+    EXPECT_EQ(beams[77].direction_sensor, shipped[77].direction_sensor);
+  }
+  // a table beside the file goes before the shipped one
+  testing::write_file(folder / "velodyne_vlp32c", "ring,elevation_deg,azimuth_offset_deg\n0,5,0\n");
+  EXPECT_LT(scan_of(folder / "my32.yaml").size(), shipped.size() / 30);
+}
+
+TEST(Rings, ChannelsWithoutATable) {
+  const auto beams_of = [](const std::string& rings) {
+    const Executor executor(1);
+    return make_pattern(parse_lidar("range_max: 10\npattern: rings\nrings: " + rings, "x.yaml"))
+        ->beams(0, executor);
+  };
+  // in the order of firing, rings counted from below
+  const auto listed = beams_of(
+      "{elevations_deg: [-4, 6, 1], azimuth_offsets_deg: [0, 2, -3], cycle_us: 100, "
+      "channel_interval_us: 10}\n");
+  ASSERT_GE(listed.size(), 3u * 999u);
+  const double elevations[] = {-4, 6, 1};
+  const double offsets[] = {0, 2, -3};
+  const int rings[] = {0, 2, 1};
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_NEAR(angles_of(listed[i]).elevation_deg, elevations[i], 1e-4);
+    // the head turns clockwise by 0.36 deg in 100 us and the channel lags by its offset
+    EXPECT_NEAR(
+        angles_of(listed[i]).azimuth_deg, offsets[i] - 0.036 * static_cast<double>(i), 1e-4);
+    EXPECT_EQ(listed[i].ring, rings[i]);
+    EXPECT_EQ(listed[i].time_offset, Duration(10000 * static_cast<std::int64_t>(i)));
+  }
+  const auto spaced = beams_of("{channels: 5, elevation_min_deg: -10, elevation_max_deg: 30}\n");
+  for (std::size_t i = 0; i < 5; ++i) {
+    EXPECT_NEAR(angles_of(spaced[i]).elevation_deg, -10.0 + 10.0 * static_cast<double>(i), 1e-4);
+  }
+  const auto columns = beams_of("{convention: ouster, channels: 3, columns: 16}\n");
+  ASSERT_EQ(columns.size(), 48u);
+  std::set<std::uint16_t> numbers;
+  for (std::size_t i = 0; i < 3; ++i) {  // rows from the top
+    EXPECT_NEAR(angles_of(columns[i]).elevation_deg, 15.0 - 15.0 * static_cast<double>(i), 1e-4);
+    numbers.insert(columns[i].ring);
+  }
+  EXPECT_EQ(numbers, (std::set<std::uint16_t>{0, 1, 2}));
+  const auto error = [&](const std::string& text) { return error_of([&] { beams_of(text); }); };
+  expect_contains(error("{elevations_deg: [1, 2], azimuth_offsets_deg: [1]}\n"),
+                  "1 offsets for 2 elevations");
+  expect_contains(error("{channels: 3, elevation_min_deg: 5, elevation_max_deg: 5}\n"),
+                  "is not below elevation_max_deg");
+}
+
 TEST(Ouster, ColumnsShareATimeAndBeamsLeaveTheRing) {
   for (const auto& [name, rows] : {std::pair("os1_32", 32u), std::pair("os1_128", 128u)}) {
     SCOPED_TRACE(name);
@@ -348,9 +409,12 @@ TEST(LidarSettings, BadFilesSayWhereAndWhat) {
   expect_contains(error("range_max: 10\nrate: -5\npattern: rotor\n"), "x.yaml:2: rate: -5");
   expect_contains(error("range_max: 10\nrate: 10 Hz\npattern: rotor\n"), "plain number in Hz");
   expect_contains(error("range_max: 10\nrange_min: 20\npattern: rotor\n"), "x.yaml:2: range_min");
-  expect_contains(error("range_max: 10\npattern: rings\n"), "name the CSV");
-  expect_contains(error("range_max: 10\npattern: rings\nrings: {table: absent.csv}\n"),
-                  "absent.csv");
+  expect_contains(error("range_max: 10\npattern: rings\n"), "no channels; give a table");
+  // where it looked
+  const std::string absent = error("range_max: 10\npattern: rings\nrings: {table: absent.csv}\n");
+  expect_contains(absent, "x.yaml:3: rings.table: 'absent.csv' is neither absent.csv nor ");
+  expect_contains(absent, data_folder() + "/lidars/tables/absent.csv; give");
+  expect_contains(absent, "velodyne_vlp32c");
   expect_contains(error("range_max: 10\npattern: grid\ngrid: {projection: pinhole}\n"),
                   "fx and fy");
 }

@@ -108,12 +108,14 @@ TEST(Scenario, WhatIsWrittenReadsBackTheSame) {
   scenario.map = "maps/a hall.pfmap";
   scenario.vehicles[0].mission.waypoints = {{1, 2, 3}, {4.25, -5, 6}};
   scenario.vehicles[0].lidars.push_back(
-      LidarMount{"avia", {0.1, 0, 0.2}, {0, 10, 0}, "paper", true, false});
+      LidarMount{"avia", {0.1, 0, 0.2}, {0, 10, 0}, "beam", true, false});
+  scenario.vehicles[0].lidars.push_back(scenario.vehicles[0].lidars[0]);
+  scenario.vehicles[0].lidars.back().renderer = "paper";
   const Scenario again = parse_scenario(scenario_yaml(scenario), "s.yaml");
   EXPECT_EQ(again.map, scenario.map);
   EXPECT_EQ(again.vehicles[0].mission.waypoints, scenario.vehicles[0].mission.waypoints);
-  ASSERT_EQ(again.vehicles[0].lidars.size(), 2u);
-  EXPECT_EQ(again.vehicles[0].lidars[1].renderer, "paper");
+  ASSERT_EQ(again.vehicles[0].lidars.size(), 3u);
+  EXPECT_EQ(again.vehicles[0].lidars[2].renderer, "paper");
   EXPECT_TRUE(again.vehicles[0].lidars[1].snapshot);
   EXPECT_EQ(scenario_yaml(again), scenario_yaml(scenario));
   EXPECT_EQ(again.place("vehicles[0].mission.speed").rfind("s.yaml:", 0), 0u);

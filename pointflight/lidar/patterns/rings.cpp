@@ -15,10 +15,79 @@
 namespace pointflight {
 namespace {
 
+struct Channel {
+  double elevation_deg;
+  double azimuth_offset_deg;
+};
+
+/// The channels of a file that has no table, in its order.
+std::vector<Channel> listed_channels(const RingsSettings& s) {
+  std::vector<Channel> channels;
+  for (std::size_t i = 0; i < s.elevations_deg.size(); ++i) {
+    channels.push_back(
+        {s.elevations_deg[i], s.azimuth_offsets_deg.empty() ? 0.0 : s.azimuth_offsets_deg[i]});
+  }
+  for (std::int64_t i = 0; i < s.channels; ++i) {
+    const double share =
+        s.channels == 1 ? 0.0 : static_cast<double>(i) / static_cast<double>(s.channels - 1);
+    channels.push_back(
+        {s.elevation_min_deg + share * (s.elevation_max_deg - s.elevation_min_deg), 0.0});
+  }
+  return channels;
+}
+
+/// The table that channels without one stand for.
+CsvTable table_of(std::vector<Channel> channels, const RingsSettings& s, const std::string& name) {
+  const auto below = [](const Channel& a, const Channel& b) {
+    return a.elevation_deg < b.elevation_deg;
+  };
+  std::string text;
+  if (s.convention == "ouster") {  // whose rows are counted from the top
+    std::stable_sort(channels.begin(), channels.end(), [&](const Channel& a, const Channel& b) {
+      return below(b, a);
+    });
+    text = "beam_altitude_deg,beam_azimuth_deg\n";
+    for (const Channel& c : channels) {
+      text += fmt::format("{},{}\n", c.elevation_deg, c.azimuth_offset_deg);
+    }
+    return {text, name};
+  }
+  text = "ring,elevation_deg,azimuth_offset_deg\n";
+  for (std::size_t i = 0; i < channels.size(); ++i) {
+    // from below; equal ones in their order
+    std::size_t ring = 0;
+    for (std::size_t j = 0; j < channels.size(); ++j) {
+      const bool equal = channels[j].elevation_deg == channels[i].elevation_deg;
+      if (below(channels[j], channels[i]) || (equal && j < i)) ++ring;
+    }
+    text +=
+        fmt::format("{},{},{}\n", ring, channels[i].elevation_deg, channels[i].azimuth_offset_deg);
+  }
+  return {text, name};
+}
+
+/// Refuses a time between channels where the table has the time of each.
+void check_interval(const LidarSettings& settings, const CsvTable& table) {
+  const int time = table.find("fire_time_us");
+  if (time < 0 || !settings.lines.contains("rings.channel_interval_us")) return;
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    if (std::isnan(table.at(row, time))) return;
+  }
+  throw InputError(fmt::format(
+      "{}: rings.channel_interval_us: has no effect here: {} has a fire_time_us for each "
+      "channel; remove it",
+      settings.place("rings.channel_interval_us"),
+      settings.rings.table));
+}
+
 CsvTable load_table(const LidarSettings& settings) {
+  const RingsSettings& s = settings.rings;
+  if (s.table.empty()) return table_of(listed_channels(s), s, settings.path);
   const std::string folder = std::filesystem::path(settings.path).parent_path().string();
-  return settings.at("rings.table",
-                     [&] { return CsvTable(resolve_path(settings.rings.table, folder)); });
+  CsvTable table =
+      settings.at("rings.table", [&] { return CsvTable(find_table("lidars", s.table, folder)); });
+  check_interval(settings, table);
+  return table;
 }
 
 /// Velodyne: the head turns clockwise seen from above; a channel fires at its own time within the
