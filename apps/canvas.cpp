@@ -17,6 +17,10 @@
 namespace pointflight::apps {
 namespace {
 
+// of letters in units of the font's size
+constexpr double kAscent = 0.75;
+constexpr double kDescent = 0.22;
+
 /// Where cairo writes to; an exception must not pass through its C code.
 struct PngTarget {
   OutputFile file;
@@ -66,11 +70,53 @@ void Canvas::color(Color c, double alpha) {
   cairo_set_source_rgba(cr_, c.r, c.g, c.b, alpha);
 }
 
-void Canvas::text(double x, double y, const std::string& words, double size, Color c) {
+int Canvas::width() const {
+  return cairo_image_surface_get_width(surface_);
+}
+int Canvas::height() const {
+  return cairo_image_surface_get_height(surface_);
+}
+
+double Canvas::text_width(const std::string& words, double size) const {
+  cairo_text_extents_t extents;
+  cairo_set_font_size(cr_, size);
+  cairo_text_extents(cr_, words.c_str(), &extents);
+  return extents.x_advance;
+}
+
+void Canvas::text(double x, double y, const std::string& words, double size, Color c, Align align) {
+  const double width = text_width(words, size);
+  if (align != Align::kLeft) x -= align == Align::kCenter ? 0.5 * width : width;
   color(c);
   cairo_set_font_size(cr_, size);
   cairo_move_to(cr_, x, y);
   cairo_show_text(cr_, words.c_str());
+  texts_.push_back({x, y - kAscent * size, x + width, y + kDescent * size, words});
+}
+
+void Canvas::text_within(
+    double x, double y, const std::string& words, double size, double room, Color c) {
+  constexpr double kSmallest = 10.0;
+  while (size > kSmallest && text_width(words, size) > room) size -= 0.5;
+  std::string shown = words;
+  for (std::size_t cut = 1; text_width(shown, size) > room && 2 * cut + 2 < words.size(); ++cut) {
+    const std::size_t half = (words.size() - cut) / 2;
+    shown = words.substr(0, half) + "..." + words.substr(half + cut);
+  }
+  text(x, y, shown, size, c);
+}
+
+void Canvas::text_upwards(double x, double y, const std::string& words, double size, Color c) {
+  const double width = text_width(words, size);
+  color(c);
+  cairo_save(cr_);
+  cairo_set_font_size(cr_, size);
+  cairo_move_to(cr_, x, y + 0.5 * width);
+  cairo_rotate(cr_, -0.5 * kPi);
+  cairo_show_text(cr_, words.c_str());
+  cairo_restore(cr_);
+  texts_.push_back(
+      {x - kAscent * size, y - 0.5 * width, x + kDescent * size, y + 0.5 * width, words});
 }
 
 void Canvas::dot(double x, double y, double radius, Color c, double alpha) {
@@ -90,12 +136,35 @@ void Canvas::ring(double x, double y, double radius, double width, Color c) {
 
 void Canvas::box(double x, double y, double w, double h, Color c) {
   color(c);
+  cairo_new_path(cr_);
   cairo_rectangle(cr_, x, y, w, h);
   cairo_fill(cr_);
 }
 
-void Canvas::line(const std::vector<std::pair<double, double>>& points, double width, Color c) {
+void Canvas::outline(double x, double y, double w, double h, double width, Color c) {
   color(c);
+  cairo_set_line_width(cr_, width);
+  cairo_new_path(cr_);
+  cairo_rectangle(cr_, x, y, w, h);
+  cairo_stroke(cr_);
+}
+
+void Canvas::begin_clip(double x, double y, double w, double h) {
+  cairo_save(cr_);
+  cairo_new_path(cr_);
+  cairo_rectangle(cr_, x, y, w, h);
+  cairo_clip(cr_);
+}
+
+void Canvas::end_clip() {
+  cairo_restore(cr_);
+}
+
+void Canvas::line(const std::vector<std::pair<double, double>>& points,
+                  double width,
+                  Color c,
+                  double alpha) {
+  color(c, alpha);
   cairo_set_line_width(cr_, width);
   cairo_set_line_join(cr_, CAIRO_LINE_JOIN_ROUND);
   cairo_new_path(cr_);  // text leaves a current point behind
@@ -122,9 +191,7 @@ void Canvas::end_pixels() {
 }
 
 void Canvas::put(int x, int y, Color c, double alpha) {
-  const int width = cairo_image_surface_get_width(surface_);
-  const int height = cairo_image_surface_get_height(surface_);
-  if (x < 0 || y < 0 || x >= width || y >= height) return;
+  if (x < 0 || y < 0 || x >= width() || y >= height()) return;
   auto* row = cairo_image_surface_get_data(surface_) +
               static_cast<std::ptrdiff_t>(y) * cairo_image_surface_get_stride(surface_);
   std::uint32_t pixel = 0;

@@ -21,19 +21,52 @@ inline constexpr Color kNight{0.07, 0.07, 0.1};
 /// Viridis-like scale from dark blue over green to yellow: equal steps look equal, in grey too.
 Color ramp(double share);
 
+/// Which end of the words a place is of.
+enum class Align { kLeft, kCenter, kRight };
+
 /// A picture in memory with the few strokes that we need; pixels, y downwards.
 class Canvas {
  public:
+  /// What words cover.
+  struct TextBox {
+    double left, top, right, bottom;
+    std::string words;
+  };
+
   Canvas(int width, int height, Color background);
   ~Canvas();
   Canvas(const Canvas&) = delete;
   Canvas& operator=(const Canvas&) = delete;
 
-  void text(double x, double y, const std::string& words, double size, Color c);
+  [[nodiscard]] int width() const;
+  [[nodiscard]] int height() const;
+  [[nodiscard]] double text_width(const std::string& words, double size) const;
+  /// All words so far: none may lie over another or be cut off.
+  [[nodiscard]] const std::vector<TextBox>& texts() const { return texts_; }
+
+  /// `y` is the base line.
+  void text(double x,
+            double y,
+            const std::string& words,
+            double size,
+            Color c,
+            Align align = Align::kLeft);
+  /// In a smaller size, then without their middle, where they are wider than `room`.
+  void text_within(double x, double y, const std::string& words, double size, double room, Color c);
+  /// Upwards along a base line at `x`, its middle at `y`.
+  void text_upwards(double x, double y, const std::string& words, double size, Color c);
   void dot(double x, double y, double radius, Color c, double alpha = 1.0);
   void ring(double x, double y, double radius, double width, Color c);
   void box(double x, double y, double w, double h, Color c);
-  void line(const std::vector<std::pair<double, double>>& points, double width, Color c);
+  void outline(double x, double y, double w, double h, double width, Color c);
+  void line(const std::vector<std::pair<double, double>>& points,
+            double width,
+            Color c,
+            double alpha = 1.0);
+
+  /// Strokes and fills between these two stay in the rectangle.
+  void begin_clip(double x, double y, double w, double h);
+  void end_clip();
 
   /// Between these two only `put` may draw.
   void begin_pixels();
@@ -49,6 +82,7 @@ class Canvas {
 
   cairo_surface_t* surface_;
   cairo_t* cr_;
+  std::vector<TextBox> texts_;
 };
 
 }  // namespace pointflight::apps

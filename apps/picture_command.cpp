@@ -66,6 +66,7 @@ void read_vehicle(const fs::path& folder, std::size_t number, RunPicture& pictur
   const fs::path scans = folder / "scans.csv";
   if (!fs::exists(scans)) return;
   constexpr std::size_t kColumns = 14;
+  std::size_t offered = 0;
   for (const auto& row : rows_of(scans)) {
     if (row.size() < kColumns) throw InputError(fmt::format("{}: short row", scans.string()));
     std::array<double, 7> pose{};
@@ -75,7 +76,11 @@ void read_vehicle(const fs::path& folder, std::size_t number, RunPicture& pictur
     const auto reader = open_cloud((folder / row[0]).string());
     std::vector<CloudPoint> points;
     while (reader->read(points)) {
-      for (const CloudPoint& point : points) picture.add_seen(T_world_sensor * point.position);
+      for (const CloudPoint& point : points) {
+        if (offered++ % RunPicture::kSeenStride == 0) {
+          picture.seen.add(T_world_sensor * point.position);
+        }
+      }
     }
   }
 }
@@ -85,30 +90,24 @@ RunPicture read_run(const fs::path& folder) {
   nlohmann::json summary;
   try {
     summary = nlohmann::json::parse(std::ifstream(folder / "summary.json"));
-    double flown = 0.0;
-    std::size_t number = 0;
-    std::uint64_t collisions = 0;
-    double closest = 1e9;
     const auto& vehicles = summary.at("vehicles");
+    RunFigures figures;
+    figures.vehicles = vehicles.size();
+    figures.time = summary.at("simulated_time").get<double>();
+    figures.end = summary.at("end").get<std::string>();
     for (const auto& vehicle : vehicles) {
       const std::string name = vehicle.at("name").get<std::string>();
-      read_vehicle(vehicles.size() == 1 ? folder : folder / name, number++, picture);
-      flown += vehicle.at("distance_flown").get<double>();
-      collisions += vehicle.at("collisions").get<std::uint64_t>();
+      read_vehicle(vehicles.size() == 1 ? folder : folder / name, picture.names.size(), picture);
+      picture.names.push_back(name);
+      figures.flown += vehicle.at("distance_flown").get<double>();
+      figures.scans += vehicle.at("scans").get<std::uint64_t>();
+      figures.points += vehicle.at("points").get<std::uint64_t>();
+      figures.collisions += vehicle.at("collisions").get<std::uint64_t>();
       if (vehicle.at("closest_approach").is_number()) {
-        closest = std::min(closest, vehicle.at("closest_approach").get<double>());
+        figures.add_closest(vehicle.at("closest_approach").get<double>());
       }
     }
-    picture.title = fmt::format("{:.1f} m flown in {:.1f} s, {}",
-                                flown,
-                                summary.at("simulated_time").get<double>(),
-                                summary.at("end").get<std::string>());
-    picture.subtitle =
-        fmt::format("closest approach {}; {} collision{}; seed {}",
-                    closest < 1e9 ? fmt::format("{:.2f} m", closest) : std::string("over 10 m"),
-                    collisions,
-                    collisions == 1 ? "" : "s",
-                    summary.at("seed").get<std::int64_t>());
+    write_titles(figures, picture);
   } catch (const nlohmann::json::exception&) {
     throw InputError(fmt::format("{}: not the summary of a run; give the folder of `fly -o`",
                                  (folder / "summary.json").string()));
@@ -128,8 +127,8 @@ RunPicture read_run(const fs::path& folder) {
   const fs::path events = folder / "events.csv";
   for (const auto& row : rows_of(events)) {
     if (row.size() < 10 || row[1] != "collision") continue;
-    picture.collisions.emplace_back(
-        number_of(row[7], events), number_of(row[8], events), number_of(row[9], events));
+    picture.collisions.add(
+        {number_of(row[7], events), number_of(row[8], events), number_of(row[9], events)});
   }
   return picture;
 }
