@@ -3,23 +3,41 @@
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
-#include <algorithm>
-#include <cmath>
 #include <memory>
-#include <set>
+#include <nlohmann/json.hpp>
 
 #include "apps/commands.hpp"
-#include "pointflight/core/constants.hpp"
+#include "apps/flags.hpp"
+#include "apps/lidar_picture.hpp"
+#include "apps/scan_statistics.hpp"
+#include "apps/settings_json.hpp"
+#include "apps/terminal.hpp"
 #include "pointflight/core/number_text.hpp"
 #include "pointflight/core/resources.hpp"
-#include "pointflight/lidar/lidar.hpp"
 
 namespace pointflight::apps {
 namespace {
 
-void list_lidars() {
+struct LidarFlags {
+  std::string name;
+  std::string picture;
+  bool json = false;
+  bool force = false;
+};
+
+void list_lidars(const LidarFlags& flags) {
+  nlohmann::ordered_json json = nlohmann::ordered_json::array();
   for (const std::string& name : model_names("lidars")) {
     const LidarSettings s = load_lidar(name);
+    if (flags.json) {
+      json.push_back({{"name", name},
+                      {"title", s.title},
+                      {"pattern", s.pattern},
+                      {"rate", s.rate},
+                      {"range_max", s.range_max},
+                      {"path", s.path}});
+      continue;
+    }
     fmt::print("{:<12}  {:<9} {:>5.1f} Hz  {:>5.1f} m  {}\n",
                name,
                s.pattern,
@@ -27,44 +45,70 @@ void list_lidars() {
                s.range_max,
                s.title);
   }
+  if (flags.json) print_json(json);
 }
 
-void show_lidar(const std::string& name) {
-  LidarSettings s = load_lidar(name);
-  const Executor executor;
-  const Lidar lidar(s, 0);
-  const std::vector<Beam> beams = lidar.beams(0, executor);
-  double el_low = kPi;
-  double el_high = -kPi;
-  double az_low = kPi;
-  double az_high = -kPi;
-  std::set<std::uint16_t> rings;
-  Duration last{0};
-  for (const Beam& beam : beams) {
-    const Vector3d d = beam.direction_sensor.cast<double>();
-    const double az = std::atan2(d.y(), d.x());
-    const double el = std::asin(std::clamp(d.z(), -1.0, 1.0));
-    az_low = std::min(az_low, az);
-    az_high = std::max(az_high, az);
-    el_low = std::min(el_low, el);
-    el_high = std::max(el_high, el);
-    rings.insert(beam.ring);
-    last = std::max(last, beam.time_offset);
+nlohmann::ordered_json json_of(const ScanStatistics& scan) {
+  nlohmann::ordered_json json;
+  json["beams"] = scan.beams;
+  json["beams_per_second"] = scan.beams_a_second;
+  json["time_span"] = scan.span;
+  json["rings"] = scan.rings;
+  json["azimuth_deg"] = {scan.azimuth_min, scan.azimuth_max};
+  json["elevation_deg"] = {scan.elevation_min, scan.elevation_max};
+  json["spacing_along_ring_deg"] = scan.along_ring;
+  json["spacing_nearest_deg"] = scan.nearest;
+  if (scan.between_rings) {
+    json["spacing_between_rings_deg"] = {scan.between_rings->first, scan.between_rings->second};
   }
-  fmt::print(
-      "# {}\n# first scan: {} beams over {:.2f} ms, {} rings or lines; azimuth {} to {} deg, "
-      "elevation {} to {} deg\n",
-      s.path,
-      beams.size(),
-      to_seconds(last) * 1e3,
-      rings.size(),
-      fixed_text(az_low / kDegree, 2),
-      fixed_text(az_high / kDegree, 2),
-      fixed_text(el_low / kDegree, 2),
-      fixed_text(el_high / kDegree, 2));
-  SettingsWriter writer;
-  describe(writer, s);
-  fmt::print("{}", writer.text());
+  return json;
+}
+
+void print_statistics(const LidarSettings& s, const ScanStatistics& scan) {
+  const char* lines = s.pattern == "rings" ? "rings" : s.pattern == "grid" ? "rows" : "lines";
+  fmt::print("# scan: {} beams, {} {}, fired within {} ms; {:g} scans and {:.0f} beams a second\n",
+             scan.beams,
+             scan.rings,
+             lines,
+             fixed_text(scan.span * 1e3, 2),
+             s.rate,
+             scan.beams_a_second);
+  fmt::print("# field of view: azimuth {} to {} deg, elevation {} to {} deg\n",
+             fixed_text(scan.azimuth_min, 2),
+             fixed_text(scan.azimuth_max, 2),
+             fixed_text(scan.elevation_min, 2),
+             fixed_text(scan.elevation_max, 2));
+  fmt::print("# spacing: {} deg from beam to beam of a {}{}; nearest neighbour {} deg (medians)\n",
+             fixed_text(scan.along_ring, 3),
+             std::string(lines).substr(0, std::string(lines).size() - 1),
+             scan.between_rings ? fmt::format(", {} to {} deg between rings",
+                                              fixed_text(scan.between_rings->first, 3),
+                                              fixed_text(scan.between_rings->second, 3))
+                                : std::string(),
+             fixed_text(scan.nearest, 3));
+}
+
+void show_lidar(const LidarFlags& flags) {
+  LidarSettings s = load_lidar(flags.name);
+  refuse_same_file(flags.picture, s.path);
+  refuse_to_overwrite(flags.picture, flags.force);
+  const ScanStatistics scan = scan_statistics(s);
+  if (flags.json) {
+    nlohmann::ordered_json json;
+    json["path"] = s.path;
+    json["scan"] = json_of(scan);
+    json["settings"] = json_of_settings(s);
+    print_json(json);
+  } else {
+    fmt::print("# {}\n", s.path);
+    print_statistics(s, scan);
+    SettingsWriter writer;
+    describe(writer, s);
+    fmt::print("{}", writer.text());
+  }
+  if (flags.picture.empty()) return;
+  draw_lidar(s, flags.picture);
+  log("picture: " + flags.picture);
 }
 
 }  // namespace
@@ -72,12 +116,21 @@ void show_lidar(const std::string& name) {
 void add_lidar_command(CLI::App& parent, int& /*exit_code*/) {
   auto* app = parent.add_subcommand("lidar", "Sensors: a YAML file each");
   app->require_subcommand(1);
+  auto flags = std::make_shared<LidarFlags>();
   auto* list = app->add_subcommand("list", "Names of the shipped sensors");
-  list->callback([] { list_lidars(); });
-  auto* show = app->add_subcommand("show", "What a sensor's file says, and its first scan");
-  auto name = std::make_shared<std::string>();
-  show->add_option("name", *name, "A shipped sensor or the path of a .yaml file")->required();
-  show->callback([name] { show_lidar(*name); });
+  list->add_flag("--json", flags->json, "JSON on stdout");
+  list->callback([flags] { list_lidars(*flags); });
+  auto* show =
+      app->add_subcommand("show", "What a sensor's file says, and figures of its first scan");
+  show->add_option("name", flags->name, "A shipped sensor or the path of a .yaml file")->required();
+  show->add_option(
+      "--png", flags->picture, "Draw its pattern after 0.1 s and 1 s, and its coverage over time");
+  add_force_flag(*show, flags->force);
+  show->add_flag("--json", flags->json, "JSON on stdout");
+  show->callback([flags] { show_lidar(*flags); });
+  auto* keys = app->add_subcommand(
+      "keys", "All keys of a sensor file as a Markdown table (docs/sensors.md)");
+  keys->callback([] { print_reference(lidar_reference()); });
 }
 
 }  // namespace pointflight::apps

@@ -4,11 +4,15 @@
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
 #include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
 
 #include "apps/commands.hpp"
 #include "apps/flags.hpp"
 #include "apps/pictures.hpp"
+#include "apps/settings_json.hpp"
 #include "pointflight/core/constants.hpp"
+#include "pointflight/core/number_text.hpp"
 #include "pointflight/core/resources.hpp"
 #include "pointflight/vehicle/step_response.hpp"
 
@@ -20,13 +24,24 @@ struct ShowFlags {
   std::string controller;
   std::string picture;
   bool force = false;
+  bool json = false;
 };
 
-void list_vehicles() {
+void list_vehicles(const ShowFlags& flags) {
+  nlohmann::ordered_json json = nlohmann::ordered_json::array();
   for (const std::string& name : model_names("vehicles")) {
     const VehicleSettings s = load_vehicle(name);
+    if (flags.json) {
+      json.push_back({{"name", name},
+                      {"title", s.title},
+                      {"rotors", s.rotors.size()},
+                      {"mass", s.mass},
+                      {"path", s.path}});
+      continue;
+    }
     fmt::print("{:<12}  {} rotors  {:>5.2f} kg  {}\n", name, s.rotors.size(), s.mass, s.title);
   }
+  if (flags.json) print_json(json);
 }
 
 /// Power at the shafts in hover, W.
@@ -35,10 +50,40 @@ double hover_power(const VehicleSettings& s) {
   return static_cast<double>(s.rotors.size()) * s.rotor.torque_coefficient * w * w * w;
 }
 
-void show_vehicle(const ShowFlags& flags) {
-  refuse_to_overwrite(flags.picture, flags.force);
-  VehicleSettings s = load_vehicle(flags.name);
-  if (!flags.controller.empty()) s.controller.kind = flags.controller;
+/// How long the battery lasts in hover, s; nothing without one.
+std::optional<double> hover_time(const VehicleSettings& s) {
+  if (s.battery.cells <= 0.0) return std::nullopt;
+  constexpr double kCellVoltage = 3.85;  // half full
+  const double current = hover_power(s) / s.battery.efficiency / (s.battery.cells * kCellVoltage);
+  return 3600.0 * s.battery.capacity / current;
+}
+
+nlohmann::ordered_json json_of(const StepResponse& r) {
+  nlohmann::ordered_json json;
+  json["step"] = r.name;
+  json["design_natural_frequency"] = r.design.natural_frequency;
+  if (!r.first_order) json["design_damping"] = r.design.damping;
+  json["bandwidth"] = r.bandwidth;
+  json["rise_time"] = r.rise_time;
+  json["overshoot"] = r.overshoot;
+  json["settling_time"] = r.settling;
+  return json;
+}
+
+void print_json_of(VehicleSettings& s, const std::vector<StepResponse>& responses) {
+  nlohmann::ordered_json json;
+  json["path"] = s.path;
+  json["hover"] = {{"rotor_speed", s.hover_speed()},
+                   {"shaft_power", hover_power(s)},
+                   {"thrust_to_weight", s.thrust_to_weight()}};
+  if (const auto time = hover_time(s)) json["hover"]["time"] = *time;
+  json["hull_radius"] = bounding_radius(s.hull());
+  for (const StepResponse& r : responses) json["responses"].push_back(json_of(r));
+  json["settings"] = json_of_settings(s);
+  print_json(json);
+}
+
+void print_vehicle(VehicleSettings& s, const std::vector<StepResponse>& responses) {
   const double hover = s.hover_speed();
   fmt::print("# {}\n", s.path);
   fmt::print("# hover: {:.0f} rad/s of {:.0f} ({:.0f} % of the speed, {:.0f} % of the thrust)\n",
@@ -50,14 +95,12 @@ void show_vehicle(const ShowFlags& flags) {
              s.thrust_to_weight(),
              bounding_radius(s.hull()),
              hover_power(s));
-  if (s.battery.cells > 0.0) {
-    const double current = hover_power(s) / s.battery.efficiency / (s.battery.cells * 3.85);
+  if (const auto time = hover_time(s)) {
     fmt::print("# battery: {:.0f} cells, {:.1f} Ah: about {:.0f} min of hover\n",
                s.battery.cells,
                s.battery.capacity,
-               60.0 * s.battery.capacity / current);
+               *time / 60.0);
   }
-  const auto responses = step_responses(s);
   fmt::print("# loops ({}), flown from hover:\n", s.controller.kind);
   fmt::print("#   {:<15} {:>10} {:>8} {:>10} {:>8} {:>10} {:>9}\n",
              "step",
@@ -68,18 +111,31 @@ void show_vehicle(const ShowFlags& flags) {
              "overshoot",
              "settled");
   for (const StepResponse& r : responses) {
-    fmt::print("#   {:<15} {:>4.1f} rad/s {:>8} {:>4.1f} rad/s {:>6.2f} s {:>8.1f} % {:>7.2f} s\n",
+    fmt::print("#   {:<15} {:>4.1f} rad/s {:>8} {:>4.1f} rad/s {:>6.2f} s {:>8} % {:>7.2f} s\n",
                r.name,
                r.design.natural_frequency,
                r.first_order ? std::string("1st ord.") : fmt::format("{:.2f}", r.design.damping),
                r.bandwidth,
                r.rise_time,
-               100.0 * r.overshoot,
+               fixed_text(100.0 * r.overshoot, 1),
                r.settling);
   }
   SettingsWriter writer;
   describe(writer, s);
   fmt::print("{}", writer.text());
+}
+
+void show_vehicle(const ShowFlags& flags) {
+  refuse_to_overwrite(flags.picture, flags.force);
+  VehicleSettings s = load_vehicle(flags.name);
+  refuse_same_file(flags.picture, s.path);
+  if (!flags.controller.empty()) s.controller.kind = flags.controller;
+  const auto responses = step_responses(s);
+  if (flags.json) {
+    print_json_of(s, responses);
+  } else {
+    print_vehicle(s, responses);
+  }
   if (!flags.picture.empty()) draw_step_responses(s, responses, flags.picture);
 }
 
@@ -89,17 +145,22 @@ void add_vehicle_command(CLI::App& parent, int& /*exit_code*/) {
   auto* app = parent.add_subcommand("vehicle", "Vehicles: a YAML file each");
   app->require_subcommand(1);
   auto* list = app->add_subcommand("list", "Names of the shipped vehicles");
-  list->callback([] { list_vehicles(); });
+  auto flags = std::make_shared<ShowFlags>();
+  list->add_flag("--json", flags->json, "JSON on stdout");
+  list->callback([flags] { list_vehicles(*flags); });
   auto* show = app->add_subcommand(
       "show", "What a vehicle's file says: hover, thrust to weight, loops, step responses");
-  auto flags = std::make_shared<ShowFlags>();
   show->add_option("name", flags->name, "A shipped vehicle or the path of a .yaml file")
       ->required();
   show->add_option(
       "--controller", flags->controller, "cascade or geometric, instead of the file's");
   show->add_option("--png", flags->picture, "Draw the step responses");
+  show->add_flag("--json", flags->json, "JSON on stdout");
   add_force_flag(*show, flags->force);
   show->callback([flags] { show_vehicle(*flags); });
+  auto* keys = app->add_subcommand(
+      "keys", "All keys of a vehicle file as a Markdown table (docs/vehicles.md)");
+  keys->callback([] { print_reference(vehicle_reference()); });
 }
 
 }  // namespace pointflight::apps
