@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <filesystem>
 
@@ -126,7 +127,7 @@ void describe_optics(SettingsVisitor& v, OpticsSettings& s) {
           s.range_at_80_percent);
 }
 
-constexpr std::int64_t kMostBeams = 16'000'000;
+constexpr double kMostBeams = 16e6;  // a scan
 constexpr std::size_t kMostChannels = 1024;
 
 /// Channels come from one of table, list and number.
@@ -157,6 +158,23 @@ void check_channels(const RingsSettings& s, const Fail& fail) {
   }
 }
 
+/// What a scan has at least; a table may have more channels than one.
+double beams_a_scan(const LidarSettings& s) {
+  if (s.pattern == "rotor") {
+    return s.rotor.shot_rate / s.rate * static_cast<double>(s.rotor.line_angles_deg.size());
+  }
+  if (s.pattern == "prisms") {
+    return s.prisms.shot_rate / s.rate * static_cast<double>(s.prisms.line_heights.size());
+  }
+  if (s.pattern == "csv") return s.csv.points_per_second / s.rate;
+  if (s.pattern == "grid") return static_cast<double>(s.grid.columns * s.grid.rows);
+  const double listed =
+      static_cast<double>(s.rings.elevations_deg.size()) + static_cast<double>(s.rings.channels);
+  const double firings = s.rings.convention == "ouster" ? static_cast<double>(s.rings.columns)
+                                                        : 1e6 / s.rings.cycle_us / s.rate;
+  return firings * std::max(1.0, listed);
+}
+
 LidarSettings read(SettingsReader& reader, const std::string& path) {
   LidarSettings settings;
   describe(reader, settings);
@@ -180,13 +198,13 @@ LidarSettings read(SettingsReader& reader, const std::string& path) {
   } else if (settings.pattern == "csv" && settings.csv.file.empty()) {
     fail("csv.file", "missing; name the CSV of directions");
   } else if (settings.pattern == "grid") {
-    if (grid.columns * grid.rows > kMostBeams) {
-      fail("grid.columns",
-           fmt::format("{} beams a scan; {} at most", grid.columns * grid.rows, kMostBeams));
-    }
     if (grid.projection == "pinhole" && (grid.fx <= 0.0 || grid.fy <= 0.0)) {
       fail("grid.projection", "pinhole needs fx and fy");
     }
+  }
+  if (const double beams = beams_a_scan(settings); beams > kMostBeams) {
+    fail(settings.pattern == "grid" ? "grid.columns" : "rate",
+         fmt::format("{:.0f} beams a scan; {:.0f} at most", beams, kMostBeams));
   }
   return settings;
 }

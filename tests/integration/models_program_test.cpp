@@ -67,7 +67,7 @@ TEST(Models, ListsAreJsonToo) {
 }
 
 TEST(Models, NumbersAreWrittenAsPeopleWrite) {
-  for (const std::string& name : model_names("lidars")) {
+  for (const char* name : {"avia", "vlp32c", "os1_32", "d455"}) {
     const std::string head = run(fmt::format("lidar show {}", name)).out;
     for (const char* odd : {"-0.00 ", "0000000", "9999999"}) {
       EXPECT_EQ(head.find(odd), std::string::npos) << name << ": " << odd << "\n" << head;

@@ -417,6 +417,16 @@ TEST(LidarSettings, BadFilesSayWhereAndWhat) {
   expect_contains(absent, "velodyne_vlp32c");
   expect_contains(error("range_max: 10\npattern: grid\ngrid: {projection: pinhole}\n"),
                   "fx and fy");
+  // memory for a scan is asked for at once
+  for (const char* text : {"pattern: rotor\nrate: 0.01\nrotor: {shot_rate: 1e7}\n",
+                           "pattern: prisms\nrate: 0.01\nprisms: {shot_rate: 1e7}\n",
+                           "pattern: rings\nrate: 0.1\nrings: {channels: 1024, cycle_us: 1}\n",
+                           "pattern: rings\nrings: {channels: 1024, convention: ouster, columns: "
+                           "65536}\n",
+                           "pattern: csv\nrate: 0.01\ncsv: {file: a.csv, points_per_second: 1e8}\n",
+                           "pattern: grid\ngrid: {columns: 16384, rows: 16384}\n"}) {
+    expect_contains(error(fmt::format("range_max: 10\n{}", text).c_str()), "16000000 at most");
+  }
 }
 
 }  // namespace
