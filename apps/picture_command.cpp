@@ -8,6 +8,7 @@
 #include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <sstream>
 
 #include "apps/commands.hpp"
@@ -133,18 +134,24 @@ RunPicture read_run(const fs::path& folder) {
   return picture;
 }
 
+/// The scenario that a run was flown from; nothing where its folder has none.
+std::optional<Scenario> scenario_of(const PictureFlags& flags) {
+  const fs::path file = fs::path(flags.run) / "scenario.yaml";
+  if (!fs::exists(file)) return std::nullopt;
+  return load_scenario(file.string());
+}
+
 /// The map that a run's scenario names, or the one that is given instead: the same, where the run
 /// says which that was.
-std::shared_ptr<const SurfelMap> map_of(const PictureFlags& flags) {
-  const fs::path file = fs::path(flags.run) / "scenario.yaml";
-  if (!fs::exists(file)) {
+std::shared_ptr<const SurfelMap> map_of(const PictureFlags& flags,
+                                        std::optional<Scenario> scenario) {
+  if (!scenario) {
     if (!flags.map.empty()) return SurfelMap::open(flags.map);
-    throw InputError(
-        fmt::format("{}: is not there; give the map that was flown in with --map", file.string()));
+    throw InputError(fmt::format("{}: is not there; give the map that was flown in with --map",
+                                 (fs::path(flags.run) / "scenario.yaml").string()));
   }
-  Scenario scenario = load_scenario(file.string());
-  if (!flags.map.empty()) scenario.map = fs::absolute(flags.map).string();
-  return scenario.open_map();
+  if (!flags.map.empty()) scenario->map = fs::absolute(flags.map).string();
+  return scenario->open_map();
 }
 
 }  // namespace
@@ -159,8 +166,14 @@ void add_picture_command(CLI::App& parent, int& /*exit_code*/) {
   app->callback([flags] {
     // the run's own picture may be drawn again
     if (!flags->output.empty()) refuse_to_overwrite(flags->output, flags->force);
-    const auto map = map_of(*flags);
-    const RunPicture picture = read_run(flags->run);
+    const auto scenario = scenario_of(*flags);
+    const auto map = map_of(*flags, scenario);
+    RunPicture picture = read_run(flags->run);
+    if (scenario) {
+      for (const VehicleSetup& vehicle : scenario->fleet()) {
+        picture.waypoints.push_back(vehicle.mission.waypoints);
+      }
+    }
     const std::string path =
         flags->output.empty() ? (fs::path(flags->run) / "overview.png").string() : flags->output;
     draw_overview(*map, picture, path);

@@ -271,10 +271,13 @@ std::string LidarSettings::place(const std::string& key) const {
 std::vector<std::string*> tables_of(LidarSettings& settings) {
   std::vector<std::string*> tables;
   const std::string folder = std::filesystem::path(settings.path).parent_path().string();
-  for (std::string* table : {&settings.rings.table, &settings.csv.file}) {
-    if (table->empty()) continue;
-    *table = resolve_path(*table, folder);
-    tables.push_back(table);
+  if (std::string& table = settings.rings.table; !table.empty()) {
+    table = settings.at("rings.table", [&] { return find_table("lidars", table, folder); });
+    tables.push_back(&table);
+  }
+  if (std::string& file = settings.csv.file; !file.empty()) {
+    file = resolve_path(file, folder);
+    tables.push_back(&file);
   }
   return tables;
 }

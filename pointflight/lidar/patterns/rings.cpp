@@ -69,7 +69,7 @@ CsvTable table_of(std::vector<Channel> channels, const RingsSettings& s, const s
 /// Refuses a time between channels where the table has the time of each.
 void check_interval(const LidarSettings& settings, const CsvTable& table) {
   const int time = table.find("fire_time_us");
-  if (time < 0 || !settings.lines.contains("rings.channel_interval_us")) return;
+  if (time < 0 || settings.rings.channel_interval_us <= 0.0) return;
   for (std::size_t row = 0; row < table.rows(); ++row) {
     if (std::isnan(table.at(row, time))) return;
   }
