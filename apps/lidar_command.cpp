@@ -22,6 +22,7 @@ struct LidarFlags {
   std::string name;
   std::string picture;
   bool json = false;
+  bool path = false;  ///< Nothing but where the file lies.
   bool force = false;
 };
 
@@ -93,6 +94,10 @@ void show_lidar(const LidarFlags& flags) {
   refuse_same_file(flags.picture, s.path);
   refuse_to_overwrite(flags.picture, flags.force);
   const ScanStatistics scan = scan_statistics(s);
+  if (flags.path) {
+    fmt::print("{}\n", s.path);
+    return;
+  }
   if (flags.json) {
     nlohmann::ordered_json json;
     json["path"] = s.path;
@@ -127,6 +132,7 @@ void add_lidar_command(CLI::App& parent, int& /*exit_code*/) {
       "--png", flags->picture, "Draw its pattern after 0.1 s and 1 s, and its coverage over time");
   add_force_flag(*show, flags->force);
   show->add_flag("--json", flags->json, "JSON on stdout");
+  show->add_flag("--path", flags->path, "Say where its file lies, to copy it");
   show->callback([flags] { show_lidar(*flags); });
   auto* keys = app->add_subcommand(
       "keys", "All keys of a sensor file as a Markdown table (docs/sensors.md)");

@@ -6,6 +6,7 @@
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
 #include <algorithm>
+#include <array>
 #include <filesystem>
 #include <thread>
 
@@ -69,12 +70,32 @@ class RosSession::ScanCount : public SampleSink {
  public:
   void on_scan(const Scan& scan, const PoseAt& /*pose_at*/) override {
     ++scans;
-    if (const auto late = lateness ? lateness(scan.end) : std::nullopt) delays.push_back(*late);
+    if (const auto late = lateness ? lateness(scan.end) : std::nullopt) {
+      const double bin = std::clamp(*late / kBin, 0.0, static_cast<double>(delays.size() - 1));
+      ++delays[static_cast<std::size_t>(bin)];
+      ++delayed;
+    }
   }
+
+  /// The delay that a share of all scans stayed below, s.
+  [[nodiscard]] double delay_at(double share) const {
+    std::uint64_t below = 0;
+    std::size_t bin = 0;
+    const auto wanted = static_cast<std::uint64_t>(share * static_cast<double>(delayed));
+    while (bin + 1 < delays.size() && below + delays[bin] <= wanted) {
+      below += delays[bin++];
+    }
+    return kBin * (static_cast<double>(bin) + 0.5);
+  }
+
   std::uint64_t scans = 0;
   std::uint64_t answered = 0;
   Lateness lateness;
-  std::vector<double> delays;  ///< From a scan's end until it was handed over, s.
+  std::uint64_t delayed = 0;  ///< Scans whose delay was measured.
+
+ private:
+  static constexpr double kBin = 1e-4;         // s
+  std::array<std::uint64_t, 100000> delays{};  ///< From a scan's end until it was handed over.
 };
 
 void add_ros_flags(CLI::App& app, RosFlags& flags) {
@@ -366,12 +387,10 @@ void RosSession::close() {
       log(fmt::format("{} messages were dropped for slow subscribers", transport->dropped()));
     }
   }
-  if (scans_ && !scans_->delays.empty()) {
-    auto& delays = scans_->delays;
-    std::sort(delays.begin(), delays.end());
+  if (scans_ && scans_->delayed > 0) {
     log(fmt::format("scans left {:.1f} ms after their end (median), {:.1f} ms at p99",
-                    1e3 * delays[delays.size() / 2],
-                    1e3 * delays[delays.size() * 99 / 100]));
+                    1e3 * scans_->delay_at(0.5),
+                    1e3 * scans_->delay_at(0.99)));
   }
   if (const auto count = inbox_ ? inbox_->refused().count : 0; count > 0) {
     log(fmt::format("{} messages were left out; the last: {}", count, inbox_->refused().last));

@@ -25,6 +25,7 @@ struct ShowFlags {
   std::string picture;
   bool force = false;
   bool json = false;
+  bool path = false;  ///< Nothing but where the file lies.
 };
 
 void list_vehicles(const ShowFlags& flags) {
@@ -130,6 +131,10 @@ void show_vehicle(const ShowFlags& flags) {
   VehicleSettings s = load_vehicle(flags.name);
   refuse_same_file(flags.picture, s.path);
   if (!flags.controller.empty()) s.controller.kind = flags.controller;
+  if (flags.path) {
+    fmt::print("{}\n", s.path);
+    return;
+  }
   const auto responses = step_responses(s);
   if (flags.json) {
     print_json_of(s, responses);
@@ -156,6 +161,7 @@ void add_vehicle_command(CLI::App& parent, int& /*exit_code*/) {
       "--controller", flags->controller, "cascade or geometric, instead of the file's");
   show->add_option("--png", flags->picture, "Draw the step responses");
   show->add_flag("--json", flags->json, "JSON on stdout");
+  show->add_flag("--path", flags->path, "Say where its file lies, to copy it");
   add_force_flag(*show, flags->force);
   show->callback([flags] { show_vehicle(*flags); });
   auto* keys = app->add_subcommand(

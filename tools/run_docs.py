@@ -3,11 +3,12 @@
 
 usage: run_docs.py BUILD_FOLDER [PAGE...]
 
-Installs the build into a folder of its own and runs each page's shell blocks there, line by line, with
-that program in the path. The README comes first; every other page starts with the files that it left.
+Installs the build into a folder of its own ($POINTFLIGHT_INSTALLED: where it is already) and runs each
+page's shell blocks there, line by line, with that program in the path. The README comes first; every other page starts with the files that it left.
 A comment on the line before a block says what else it is:
 
-  <!-- docs: file NAME -->          the block is a file of that name, which later blocks use
+  <!-- docs: file NAME -->          the block is a file of that name, which later blocks use;
+                                    `file NAME then COMMAND` runs a command on it
   <!-- docs: with A=B ... -->       run, with B under the name A: what a user has of his own
   <!-- docs: arguments REASON -->   not run; commands, flags and launch files in it must exist
   <!-- docs: text -->               a drawing, a formula, what a program prints
@@ -65,8 +66,14 @@ def blocks_of(page):
 
 def commands_of(block):
     """Its lines, those that end in \\ joined, without ./dev's verbs, comments and empty ones."""
-    lines, whole = [], ""
+    lines, whole, ends_at = [], "", None
     for line in block.text:
+        if ends_at:  # within a here-document
+            lines.append(line)
+            ends_at = None if line == ends_at else ends_at
+            continue
+        here = re.search(r"<<'?(\w+)'?", line)
+        ends_at = here.group(1) if here else None
         whole += line
         if whole.endswith("\\"):
             whole = whole[:-1]
@@ -142,8 +149,11 @@ def run(block, folder, environment):
     if block.kind == "with":
         lay_out(block, folder)
     script = "\n".join(commands_of(block))
-    if not script:
-        return
+    if script:
+        execute(script, block, folder, environment)
+
+
+def execute(script, block, folder, environment):
     done = subprocess.run(["bash", "-eo", "pipefail", "-c", script], cwd=folder, env=environment,
                           capture_output=True, text=True, timeout=280)
     if done.returncode != 0:
@@ -160,6 +170,8 @@ def run_page(page, folder, environment, tree):
             path = folder / block.words[0]
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text("\n".join(block.text) + "\n")
+            if block.words[1:2] == ["then"]:
+                execute(" ".join(block.words[2:]), block, folder, environment)
         elif block.kind == "arguments":
             check_arguments(block, tree)
         elif block.kind != "text":
@@ -173,8 +185,9 @@ def main():
     build = Path(sys.argv[1]).resolve()
     pages = sys.argv[2:] or [str(page.relative_to(SOURCE)) for page in sorted((SOURCE / "docs").glob("*.md"))]
     with tempfile.TemporaryDirectory(prefix="pointflight_docs_") as scratch:
-        prefix = Path(scratch) / "usr"
-        subprocess.run(["cmake", "--install", build, "--prefix", prefix], check=True, capture_output=True)
+        prefix = Path(os.environ.get("POINTFLIGHT_INSTALLED", Path(scratch) / "usr"))
+        if not prefix.exists():
+            subprocess.run(["cmake", "--install", build, "--prefix", prefix], check=True, capture_output=True)
         environment = dict(os.environ, PATH=f"{prefix}/bin:{os.environ['PATH']}",
                            CMAKE_PREFIX_PATH=str(prefix), POINTFLIGHT_PREFIX=str(prefix),
                            SOURCE=str(SOURCE), CLICOLOR="0")
@@ -184,7 +197,7 @@ def main():
         run_page("README.md", first, environment, tree)
         for number, page in enumerate(pages):
             folder = Path(scratch) / f"page{number}"
-            subprocess.run(["cp", "-al", first, folder], check=True)
+            subprocess.run(["cp", "-a", first, folder], check=True)
             run_page(page, folder, environment, tree)
 
 

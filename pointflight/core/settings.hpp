@@ -155,6 +155,8 @@ class SettingsChecker : public SettingsVisitor {
               std::span<const std::string_view> choices) override;
 
  protected:
+  /// Keys without effect are not looked at.
+  bool enter_condition(bool holds, std::string_view /*condition*/) override { return holds; }
   bool enter(const Key& key) override;
   void leave() override;
   std::size_t enter_list(const Key& key, std::size_t size) override;

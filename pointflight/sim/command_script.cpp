@@ -40,10 +40,16 @@ void describe(SettingsVisitor& v, CommandSettings& s) {
     const bool holds = std::find(kinds.begin(), kinds.end(), s.kind) != kinds.end();
     v.only_if(holds, fmt::format("kind: {}", fmt::join(kinds, ", ")), keys);
   };
-  for_kinds({"acceleration", "velocity", "position", "waypoint"}, [&](SettingsVisitor& w) {
-    w.value({"vector", "", "acceleration m/s^2, velocity m/s, position or waypoint m", -kFar, kFar},
+  const bool has_vector = s.kind == "acceleration" || s.kind == "velocity" ||
+                          s.kind == "position" || s.kind == "waypoint";
+  v.only_if(
+      has_vector,
+      "kind: acceleration, velocity, position, waypoint; body_rates has rates_deg",
+      [&](SettingsVisitor& w) {
+        w.value(
+            {"vector", "", "acceleration m/s^2, velocity m/s, position or waypoint m", -kFar, kFar},
             s.vector);
-  });
+      });
   for_kinds({"body_rates"}, [&](SettingsVisitor& w) {
     w.value({"rates_deg", "deg/s", "about the body's axes", -36000, 36000}, s.rates_deg);
   });

@@ -201,8 +201,10 @@ TEST(Scenario, MistakesInASwarmSayWhere) {
                   "s.yaml:4: faults[0].value: 60 of kind rotor");
   expect_contains(error(start + "faults:\n  - kind: imu\n    from: 3\n    until: 2\n"),
                   "s.yaml:6: faults[0].until: 2 s is not after 3 s");
-  expect_contains(error(start + "commands:\n  - kind: body_rates\n    vector: [10, 0, 0]\n"),
-                  "s.yaml:5: commands[0].vector: body rates are given as rates_deg");
+  expect_contains(
+      error(start + "commands:\n  - kind: body_rates\n    vector: [10, 0, 0]\n"),
+      "s.yaml:5: commands[0].vector: has no effect here: it is for `kind: acceleration, "
+      "velocity, position, waypoint; body_rates has rates_deg`");
   expect_contains(error(start + "commands:\n  - {kind: waypoint, vector: [1e300, 0, 0]}\n"),
                   "s.yaml:4: commands[0].vector: 1e300 is out of range");
   expect_contains(error(start + "mission:\n  waypoints:\n    - [1e300, 0, 0]\n"),

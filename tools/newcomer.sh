@@ -1,0 +1,59 @@
+#!/usr/bin/env bash
+# A bare Debian in which a new user follows the docs and nothing else: the demo, an own cloud to a flight, an own
+# sensor, an own vehicle, an own planner from an installed prefix.
+# usage: newcomer.sh [FOLDER]   (root; the tree is kept in FOLDER for a next time, else made anew)
+set -eu
+source=$(cd "$(dirname "$0")/.." && pwd)
+[ "$(id -u)" = 0 ] || { echo "newcomer: needs root, for debootstrap and chroot" >&2; exit 2; }
+root=${1:-}
+if [ -z "$root" ]; then
+  root=$(mktemp -d)
+  # the mounts below are gone with their namespace by then
+  trap 'rm -rf --one-file-system "$root"' EXIT
+fi
+sources=/etc/apt
+if [ ! -x "$root/bin/bash" ]; then
+  echo "== a bare Debian 12 in $root" >&2
+  mirror=$(sed -n 's/^URIs: *//p; s/^deb \(\[[^]]*\] \)\?\([^ ]*\) .*/\2/p' $sources/sources.list \
+           $sources/sources.list.d/* 2>/dev/null | head -1)
+  debootstrap --variant=minbase bookworm "$root" "${mirror:-http://deb.debian.org/debian}" >/dev/null
+  # the same sources of packages as here
+  for file in $sources/apt.conf.d $sources/sources.list $sources/sources.list.d $sources/auth.conf.d; do
+    [ ! -e "$file" ] || cp -a "$file" "$root/etc/apt/"
+  done
+fi
+rm -rf "$root/home/new"
+mkdir -p "$root/home/new"
+git clone -q "$source" "$root/home/new/pointflight"
+# what the user brings: a cloud of a place, as text
+cat >"$root/home/new/day.sh" <<'END'
+set -eux
+export DEBIAN_FRONTEND=noninteractive LC_ALL=C
+cd /home/new/pointflight
+./dev demo
+test -s build/demo/run/overview.png
+cmake --install build/release >/dev/null           # README, "Install"
+cd /home/new
+# an own cloud to a flight: README, "Your own map"
+awk 'BEGIN{srand(3); for(i=0;i<400000;i++){x=rand()*20;y=rand()*14;z=rand()*4;s=int(rand()*6);
+  if(s<2)z=0; else if(s==2)x=0; else if(s==3)x=20; else if(s==4)y=0; else y=14; print x,y,z}}' >hall.xyz
+pointflight map import hall.xyz -o hall.pfmap
+pointflight map info hall.pfmap --png hall.png
+pointflight fly hall.pfmap -o run
+pointflight fly run/scenario.yaml -o again
+diff -r -x timing.json run again
+# an own sensor and vehicle, a planner outside of the tree: their pages, block by block
+cd pointflight
+apt-get -qq install -y --no-install-recommends python3 >/dev/null  # runs the blocks
+POINTFLIGHT_INSTALLED=/usr/local tools/run_docs.py build/release \
+  docs/sensors.md docs/vehicles.md docs/maps.md docs/planner.md
+cmake --build build/release --target uninstall >/dev/null
+! command -v pointflight
+END
+echo "== the first day" >&2
+# mounts of its own, which go with it
+unshare --mount --pid --fork sh -c '
+  mount -t proc proc "$1/proc"
+  mount --bind /dev "$1/dev"
+  [ ! -e /etc/resolv.conf ] || cp -L /etc/resolv.conf "$1/etc/"
+  chroot "$1" bash /home/new/day.sh' sh "$root"
