@@ -4,18 +4,46 @@
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
 #include <memory>
+#include <nlohmann/json.hpp>
 
 #include "apps/commands.hpp"
 #include "apps/modules.hpp"
+#include "apps/settings_json.hpp"
 #include "recording/mcap_reader.hpp"
 
 namespace pointflight::apps {
 namespace {
 
-void show(const std::string& path) {
+nlohmann::ordered_json json_of(const std::string& path, const RecordingInfo& info, double seconds) {
+  nlohmann::ordered_json json;
+  json["file"] = path;
+  json["format"] = info.format;
+  json["complete"] = info.complete;
+  json["compression"] = info.compression;
+  json["messages"] = info.messages;
+  json["start_ns"] = info.start;
+  json["end_ns"] = info.end;
+  json["attachments"] = nlohmann::ordered_json::array();
+  for (const auto& attachment : info.attachments) {
+    json["attachments"].push_back({{"name", attachment.name}, {"bytes", attachment.size}});
+  }
+  json["topics"] = nlohmann::ordered_json::array();
+  for (const auto& topic : info.topics) {
+    const double rate = seconds > 0.0 ? static_cast<double>(topic.messages) / seconds : 0.0;
+    json["topics"].push_back(
+        {{"name", topic.name}, {"type", topic.type}, {"messages", topic.messages}, {"rate", rate}});
+  }
+  return json;
+}
+
+void show(const std::string& path, bool as_json) {
   const bool is_bag = path.ends_with(".bag") || path.ends_with(".bag.active");
   const RecordingInfo info = is_bag ? ros1_module().read_bag(path) : read_mcap(path);
   const double seconds = 1e-9 * static_cast<double>(info.end - info.start);
+  if (as_json) {
+    print_json(json_of(path, info, seconds));
+    return;
+  }
   fmt::print("{}\n", path);
   fmt::print("  format       {}{}\n",
              info.format,
@@ -50,7 +78,9 @@ void add_bag_command(CLI::App& parent, int& /*exit_code*/) {
   auto path = std::make_shared<std::string>();
   info->add_option("file", *path, "A .mcap or .bag, or a .mcap.active that was cut short")
       ->required();
-  info->callback([path] { show(*path); });
+  auto as_json = std::make_shared<bool>(false);
+  info->add_flag("--json", *as_json, "JSON on stdout");
+  info->callback([path, as_json] { show(*path, *as_json); });
 }
 
 }  // namespace pointflight::apps

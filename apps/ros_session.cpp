@@ -129,6 +129,16 @@ void add_ros_flags(CLI::App& app, RosFlags& flags) {
 }
 
 void prepare_for_ros(const RosFlags& flags, double rate, Scenario& scenario) {
+  for (const auto& [flag, given] : {std::pair{"--lockstep", flags.lockstep > 0.0},
+                                    std::pair{"--stay", flags.stay},
+                                    std::pair{"--no-wait", flags.no_wait}}) {
+    if (given && !flags.is_live()) {
+      throw InputError(fmt::format("{}: has no effect without --ros1 or --ros2", flag));
+    }
+  }
+  if (!flags.profile.empty() && !flags.any()) {
+    throw InputError("--profile: has no effect without --ros1, --ros2 or --record");
+  }
   if (!flags.any()) return;
   const RosProfile profile = profile_for(scenario, flags.profile);
   scenario.output.odometry_rate =

@@ -8,9 +8,11 @@
 #include <cmath>
 #include <filesystem>
 #include <memory>
+#include <nlohmann/json.hpp>
 
 #include "apps/commands.hpp"
 #include "apps/flags.hpp"
+#include "apps/settings_json.hpp"
 #include "apps/terminal.hpp"
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/input_error.hpp"
@@ -94,19 +96,24 @@ void new_scenario(const NewFlags& flags) {
   fmt::print("{}\n", flags.output);
 }
 
-void check_scenario(const std::string& path) {
-  const Scenario scenario = load_scenario(path);
-  const auto map = scenario.open_map();
-  const Executor executor;
-  const Simulation simulation(scenario, map, executor);
-  // whatever --ros1, --ros2 and --record will ask for
-  const RosProfile profile = profile_for(scenario);
-  output_streams(simulation, profile);
-  warn_about(scenario, *map);
-  for (const std::string& warning : start_warnings(simulation, executor)) log(warning);
+nlohmann::ordered_json json_of(const std::string& path, const Simulation& simulation) {
+  nlohmann::ordered_json json;
+  json["file"] = path;
+  json["duration"] = to_seconds(simulation.end_time());
+  json["obstacles"] = simulation.obstacle_count();
+  json["vehicles"] = nlohmann::ordered_json::array();
   for (std::size_t v = 0; v < simulation.vehicle_count(); ++v) {
-    for (const std::string& line : simulation.vehicle(v).foreseen()) log("warning: " + line);
+    const VehicleAgent& agent = simulation.vehicle(v);
+    json["vehicles"].push_back({{"name", agent.setup().name},
+                                {"model", agent.setup().model},
+                                {"lidars", agent.lidars().size()},
+                                {"waypoints", agent.setup().mission.waypoints.size()},
+                                {"mission_length", agent.mission().length()}});
   }
+  return json;
+}
+
+void print_scenario(const std::string& path, const Simulation& simulation) {
   fmt::print("{}: ready: {:.1f} s\n", path, to_seconds(simulation.end_time()));
   for (std::size_t v = 0; v < simulation.vehicle_count(); ++v) {
     const VehicleAgent& agent = simulation.vehicle(v);
@@ -119,6 +126,26 @@ void check_scenario(const std::string& path) {
                agent.mission().length());
   }
   if (simulation.obstacle_count() > 0) fmt::print("  {} obstacles\n", simulation.obstacle_count());
+}
+
+void check_scenario(const std::string& path, bool as_json) {
+  const Scenario scenario = load_scenario(path);
+  const auto map = scenario.open_map();
+  const Executor executor;
+  const Simulation simulation(scenario, map, executor);
+  // whatever --ros1, --ros2 and --record will ask for
+  const RosProfile profile = profile_for(scenario);
+  output_streams(simulation, profile);
+  warn_about(scenario, *map);
+  for (const std::string& warning : start_warnings(simulation, executor)) log(warning);
+  for (std::size_t v = 0; v < simulation.vehicle_count(); ++v) {
+    for (const std::string& line : simulation.vehicle(v).foreseen()) log("warning: " + line);
+  }
+  if (as_json) {
+    print_json(json_of(path, simulation));
+  } else {
+    print_scenario(path, simulation);
+  }
 }
 
 }  // namespace
@@ -230,7 +257,9 @@ void add_scenario_command(CLI::App& parent, int& /*exit_code*/) {
   auto* check = app->add_subcommand("check", "Read a scenario and say whether it can be flown");
   auto path = std::make_shared<std::string>();
   check->add_option("scenario", *path, "A .yaml")->required();
-  check->callback([path] { check_scenario(*path); });
+  auto as_json = std::make_shared<bool>(false);
+  check->add_flag("--json", *as_json, "JSON on stdout");
+  check->callback([path, as_json] { check_scenario(*path, *as_json); });
 
   auto* keys = app->add_subcommand("keys", "All keys as a Markdown table (docs/scenario.md)");
   keys->callback([] {
