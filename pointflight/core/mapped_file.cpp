@@ -25,6 +25,13 @@ std::string error_text(int error) {
   return std::generic_category().message(error);
 }
 
+[[noreturn]] void refuse(const std::string& path, const struct stat& status) {
+  const bool streams = S_ISFIFO(status.st_mode) || S_ISSOCK(status.st_mode);
+  throw InputError(fmt::format("{}: {}not a regular file; give the path of a file",
+                               path,
+                               streams ? "a pipe or socket, " : ""));
+}
+
 /// A mapping as a signal handler can look it up.
 struct Mapping {
   std::atomic<std::uintptr_t> begin{0};  ///< 0: free
@@ -129,28 +136,45 @@ void throw_if_mapped_file_was_cut() {
       path));
 }
 
+void require_regular_file(const std::string& path) {
+  struct stat status {};
+  if (::stat(path.c_str(), &status) != 0) {
+    throw InputError(fmt::format("{}: cannot open: {}; check the path", path, error_text(errno)));
+  }
+  if (!S_ISREG(status.st_mode)) refuse(path, status);
+}
+
 MappedFile::MappedFile(const std::string& path) : path_(path) {
+  require_regular_file(path);
+  // without waiting, should a pipe have taken the file's place meanwhile
   const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
   if (file < 0)
     throw InputError(fmt::format("{}: cannot open: {}; check the path", path, error_text(errno)));
+  try {
+    map(file);
+  } catch (...) {
+    ::close(file);
+    throw;
+  }
+  ::close(file);
+}
+
+MappedFile::MappedFile(int descriptor, std::string name) : path_(std::move(name)) {
+  map(descriptor);
+}
+
+void MappedFile::map(int descriptor) {
   struct stat status {};
-  if (::fstat(file, &status) != 0 || !S_ISREG(status.st_mode)) {
-    ::close(file);
-    throw InputError(fmt::format("{}: not a regular file; give the path of a file", path));
-  }
+  if (::fstat(descriptor, &status) != 0 || !S_ISREG(status.st_mode)) refuse(path_, status);
   size_ = static_cast<std::size_t>(status.st_size);
-  if (size_ > 0) {
-    void* address = ::mmap(nullptr, size_, PROT_READ, MAP_SHARED, file, 0);
-    const int error = errno;
-    ::close(file);
-    if (address == MAP_FAILED) {
-      throw InputError(fmt::format("{}: cannot map into memory: {}", path, error_text(error)));
-    }
-    data_ = static_cast<const std::byte*>(address);
-    register_mapping(data_, size_, path_);
-  } else {
-    ::close(file);
+  if (size_ == 0) return;
+  void* address = ::mmap(nullptr, size_, PROT_READ, MAP_SHARED, descriptor, 0);
+  if (address == MAP_FAILED) {
+    size_ = 0;
+    throw InputError(fmt::format("{}: cannot map into memory: {}", path_, error_text(errno)));
   }
+  data_ = static_cast<const std::byte*>(address);
+  register_mapping(data_, size_, path_);
 }
 
 MappedFile::~MappedFile() {

@@ -7,11 +7,19 @@
 
 namespace pointflight {
 
+/// Throws InputError where the path is missing, or is a folder, a pipe, a socket or a device: these
+/// have no beginning to come back to, and opening a pipe waits for whoever writes into it. What
+/// reads a user's file by other means than MappedFile asks this first.
+void require_regular_file(const std::string& path);
+
 /// A file mapped read-only: pages come from the page cache and are shared between processes.
 class MappedFile {
  public:
   /// Throws InputError where the file is missing, unreadable or not a regular file.
   explicit MappedFile(const std::string& path);
+
+  /// Maps an open file, which stays open; `name` stands for its path in messages.
+  MappedFile(int descriptor, std::string name);
   ~MappedFile();
   MappedFile(MappedFile&& other) noexcept;
   MappedFile& operator=(MappedFile&& other) noexcept;
@@ -26,6 +34,8 @@ class MappedFile {
   void release_before(std::size_t offset) const;
 
  private:
+  void map(int descriptor);
+
   std::string path_;
   const std::byte* data_ = nullptr;
   std::size_t size_ = 0;

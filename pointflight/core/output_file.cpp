@@ -50,6 +50,12 @@ void OutputFile::write(std::string_view text) {
   write(std::as_bytes(std::span<const char>(text.data(), text.size())));
 }
 
+void OutputFile::write_at(std::size_t offset, std::span<const std::byte> bytes) {
+  if (::fseeko(file_, static_cast<off_t>(offset), SEEK_SET) != 0) fail(errno);
+  write(bytes);
+  if (::fseeko(file_, 0, SEEK_END) != 0) fail(errno);
+}
+
 void OutputFile::commit() {
   throw_if_mapped_file_was_cut();
   if (std::fflush(file_) != 0) fail(errno);

@@ -24,6 +24,8 @@ class OutputFile {
 
   void write(std::span<const std::byte> bytes);
   void write(std::string_view text);
+  /// Replaces bytes written before: a header that counts what came after it.
+  void write_at(std::size_t offset, std::span<const std::byte> bytes);
   void commit();
 
   [[nodiscard]] const std::string& path() const { return path_; }

@@ -27,23 +27,34 @@ constexpr std::size_t kPage = 4096;
                   std::generic_category().message(error)));
 }
 
-/// A file that has no name.
-int open_nameless(const std::string& folder, std::size_t bytes) {
-  int file = ::open(folder.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, 0600);
+std::string folder_or_default(std::string folder) {
+  return folder.empty() ? std::filesystem::temp_directory_path().string() : std::move(folder);
+}
+
+/// -1 where there is none; errno says why.
+int open_nameless(const std::string& folder) {
+  const int file = ::open(folder.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, 0600);
   if (file >= 0) return file;
   // some network file systems cannot
   std::string name = folder + "/pointflight-XXXXXX";
-  file = ::mkstemp(name.data());
-  if (file < 0) fail(folder, bytes, errno);
-  ::unlink(name.c_str());
-  return file;
+  const int named = ::mkostemp(name.data(), O_CLOEXEC);
+  if (named >= 0) ::unlink(name.c_str());
+  return named;
 }
 
 }  // namespace
 
+int open_nameless_file(const std::string& folder) {
+  const std::string place = folder_or_default(folder);
+  const int file = open_nameless(place);
+  if (file >= 0) return file;
+  throw InputError(fmt::format("{}: no file can be made there: {}; choose another place",
+                               place,
+                               std::generic_category().message(errno)));
+}
+
 Scratch::Scratch(std::string folder, std::size_t memory_bytes) {
-  state_->folder =
-      folder.empty() ? std::filesystem::temp_directory_path().string() : std::move(folder);
+  state_->folder = folder_or_default(std::move(folder));
   state_->limit = memory_bytes;
 }
 
@@ -54,7 +65,8 @@ ScratchBlock::ScratchBlock(Scratch& scratch, std::size_t bytes)
   int file = -1;
   if (in_file_) {
     scratch_->in_memory -= bytes_;
-    file = open_nameless(scratch_->folder, bytes_);
+    file = open_nameless(scratch_->folder);
+    if (file < 0) fail(scratch_->folder, bytes_, errno);
     // takes the room now: a full disk is an error here and not a signal later
     const int error = ::posix_fallocate(file, 0, static_cast<off_t>(bytes_));
     if (error != 0) {

@@ -11,6 +11,10 @@
 
 namespace pointflight {
 
+/// A file without a name in `folder` (empty: that of temporary files), open for reading and
+/// writing: it vanishes with its last descriptor, which is the caller's. Throws InputError.
+int open_nameless_file(const std::string& folder);
+
 /// Room for large arrays: in memory until together they reach a limit, beyond that in files without
 /// a name in a folder, mapped, which the kernel can write out whenever memory is short. The files
 /// vanish with the process, however it ends.

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace pointflight {
+
+/// What a child may use before it is ended.
+struct ChildLimits {
+  double cpu_seconds = 20.0;
+  std::size_t memory_bytes = std::size_t{2} << 30;  ///< Beyond what the process has; not under
+                                                    ///< sanitizers, whose shadow would count.
+};
+
+/// Where a child's work leaves its results.
+class ChildOutput {
+ public:
+  explicit ChildOutput(int pipe) : pipe_(pipe) {}
+  /// Bytes for the parent, after those of earlier calls.
+  void write(std::span<const std::byte> bytes);
+
+ private:
+  int pipe_;
+};
+
+/// What came back from a child.
+struct ChildResult {
+  std::vector<std::byte> bytes;
+  std::string failure;  ///< Empty where the work was done, else why not: for a message.
+};
+
+/// Runs `work` in a copy of this process (fork), so that a library that crashes, hangs or takes all
+/// memory ends the copy and not the program. Of what `work` changes only what it writes comes back;
+/// what it throws comes back as `failure`. The copy has the calling thread only and nothing on
+/// standard input, output and error; it ends with `_exit`, so no destructor of a static object runs
+/// twice.
+///
+/// `while_waiting` is called about ten times a second and may throw, which ends the child. Throws
+/// InputError where the system gives no process.
+ChildResult run_in_child(const std::function<void(ChildOutput&)>& work,
+                         const ChildLimits& limits,
+                         const std::function<void()>& while_waiting = {});
+
+}  // namespace pointflight
