@@ -9,6 +9,7 @@
 #include "apps/commands.hpp"
 #include "apps/modules.hpp"
 #include "apps/settings_json.hpp"
+#include "pointflight/core/mapped_file.hpp"
 #include "recording/mcap_reader.hpp"
 
 namespace pointflight::apps {
@@ -37,6 +38,7 @@ nlohmann::ordered_json json_of(const std::string& path, const RecordingInfo& inf
 }
 
 void show(const std::string& path, bool as_json) {
+  require_regular_file(path);
   const bool is_bag = path.ends_with(".bag") || path.ends_with(".bag.active");
   const RecordingInfo info = is_bag ? ros1_module().read_bag(path) : read_mcap(path);
   const double seconds = 1e-9 * static_cast<double>(info.end - info.start);

@@ -15,6 +15,7 @@
 #include "apps/flags.hpp"
 #include "apps/pictures.hpp"
 #include "pointflight/core/input_error.hpp"
+#include "pointflight/core/mapped_file.hpp"
 #include "pointflight/io/cloud_reader.hpp"
 #include "pointflight/io/csv_table.hpp"
 
@@ -32,9 +33,11 @@ struct PictureFlags {
 
 /// Lines of a text file split at commas, the first left out; for tables with words in them.
 std::vector<std::vector<std::string>> rows_of(const fs::path& path) {
-  std::ifstream file(path);
-  if (!file)
+  std::error_code ignored;
+  if (!fs::exists(path, ignored))
     throw InputError(fmt::format("{}: cannot open; is this a run's folder?", path.string()));
+  require_regular_file(path.string());
+  std::ifstream file(path);
   std::vector<std::vector<std::string>> rows;
   std::string line;
   std::getline(file, line);
@@ -90,6 +93,7 @@ RunPicture read_run(const fs::path& folder) {
   RunPicture picture;
   nlohmann::json summary;
   try {
+    require_regular_file((folder / "summary.json").string());
     summary = nlohmann::json::parse(std::ifstream(folder / "summary.json"));
     const auto& vehicles = summary.at("vehicles");
     RunFigures figures;

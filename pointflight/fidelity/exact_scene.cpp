@@ -12,6 +12,7 @@
 
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/input_error.hpp"
+#include "pointflight/core/mapped_file.hpp"
 #include "pointflight/core/math.hpp"
 #include "pointflight/core/resources.hpp"
 #include "pointflight/geometry/morton.hpp"
@@ -49,6 +50,7 @@ std::string unpack_xz(const std::string& packed, const std::string& path) {
 }
 
 std::string text_of(const std::string& path) {
+  require_regular_file(path);
   std::ifstream file(path, std::ios::binary);
   std::string text{std::istreambuf_iterator<char>(file), {}};
   if (!file.good() && !file.eof()) throw InputError(fmt::format("{}: cannot be read", path));

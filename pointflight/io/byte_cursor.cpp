@@ -17,11 +17,10 @@ bool parse_number(std::string_view word, double& value) {
   return result.ec == std::errc() && result.ptr == end;
 }
 
-std::string excerpt(std::string_view text) {
-  constexpr std::size_t kLength = 40;
+std::string excerpt(std::string_view text, std::size_t length) {
   std::string shown;
-  for (const char c : text.substr(0, kLength)) shown += c >= ' ' && c <= '~' ? c : '?';
-  if (text.size() > kLength) shown += "...";
+  for (const char c : text.substr(0, length)) shown += c >= ' ' && c <= '~' ? c : '?';
+  if (text.size() > length) shown += "...";
   return shown;
 }
 

@@ -80,7 +80,7 @@ inline std::string_view as_text(std::span<const std::byte> bytes) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
-/// Printable excerpt of hostile text for a message.
-std::string excerpt(std::string_view text);
+/// Printable excerpt of hostile text for a message: its first characters.
+std::string excerpt(std::string_view text, std::size_t length = 40);
 
 }  // namespace pointflight

@@ -1,11 +1,14 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "pointflight/core/mapped_file.hpp"
+#include "pointflight/core/progress.hpp"
 #include "pointflight/geometry/types.hpp"
 
 namespace pointflight {
@@ -14,6 +17,19 @@ namespace pointflight {
 struct CloudPoint {
   Vector3d position = Vector3d::Zero();  ///< Metres, after `MeshSampling` and before --scale, --up.
   float intensity = 0.0f;                ///< The file's own scale; 0 where the file has none.
+  std::array<std::uint8_t, 3> color{};   ///< Red, green, blue; 0 where the file has none.
+};
+
+/// Brightness of a point's colour as the eye has it, 0 to 255 (ITU-R BT.601).
+inline float luminance(const CloudPoint& point) {
+  const auto part = [&](std::size_t i) { return static_cast<float>(point.color[i]); };
+  return 0.299f * part(0) + 0.587f * part(1) + 0.114f * part(2);
+}
+
+/// The unit of length that a file names for its coordinates.
+struct FileUnit {
+  std::string name;     ///< "foot"
+  double metres = 1.0;  ///< Of one unit; 0 where the coordinates are angles.
 };
 
 /// Reads a cloud front to back in batches: the whole cloud is never in memory (but for
@@ -30,6 +46,12 @@ class CloudReader {
   /// True if the points carry an intensity.
   [[nodiscard]] virtual bool has_intensity() const = 0;
 
+  /// True if the points carry a colour.
+  [[nodiscard]] virtual bool has_color() const { return false; }
+
+  /// The unit that the file's header or its first comments name; nothing where they name none.
+  [[nodiscard]] virtual std::optional<FileUnit> unit() const { return std::nullopt; }
+
   /// Share of the file that was read, 0 to 1.
   [[nodiscard]] virtual double share_read() const = 0;
 
@@ -43,13 +65,45 @@ struct MeshSampling {
   double unit = 1.0;                        ///< The metres of one unit of the mesh's coordinates.
 };
 
-/// Opens a cloud or mesh by its extension; the table of formats is in cloud_reader.cpp.
+/// A cloud or mesh that can be read as often as it takes.
+class CloudSource {
+ public:
+  /// A file. `format` is an extension ("las") that counts instead of the path's own.
+  CloudSource(std::string path, const std::string& format = {});  // NOLINT: a path is a source
+  CloudSource(const char* path) : CloudSource(std::string(path)) {}  // NOLINT
+
+  /// What comes through a pipe or a socket until its end. It is kept in a file without a name in
+  /// `folder` (empty: that of temporary files), for an import may read it twice. Without a `format`
+  /// the first bytes tell it; meshes are not read from pipes. Throws InputError.
+  static CloudSource from_stream(int descriptor,
+                                 const std::string& format,
+                                 const std::string& folder,
+                                 const Progress& progress = {});
+
+  [[nodiscard]] const std::string& name() const { return name_; }
+
+  /// True if it is a mesh (by extension, or a PLY with faces).
+  [[nodiscard]] bool is_mesh() const;
+
+  /// Opens it at its beginning. Throws InputError. `progress` may throw while a mesh is read.
+  [[nodiscard]] std::unique_ptr<CloudReader> open(const MeshSampling& sampling = {},
+                                                  const Progress& progress = {}) const;
+
+ private:
+  [[nodiscard]] MappedFile map_file() const;
+
+  std::string name_;  ///< The path, or what stands for it in messages.
+  std::string format_;
+  std::shared_ptr<const int> spool_;  ///< Descriptor of the kept bytes; null for files.
+};
+
+/// Opens a file by its extension; the table of formats is in cloud_reader.cpp.
 ///
 /// To add a format: write `io/<name>.*` with a class derived from CloudReader, add one line to the
 /// table, a golden file under 10 KB in tests/io, and a fuzz target in tests/fuzz.
 std::unique_ptr<CloudReader> open_cloud(const std::string& path, const MeshSampling& sampling = {});
 
-/// Extensions that `open_cloud` reads, for help texts.
+/// Extensions that are read, for help texts.
 std::string known_cloud_formats();
 
 /// True if the path names a mesh (by extension, or a PLY with faces).

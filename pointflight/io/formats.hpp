@@ -4,6 +4,7 @@
 #include <string>
 
 #include "pointflight/core/mapped_file.hpp"
+#include "pointflight/core/progress.hpp"
 #include "pointflight/io/cloud_reader.hpp"
 
 /// One function per format; each takes a mapped file and throws InputError where it is not valid.
@@ -18,6 +19,9 @@ std::unique_ptr<CloudReader> open_ply(MappedFile file);
 /// True if the PLY header promises faces (or triangle strips): a mesh, not a cloud.
 bool ply_has_faces(const MappedFile& file);
 
+/// Walks over all rows of a PLY. Throws InputError where the file ends before them.
+void check_ply_rows(MappedFile file);
+
 /// Text: x y z [intensity ...] a line; blanks, commas or semicolons between; an optional line of
 /// names; # and // comments; the count line of PTS.
 std::unique_ptr<CloudReader> open_xyz(MappedFile file);
@@ -25,8 +29,20 @@ std::unique_ptr<CloudReader> open_xyz(MappedFile file);
 /// ASPRS LAS 1.0 to 1.4, uncompressed, point formats 0 to 10.
 std::unique_ptr<CloudReader> open_las(MappedFile file);
 
-/// Triangles of any format that assimp reads, sampled evenly by area. Throws InputError where the
+/// What the import of a mesh may use; a damaged file can make it want without end.
+struct MeshLimits {
+  double cpu_seconds;
+  std::size_t memory_bytes;
+};
+/// More than any sound mesh of that size takes.
+MeshLimits mesh_limits(std::size_t file_bytes);
+
+/// Triangles of any format that assimp reads, sampled evenly by area. The file is read in a child
+/// process: where assimp crashes there, that is an InputError here. Throws InputError where the
 /// program was built without assimp.
-std::unique_ptr<CloudReader> open_mesh(const std::string& path, const MeshSampling& sampling);
+std::unique_ptr<CloudReader> open_mesh(const std::string& path,
+                                       const MeshSampling& sampling,
+                                       const MeshLimits& limits,
+                                       const Progress& progress = {});
 
 }  // namespace pointflight

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "pointflight/io/byte_cursor.hpp"
+#include "pointflight/io/file_unit.hpp"
 #include "pointflight/io/formats.hpp"
 
 // ASPRS LAS Specification 1.4 R15, tables 3 (header) and 6 ff. (point formats).
@@ -13,6 +14,7 @@ namespace {
 constexpr std::size_t kHeaderSize = 227;    // 1.0 - 1.2
 constexpr std::size_t kHeaderSize14 = 375;  // 1.4: 64-bit counts at byte 247
 constexpr std::size_t kMinPointSize[] = {20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67};
+constexpr std::size_t kColorAt[] = {0, 0, 20, 28, 0, 28, 0, 30, 30, 0, 30};  // 0: no colours
 
 class LasReader : public CloudReader {
  public:
@@ -36,6 +38,12 @@ class LasReader : public CloudReader {
         fail(131 + 8 * static_cast<std::size_t>(axis), "scale or offset is not a usable number");
       }
     }
+    const std::size_t header_size = load<std::uint16_t>(bytes.data() + 94);
+    if (header_size >= kHeaderSize && header_size <= data_) {
+      unit_ = unit_in_las_records(bytes.subspan(header_size, data_ - header_size),
+                                  load<std::uint32_t>(bytes.data() + 100));
+    }
+    look_at_some();
     file_.will_read_sequentially();
   }
 
@@ -48,13 +56,16 @@ class LasReader : public CloudReader {
         batch[i].position[axis] = load<std::int32_t>(p + 4 * axis) * scale_[axis] + offset_[axis];
       }
       batch[i].intensity = static_cast<float>(load<std::uint16_t>(p + 12));
+      if (has_color_) batch[i].color = color_of(p);
     }
     next_ += count;
     file_.release_before(data_ + next_ * point_size_);
     return count > 0;
   }
 
-  [[nodiscard]] bool has_intensity() const override { return true; }
+  [[nodiscard]] bool has_intensity() const override { return has_intensity_; }
+  [[nodiscard]] bool has_color() const override { return has_color_; }
+  [[nodiscard]] std::optional<FileUnit> unit() const override { return unit_; }
   [[nodiscard]] double share_read() const override {
     return points_ == 0 ? 1.0 : static_cast<double>(next_) / static_cast<double>(points_);
   }
@@ -73,6 +84,7 @@ class LasReader : public CloudReader {
                       file_.path()));
     }
     if (format > 10) fail(104, fmt::format("point format {} is unknown; 0 to 10", format));
+    color_at_ = kColorAt[format];
     data_ = load<std::uint32_t>(bytes.data() + 96);
     point_size_ = load<std::uint16_t>(bytes.data() + 105);
     if (point_size_ < kMinPointSize[format]) {
@@ -100,6 +112,33 @@ class LasReader : public CloudReader {
     }
   }
 
+  /// Every point has room for an intensity and, by its format, for a colour; files without them
+  /// leave zeros. Colours are to have 16 bits; many files have 8.
+  void look_at_some() {
+    constexpr std::uint64_t kSample = 1000;
+    const std::uint64_t step = std::max<std::uint64_t>(1, points_ / kSample);
+    has_intensity_ = points_ == 0;
+    unsigned brightest = 0;
+    for (std::uint64_t i = 0; i < points_; i += step) {
+      const std::byte* p = file_.bytes().data() + data_ + i * point_size_;
+      has_intensity_ = has_intensity_ || load<std::uint16_t>(p + 12) != 0;
+      for (std::size_t c = 0; c < 3 && color_at_ > 0; ++c) {
+        brightest = std::max<unsigned>(brightest, load<std::uint16_t>(p + color_at_ + 2 * c));
+      }
+    }
+    has_color_ = brightest > 0;
+    color_shift_ = brightest > 255 ? 8 : 0;
+  }
+
+  [[nodiscard]] std::array<std::uint8_t, 3> color_of(const std::byte* point) const {
+    std::array<std::uint8_t, 3> color{};
+    for (std::size_t c = 0; c < 3; ++c) {
+      color[c] =
+          static_cast<std::uint8_t>(load<std::uint16_t>(point + color_at_ + 2 * c) >> color_shift_);
+    }
+    return color;
+  }
+
   MappedFile file_;
   std::uint64_t points_ = 0;
   std::size_t data_ = 0;
@@ -107,6 +146,11 @@ class LasReader : public CloudReader {
   Vector3d scale_ = Vector3d::Ones();
   Vector3d offset_ = Vector3d::Zero();
   std::uint64_t next_ = 0;
+  std::size_t color_at_ = 0;
+  unsigned color_shift_ = 0;
+  bool has_intensity_ = false;
+  bool has_color_ = false;
+  std::optional<FileUnit> unit_;
 };
 
 }  // namespace

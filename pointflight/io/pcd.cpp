@@ -3,9 +3,11 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <optional>
 
 #include "pointflight/io/byte_cursor.hpp"
+#include "pointflight/io/file_unit.hpp"
 #include "pointflight/io/formats.hpp"
 
 // PCD 0.7 as documented by the Point Cloud Library, "The PCD (Point Cloud Data) file format".
@@ -31,6 +33,7 @@ struct Header {
   std::size_t columns = 0;
   std::size_t data_offset = 0;
   std::size_t data_line = 0;
+  std::optional<FileUnit> unit;
 };
 
 double load_number(const std::byte* p, char type, std::size_t size) {
@@ -57,6 +60,7 @@ class HeaderParser {
     std::string_view line;
     while (lines_.next(line)) {
       const std::string_view key = take_word(line);
+      if (!key.empty() && key.front() == '#' && !header_.unit) header_.unit = unit_in_comment(line);
       if (key.empty() || key.front() == '#' || key == "VERSION" || key == "VIEWPOINT") continue;
       if (key == "FIELDS" || key == "COLUMNS") {
         parse_fields(line);
@@ -218,6 +222,10 @@ class PcdReader : public CloudReader {
       position_[axis] = *field;
     }
     if (const Field* field = find("intensity")) intensity_ = *field;
+    for (const char* name : {"rgb", "rgba"}) {
+      const Field* field = find(name);
+      if (field != nullptr && field->size == 4) color_ = *field;
+    }
     if (header_.encoding == Encoding::kAscii) {
       lines_.emplace(as_text(file_.bytes()).substr(header_.data_offset));
     } else if (header_.encoding == Encoding::kBinary) {
@@ -241,6 +249,8 @@ class PcdReader : public CloudReader {
   }
 
   [[nodiscard]] bool has_intensity() const override { return intensity_.has_value(); }
+  [[nodiscard]] bool has_color() const override { return color_.has_value(); }
+  [[nodiscard]] std::optional<FileUnit> unit() const override { return header_.unit; }
   [[nodiscard]] double share_read() const override {
     return header_.points == 0 ? 1.0
                                : static_cast<double>(next_) / static_cast<double>(header_.points);
@@ -299,18 +309,31 @@ class PcdReader : public CloudReader {
     if (got != unpacked) fail("the compressed data is corrupt");
     for (Field* field : {&position_[0], &position_[1], &position_[2]}) to_columns(*field);
     if (intensity_) to_columns(*intensity_);
+    if (color_) to_columns(*color_);
   }
 
   /// In unpacked data `offset` is where the field's column starts.
   void to_columns(Field& field) const { field.offset *= header_.points; }
 
-  [[nodiscard]] double binary_number(std::uint64_t point, const Field& field) const {
+  [[nodiscard]] const std::byte* place_of(std::uint64_t point, const Field& field) const {
     if (header_.encoding == Encoding::kBinaryCompressed) {
-      const std::size_t at = field.offset + point * field.size * field.count;
-      return load_number(unpacked_.data() + at, field.type, field.size);
+      return unpacked_.data() + field.offset + point * field.size * field.count;
     }
-    const std::size_t at = header_.data_offset + point * header_.point_size + field.offset;
-    return load_number(file_.bytes().data() + at, field.type, field.size);
+    return file_.bytes().data() + header_.data_offset + point * header_.point_size + field.offset;
+  }
+
+  [[nodiscard]] double binary_number(std::uint64_t point, const Field& field) const {
+    return load_number(place_of(point, field), field.type, field.size);
+  }
+
+  /// Colours are the low 24 bits of a whole number, which PCL also writes as a float of these bits.
+  static std::array<std::uint8_t, 3> unpack_color(std::uint32_t bits) {
+    const auto part = [bits](int shift) { return static_cast<std::uint8_t>(bits >> shift); };
+    return {part(16), part(8), part(0)};
+  }
+  [[nodiscard]] std::uint32_t color_bits(double value) const {
+    if (color_->type == 'F') return std::bit_cast<std::uint32_t>(static_cast<float>(value));
+    return value >= 0.0 && value <= 4294967295.0 ? static_cast<std::uint32_t>(value) : 0;
   }
 
   void read_binary(std::uint64_t count, std::vector<CloudPoint>& batch) const {
@@ -321,6 +344,9 @@ class PcdReader : public CloudReader {
       }
       if (intensity_)
         batch[i].intensity = static_cast<float>(binary_number(next_ + i, *intensity_));
+      if (color_) {
+        batch[i].color = unpack_color(load<std::uint32_t>(place_of(next_ + i, *color_)));
+      }
     }
     if (header_.encoding == Encoding::kBinary) {
       file_.release_before(header_.data_offset + (next_ + count) * header_.point_size);
@@ -353,6 +379,7 @@ class PcdReader : public CloudReader {
         point.position[static_cast<int>(axis)] = words_[position_[axis].offset];
       }
       if (intensity_) point.intensity = static_cast<float>(words_[intensity_->offset]);
+      if (color_) point.color = unpack_color(color_bits(words_[color_->offset]));
     }
   }
 
@@ -365,6 +392,7 @@ class PcdReader : public CloudReader {
   Header header_;
   std::array<Field, 3> position_;
   std::optional<Field> intensity_;
+  std::optional<Field> color_;
   std::optional<LineCursor> lines_;
   std::vector<std::byte> unpacked_;
   std::vector<double> words_;

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "pointflight/io/byte_cursor.hpp"
+#include "pointflight/io/file_unit.hpp"
 #include "pointflight/io/formats.hpp"
 
 // PLY as described by Greg Turk, "The PLY Polygon File Format" (1994).
@@ -81,6 +82,7 @@ struct Header {
   std::vector<Element> elements;
   std::size_t data_offset = 0;
   std::size_t data_line = 0;
+  std::optional<FileUnit> unit;
 };
 
 class HeaderParser {
@@ -100,7 +102,11 @@ class HeaderParser {
         check_length();
         return header_;
       }
-      if (key == "comment" || key == "obj_info" || key.empty()) continue;
+      if (key == "comment" || key == "obj_info") {
+        if (!header_.unit) header_.unit = unit_in_comment(line);
+        continue;
+      }
+      if (key.empty()) continue;
       if (key == "format") {
         parse_format(take_word(line));
         has_format = true;
@@ -227,13 +233,27 @@ class PlyReader : public CloudReader {
         point.position[static_cast<int>(axis)] = values_[position_[axis]];
       }
       if (intensity_) point.intensity = static_cast<float>(values_[*intensity_]);
+      if (has_color()) {
+        for (std::size_t c = 0; c < 3; ++c) point.color[c] = color_part(*color_[c]);
+      }
       ++next_;
     }
     if (!header_.ascii) file_.release_before(at_);
     return !batch.empty();
   }
 
+  /// Goes over what has not been read.
+  void skip_rest() {
+    bool behind = false;
+    for (const Element& element : header_.elements) {
+      behind = behind || element.name == "vertex";
+      if (behind) skip(element);
+    }
+  }
+
   [[nodiscard]] bool has_intensity() const override { return intensity_.has_value(); }
+  [[nodiscard]] bool has_color() const override { return color_[0] && color_[1] && color_[2]; }
+  [[nodiscard]] std::optional<FileUnit> unit() const override { return header_.unit; }
   [[nodiscard]] double share_read() const override {
     return vertex_.count == 0 ? 1.0
                               : static_cast<double>(next_) / static_cast<double>(vertex_.count);
@@ -249,12 +269,27 @@ class PlyReader : public CloudReader {
         if (property.name == std::string(1, "xyz"[axis])) position_[axis] = i;
       }
       if (is_intensity(property.name)) intensity_ = i;
+      for (std::size_t c = 0; c < 3; ++c) {
+        constexpr std::array<std::string_view, 3> kColors = {"red", "green", "blue"};
+        if (property.name == kColors[c] || property.name == fmt::format("diffuse_{}", kColors[c])) {
+          color_[c] = i;
+        }
+      }
     }
     for (const std::size_t column : position_) {
       if (column == std::numeric_limits<std::size_t>::max()) {
         throw InputError(fmt::format("{}: the 'vertex' element lacks x, y or z", file_.path()));
       }
     }
+  }
+
+  /// Whole numbers fill their type, others go from 0 to 1.
+  [[nodiscard]] std::uint8_t color_part(std::size_t column) const {
+    const Scalar type = vertex_.properties[column].type;
+    double value = values_[column];
+    if (type == Scalar::kFloat || type == Scalar::kDouble) value *= 255.0;
+    if (type == Scalar::kInt16 || type == Scalar::kUint16) value /= 257.0;
+    return value > 0.0 ? static_cast<std::uint8_t>(std::min(value + 0.5, 255.0)) : std::uint8_t{0};
   }
 
   void skip(const Element& element) {
@@ -341,6 +376,7 @@ class PlyReader : public CloudReader {
   Element vertex_;
   std::array<std::size_t, 3> position_{};
   std::optional<std::size_t> intensity_;
+  std::array<std::optional<std::size_t>, 3> color_;
   std::vector<double> values_;
   std::size_t at_;
   LineCursor lines_;
@@ -351,6 +387,10 @@ class PlyReader : public CloudReader {
 
 std::unique_ptr<CloudReader> open_ply(MappedFile file) {
   return std::make_unique<PlyReader>(std::move(file));
+}
+
+void check_ply_rows(MappedFile file) {
+  PlyReader(std::move(file)).skip_rest();
 }
 
 bool ply_has_faces(const MappedFile& file) {

@@ -1,0 +1,72 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "pointflight/core/output_file.hpp"
+#include "pointflight/geometry/types.hpp"
+#include "pointflight/io/cloud_reader.hpp"
+
+namespace pointflight {
+
+/// What the points of a written cloud carry beside x, y and z.
+struct CloudColumns {
+  bool intensity = false;
+  bool color = false;
+  bool normal = false;     ///< Not in LAS.
+  bool ellipsoid = false;  ///< Deviations and axes of a surfel; not in LAS.
+};
+
+/// One row of a written cloud; what its columns lack is not looked at.
+struct CloudRow {
+  CloudPoint point;
+  Vector3f normal = Vector3f::Zero();                        ///< Unit length.
+  Vector3f spread = Vector3f::Zero();                        ///< Standard deviations, m.
+  Eigen::Quaternionf axes = Eigen::Quaternionf::Identity();  ///< World <- surfel.
+};
+
+/// Writes a cloud row by row, never held; it appears under its name with `commit`.
+///
+/// PCD and PLY are binary with coordinates as float32, or float64 where the first batch lies beyond
+/// 4 km; LAS is 1.2 with steps of 0.1 mm.
+class CloudWriter {
+ public:
+  virtual ~CloudWriter() = default;
+
+  void write(std::span<const CloudPoint> points);
+  void write(std::span<const CloudRow> rows);
+
+  /// Completes the header and the file.
+  virtual void commit() = 0;
+
+  [[nodiscard]] std::uint64_t count() const { return count_; }
+
+  /// What the format could not hold, for a warning; empty where nothing was lost.
+  [[nodiscard]] virtual std::string loss() const { return {}; }
+
+ protected:
+  explicit CloudWriter(OutputFile file) : file_(std::move(file)) {}
+  /// Called once, with the first rows.
+  virtual void begin(std::span<const CloudRow> rows) = 0;
+  virtual void append(const CloudRow& row, std::vector<std::byte>& bytes) = 0;
+
+  OutputFile file_;
+  std::uint64_t count_ = 0;
+  bool begun_ = false;
+
+ private:
+  std::vector<CloudRow> rows_;
+  std::vector<std::byte> bytes_;
+};
+
+/// Opens a cloud for writing by the extension of the file's path: .pcd, .ply, .las. Throws
+/// InputError where it is another one, or cannot hold the columns.
+std::unique_ptr<CloudWriter> write_cloud(OutputFile file, const CloudColumns& columns);
+
+/// Throws InputError where `path` has no extension that is written; says so before hours of work.
+void require_writable_cloud(const std::string& path);
+
+}  // namespace pointflight
