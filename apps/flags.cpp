@@ -1,7 +1,9 @@
 #include "apps/flags.hpp"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
+#include <algorithm>
 #include <filesystem>
 
 #include "pointflight/core/input_error.hpp"
@@ -56,6 +58,24 @@ void refuse_same_file(const std::string& output, const std::string& input) {
     throw InputError(fmt::format(
         "{}: this command reads or writes that file already; give another name", output));
   }
+}
+
+std::vector<CloudSource> cloud_sources(const std::vector<std::string>& inputs,
+                                       const std::string& format,
+                                       const std::string& scratch,
+                                       const Progress& progress) {
+  if (std::count(inputs.begin(), inputs.end(), "-") > 1) {
+    throw InputError("-: standard input can be read once; give it once");
+  }
+  std::vector<CloudSource> sources;
+  for (const std::string& input : inputs) {
+    if (input == "-") {
+      sources.push_back(CloudSource::from_stream(STDIN_FILENO, format, scratch, progress));
+    } else {
+      sources.emplace_back(input, format);
+    }
+  }
+  return sources;
 }
 
 void add_start_in_flag(CLI::App& app, std::vector<double>& numbers) {

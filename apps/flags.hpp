@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "pointflight/geometry/types.hpp"
+#include "pointflight/io/cloud_reader.hpp"
 
 namespace pointflight::apps {
 
@@ -25,6 +26,13 @@ void refuse_to_overwrite(const std::string& output, bool force);
 /// Makes a folder for a command's pictures. Throws InputError where it cannot be made, or where it
 /// holds anything that may not be replaced.
 void make_picture_folder(const std::string& folder, bool force);
+
+/// The clouds of a command line; "-" is standard input, kept in `scratch` where it has to be read
+/// again. `format`: what all of them are, empty: by their names. Throws InputError.
+std::vector<CloudSource> cloud_sources(const std::vector<std::string>& inputs,
+                                       const std::string& format,
+                                       const std::string& scratch,
+                                       const Progress& progress);
 
 /// Throws InputError where both names mean one file.
 void refuse_same_file(const std::string& output, const std::string& input);

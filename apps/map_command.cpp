@@ -11,6 +11,7 @@
 
 #include "apps/commands.hpp"
 #include "apps/flags.hpp"
+#include "apps/map_edit.hpp"
 #include "apps/pictures.hpp"
 #include "apps/terminal.hpp"
 #include "pointflight/core/input_error.hpp"
@@ -35,6 +36,7 @@ struct ImportFlags {
   double outlier_sigmas = OutlierOptions{}.sigmas;
   std::string outliers_out;
   std::string scratch;
+  std::string format;
   bool force = false;
   int threads = 0;
 };
@@ -71,6 +73,7 @@ void print_report(const ImportReport& r, const ImportOptions& options) {
                   r.resolution,
                   r.resolution_was_chosen ? " (chosen from the spacing)" : ""));
   log("spacing       " + about_spacing(r.spacing, r.resolution, r.supported_resolution));
+  if (r.intensity_from_colors) log("colours       kept as intensities: their luminance, 0 to 255");
   log(fmt::format("outliers      {}",
                   options.outliers.enabled
                       ? fmt::format("{} of {} cells ({} points) dropped; --keep-outliers keeps "
@@ -122,11 +125,15 @@ void import_map(const ImportFlags& flags) {
   }
   OutputFile output(flags.output);  // first: a folder that is not there is said at once
   const Executor executor(flags.threads);
-  const ImportedMap map = import_clouds(flags.inputs, options, executor, interruptible_progress());
+  const Progress progress = interruptible_progress();
+  const std::vector<CloudSource> sources =
+      cloud_sources(flags.inputs, flags.format, options.scratch_folder, progress);
+  const ImportedMap map = import_clouds(sources, options, executor, progress);
   end_progress();
   if (outliers) write_cloud_pcd(std::move(*outliers), map.outliers, map.report.has_intensity);
   write_map(std::move(output), map.tree, map.description);
   print_report(map.report, options);
+  for (const std::string& warning : map.report.warnings) log("warning: " + warning);
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
   log(fmt::format("took          {:.1f} s", took.count()));
   fmt::print("{}\n", flags.output);
@@ -135,9 +142,16 @@ void import_map(const ImportFlags& flags) {
 void add_import(CLI::App& parent) {
   auto* app = parent.add_subcommand("import", "Make a .pfmap from clouds or meshes");
   auto flags = std::make_shared<ImportFlags>();
-  app->add_option("inputs", flags->inputs, "Clouds or meshes: " + known_cloud_formats())
+  app->add_option("inputs",
+                  flags->inputs,
+                  "Clouds or meshes: " + known_cloud_formats() + "; -: a cloud from standard input")
       ->required();
   app->add_option("-o,--output", flags->output, "The .pfmap to write")->required();
+  app->add_option(
+      "--format",
+      flags->format,
+      "What the inputs are, whatever their names: pcd, ply, las, xyz, ...; without it by "
+      "the name, standard input by its first bytes");
   app->add_option("--resolution",
                   flags->resolution,
                   "Voxel size r, m; without it the one that the points' spacing supports")
@@ -264,9 +278,9 @@ void print_info(const SurfelMap& map, const InfoFlags& flags) {
              b.size().x(),
              b.size().y(),
              b.size().z(),
-             b.min.x(),
-             b.min.y(),
-             b.min.z());
+             no_minus(b.min.x()),
+             no_minus(b.min.y()),
+             no_minus(b.min.z()));
   fmt::print("  size        {:.1f} MB, {:.1f} bytes a surfel\n",
              static_cast<double>(map.file_size()) * 1e-6,
              bytes_each);
@@ -353,10 +367,16 @@ void add_forest(CLI::App& parent) {
 }  // namespace
 
 void add_map_command(CLI::App& parent, int& /*exit_code*/) {
-  auto* app = parent.add_subcommand("map", "Make and look at maps");
+  auto* app = parent.add_subcommand("map", "Make, look at and edit maps");
   app->require_subcommand(1);
   add_import(*app);
   add_info(*app);
+  add_crop(*app);
+  add_thin(*app);
+  add_transform(*app);
+  add_merge(*app);
+  add_export(*app);
+  add_diff(*app);
   add_forest(*app);
 }
 

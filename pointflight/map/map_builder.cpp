@@ -12,6 +12,7 @@
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/core/version.hpp"
 #include "pointflight/io/read_ahead.hpp"
+#include "pointflight/map/import_check.hpp"
 #include "pointflight/map/noise_projection.hpp"
 #include "pointflight/map/spacing.hpp"
 #include "pointflight/map/sparse_growth.hpp"
@@ -38,6 +39,22 @@ double tau_for(double points_per_cell) {
   return 0.23 + 0.13 * share(kThin, kFair) + 0.04 * share(kMany, kDense);
 }
 
+/// What the command line cannot give a library program may.
+void check_options(const ImportOptions& options) {
+  const auto check = [](bool fine, const char* what) {
+    if (!fine) throw InputError(fmt::format("import: {}", what));
+  };
+  check(!options.resolution || (*options.resolution > 0.0 && std::isfinite(*options.resolution)),
+        "the resolution has to be a number of metres above 0");
+  check(options.scale > 0.0 && std::isfinite(options.scale), "the scale has to be above 0");
+  check(options.shift.allFinite(), "the shift has to be finite");
+  check(options.up == 'z' || options.up == 'y', "up is 'y' or 'z'");
+  check(!options.tau || (*options.tau >= 0.01f && *options.tau <= 1.0f),
+        "tau has to lie between 0.01 and 1");
+  check(options.outliers.neighbours > 0 && options.outliers.sigmas >= 0.0,
+        "outliers want a neighbour or more, and deviations of 0 or more");
+}
+
 /// One import: the passes over the points in order.
 class Import {
  public:
@@ -55,16 +72,21 @@ class Import {
 
   ImportedMap run() {
     ImportReport& report = map_.report;
+    check_options(options_);
+    if (names_.empty()) throw InputError("no clouds are given; name at least one");
     for (const std::string& name : names_) {
       report.sources.push_back(std::filesystem::path(name).filename().string());
     }
     report.resolution_was_chosen = !options_.resolution.has_value();
     if (report.resolution_was_chosen) choose_resolution();
     report.resolution = options_.resolution.value_or(report.supported_resolution);
+    check_resolution();
     accumulate();
     drop_outliers();
     flatten_noise();
     build_tree();
+    report.floor =
+        find_floor(map_.tree.words.span(), map_.description.origin_world, report.resolution);
     describe();
     return std::move(map_);
   }
@@ -76,9 +98,13 @@ class Import {
     ImportReport& report = map_.report;
     report.points_read = 0;
     report.points_not_finite = 0;
+    report.units.clear();
     for (std::size_t i = 0; i < names_.size(); ++i) {
       const auto reader = opener_(i);
-      report.has_intensity = report.has_intensity || reader->has_intensity();
+      const bool by_color = !reader->has_intensity() && reader->has_color();
+      report.has_intensity = report.has_intensity || reader->has_intensity() || by_color;
+      report.intensity_from_colors = report.intensity_from_colors || by_color;
+      if (const auto unit = reader->unit()) report.units.push_back({report.sources[i], *unit});
       // while one batch is used, the next one is read
       ReadAhead ahead(*reader, executor_.threads() > 1);
       std::vector<CloudPoint> batch;
@@ -88,7 +114,8 @@ class Import {
         for (const CloudPoint& point : batch) {
           const Vector3d p = to_world(point.position);
           if (!p.allFinite()) continue;
-          batch[finite++] = {p, std::isfinite(point.intensity) ? point.intensity : 0.0f};
+          const float intensity = by_color ? luminance(point) : point.intensity;
+          batch[finite++] = {p, std::isfinite(intensity) ? intensity : 0.0f};
         }
         report.points_not_finite += batch.size() - finite;
         visit(std::span(batch).first(finite));
@@ -121,6 +148,20 @@ class Import {
     }
   }
 
+  /// What could not be opened again is not written.
+  void check_resolution() const {
+    const double r = map_.report.resolution;
+    if (r >= kMinResolution && r <= kMaxResolution) return;
+    throw InputError(fmt::format(
+        "{}: a resolution of {:.3g} m is none that maps have ({:g} to {:g} m); the points lie "
+        "{:.3g} m apart: check --scale, or give --resolution",
+        names_.front(),
+        r,
+        kMinResolution,
+        kMaxResolution,
+        map_.report.spacing));
+  }
+
   void measure_spacing() {
     map_.report.spacing = spacing_.median_spacing();
     map_.report.supported_resolution = supported_resolution(map_.report.spacing);
@@ -139,7 +180,7 @@ class Import {
     if (2 * report.points_out_of_reach > report.points_read) {
       throw InputError(fmt::format(
           "{}: {} of {} points lie more than {} km from the first one, too far for a resolution of "
-          "{} m; check --scale or give a coarser --resolution",
+          "{:.4g} m; check --scale or give a coarser --resolution",
           names_.front(),
           report.points_out_of_reach,
           report.points_read,
@@ -231,12 +272,13 @@ class Import {
     }
     for (std::size_t axis = 0; axis < 3; ++axis) {
       if (all.max[axis] - all.min[axis] >= (1 << 20)) {
-        throw InputError(fmt::format(
-            "{}: the cloud is wider than {} km, too wide for a resolution of {} m; give a coarser "
-            "--resolution",
-            names_.front(),
-            std::round(map_.report.resolution * 1048.576),
-            map_.report.resolution));
+        throw InputError(
+            fmt::format("{}: the cloud is wider than {} km, too wide for a resolution of {:.4g} m; "
+                        "give a coarser "
+                        "--resolution",
+                        names_.front(),
+                        std::round(map_.report.resolution * 1048.576),
+                        map_.report.resolution));
       }
     }
     min_voxel_ = all.min;
@@ -346,6 +388,7 @@ class Import {
     json["tau"] = static_cast<double>(report.tau);
     json["grown_surfels"] = report.grown_surfels;
     json["has_intensity"] = report.has_intensity;
+    if (report.intensity_from_colors) json["intensity"] = "luminance of the colours";
     d.metadata = json.dump(1, ' ', false, nlohmann::json::error_handler_t::replace);
   }
 
@@ -371,12 +414,13 @@ ImportedMap build_map(const std::vector<std::string>& source_names,
   return Import(source_names, opener, options, executor, progress).run();
 }
 
-ImportedMap import_clouds(const std::vector<std::string>& paths,
+ImportedMap import_clouds(const std::vector<CloudSource>& sources,
                           const ImportOptions& options,
                           const Executor& executor,
                           const Progress& progress) {
   ImportOptions chosen = options;
-  const bool has_mesh = std::any_of(paths.begin(), paths.end(), is_mesh);
+  const bool has_mesh = std::any_of(
+      sources.begin(), sources.end(), [](const CloudSource& source) { return source.is_mesh(); });
   // a mesh has no spacing of its own
   if (has_mesh && !chosen.resolution) chosen.resolution = kDefaultMeshResolution;
   MeshSampling sampling;
@@ -385,9 +429,13 @@ ImportedMap import_clouds(const std::vector<std::string>& paths,
     sampling.points_per_square_metre =
         kMeshPointsPerCell / (*chosen.resolution * *chosen.resolution);
   }
-  const auto opener = [&](std::size_t i) { return open_cloud(paths[i], sampling); };
-  ImportedMap map = build_map(paths, opener, chosen, executor, progress);
+  std::vector<std::string> names;
+  for (const CloudSource& source : sources) names.push_back(source.name());
+  const auto opener = [&](std::size_t i) { return sources[i].open(sampling, progress); };
+  ImportedMap map = build_map(names, opener, chosen, executor, progress);
   map.report.resolution_was_chosen = !options.resolution.has_value();
+  map.report.has_mesh = has_mesh;
+  map.report.warnings = import_warnings(map.report, options, map.description.bounds_world);
   return map;
 }
 

@@ -11,6 +11,7 @@
 #include "pointflight/core/progress.hpp"
 #include "pointflight/io/cloud_reader.hpp"
 #include "pointflight/map/cell_accumulator.hpp"
+#include "pointflight/map/floor_plane.hpp"
 #include "pointflight/map/map_file.hpp"
 #include "pointflight/map/noise_projection.hpp"
 #include "pointflight/map/outliers.hpp"
@@ -29,6 +30,12 @@ struct ImportOptions {
   std::string scratch_folder;
   std::size_t scratch_memory = Scratch::kDefaultMemory;        ///< Bytes.
   std::size_t cells_memory = CellAccumulator::kDefaultMemory;  ///< Bytes, while points are read.
+};
+
+/// A source whose file names the unit of its coordinates.
+struct SourceUnit {
+  std::string source;
+  FileUnit unit;
 };
 
 /// What an import did, for the user and for the map's metadata.
@@ -52,6 +59,11 @@ struct ImportReport {
   double supported_resolution = 0.0;  ///< 2.5 spacings.
   bool resolution_was_chosen = false;
   bool has_intensity = false;
+  bool intensity_from_colors = false;  ///< Of a source that has colours and no intensity.
+  bool has_mesh = false;
+  std::vector<SourceUnit> units;  ///< Of the sources that name one.
+  std::optional<FloorPlane> floor;
+  std::vector<std::string> warnings;  ///< What looks wrong about this world, one line each.
 };
 
 /// A finished import in memory.
@@ -73,8 +85,8 @@ ImportedMap build_map(const std::vector<std::string>& source_names,
                       const Executor& executor,
                       const Progress& progress = {});
 
-/// Imports files: meshes are sampled at 8 points per r^2.
-ImportedMap import_clouds(const std::vector<std::string>& paths,
+/// Imports clouds and meshes; meshes are sampled at 8 points per r^2.
+ImportedMap import_clouds(const std::vector<CloudSource>& sources,
                           const ImportOptions& options,
                           const Executor& executor,
                           const Progress& progress = {});

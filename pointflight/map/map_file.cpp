@@ -168,7 +168,7 @@ void SurfelMap::attach(std::span<const std::byte> bytes, const std::string& name
   const auto within = [](double value, double min, double max) {
     return value >= min && value <= max;
   };
-  if (!finite || !within(header.resolution, 1e-6, 1e6) ||
+  if (!finite || !within(header.resolution, kMinResolution, kMaxResolution) ||
       !within(static_cast<double>(header.support), 1.0, 10.0) ||
       !within(static_cast<double>(header.tau), 0.01, 1.0) ||
       !within(static_cast<double>(header.window), 0.01, 10.0)) {

@@ -21,6 +21,8 @@ inline constexpr char kMapMagic[8] = {'P', 'F', 'M', 'A', 'P', '\r', '\n', '\x1a
 inline constexpr std::uint32_t kMapVersion = 1;
 inline constexpr std::size_t kMapHeaderSize = 4096;
 inline constexpr std::size_t kMapAlignment = 64;
+inline constexpr double kMinResolution = 1e-6;  ///< m
+inline constexpr double kMaxResolution = 1e6;
 
 enum MapSectionId : std::uint32_t { kNodes, kWords, kIntensity, kMetadata, kMapSections };
 inline constexpr const char* kMapSectionNames[kMapSections] = {

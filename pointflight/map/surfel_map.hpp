@@ -27,6 +27,18 @@ struct Nearest {
   std::uint32_t word;     ///< Index of the surfel in `SurfelMap::words()`.
 };
 
+/// Calls `visit(leaf, index in words)` for every surfel of a map's words.
+template <class Visit>
+void for_each_surfel(std::span<const SurfelWord> words, const Visit& visit) {
+  for (std::size_t at = 0; at + kLeafPadding < words.size();) {
+    const LeafHeader leaf = decode_leaf(words[at]);
+    for (std::size_t i = 1; i <= leaf.count && at + i + kLeafPadding < words.size() + 1; ++i) {
+      visit(leaf, at + i);
+    }
+    at += leaf.count + 1;
+  }
+}
+
 /// An opened `.pfmap`: immutable, mapped read-only, shared between processes by the page cache.
 ///
 /// The same hierarchy answers rays (render/) and distances. A corrupt body can give wrong answers
@@ -62,6 +74,11 @@ class SurfelMap {
   [[nodiscard]] std::span<const SurfelWord> words() const { return words_; }
   [[nodiscard]] bool has_intensity() const { return !intensity_.empty(); }
 
+  /// Codes of the intensities beside `words`, empty without: offset + step * code.
+  [[nodiscard]] std::span<const std::uint8_t> intensity_codes() const { return intensity_; }
+  [[nodiscard]] float intensity_offset() const { return intensity_offset_; }
+  [[nodiscard]] float intensity_step() const { return intensity_step_; }
+
   /// Intensity of the surfel at a word index, in the cloud's own scale; 0 without intensities.
   [[nodiscard]] float intensity(std::uint32_t word) const {
     return word < intensity_.size()
@@ -80,17 +97,13 @@ class SurfelMap {
   /// Calls `visit(center_world, normal_world, thickness_m, word_index)` for every surfel.
   template <class Visit>
   void for_each_surfel(const Visit& visit) const {
-    for (std::size_t at = 0; at + kLeafPadding < words_.size();) {
-      const LeafHeader leaf = decode_leaf(words_[at]);
+    pointflight::for_each_surfel(words_, [&](const LeafHeader& leaf, std::size_t word) {
+      const Surfel surfel = decode(words_[word]);
       const Vector3d leaf_origin = origin_ + resolution_ * Vector3d(leaf.x, leaf.y, leaf.z);
-      for (std::size_t i = 1; i <= leaf.count && at + i + kLeafPadding < words_.size() + 1; ++i) {
-        const Surfel surfel = decode(words_[at + i]);
-        const Vector3d center = leaf_origin + resolution_ * surfel.center_voxels.cast<double>();
-        const Vector3d normal = surfel.axes.col(0).cast<double>();
-        visit(center, normal, surfel.s[0] * resolution_, static_cast<std::uint32_t>(at + i));
-      }
-      at += leaf.count + 1;
-    }
+      const Vector3d center = leaf_origin + resolution_ * surfel.center_voxels.cast<double>();
+      const Vector3d normal = surfel.axes.col(0).cast<double>();
+      visit(center, normal, surfel.s[0] * resolution_, static_cast<std::uint32_t>(word));
+    });
   }
 
  protected:
