@@ -33,7 +33,8 @@ inline constexpr float kSupport = 3.7f;
 
 /// One surfel on its way into the tree.
 struct BuildSurfel {
-  std::uint64_t morton = 0;  ///< voxel_key of its voxel; the input ascends by it, strictly.
+  std::uint64_t morton = 0;  ///< voxel_key of its voxel; the input ascends by it, at most eight
+                             ///< surfels alike.
   SurfelWord word = 0;       ///< With its centre in voxels from the voxel's low corner, in [0, 1].
 };
 

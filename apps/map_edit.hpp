@@ -1,0 +1,98 @@
+#pragma once
+
+#include <CLI/App.hpp>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "apps/point_picture.hpp"
+#include "pointflight/io/cloud_writer.hpp"
+#include "pointflight/map/map_edit.hpp"
+#include "pointflight/map/map_points.hpp"
+
+/// What `map crop`, `thin`, `transform`, `merge`, `export` and `diff` share.
+namespace pointflight::apps {
+
+struct EditFlags {
+  std::vector<std::string> inputs;
+  std::string output;
+  std::string png;
+  std::string format;
+  std::string scratch;
+  bool force = false;
+  int threads = 0;
+};
+
+/// --format, --png, --scratch, --threads, --force; -o with `what` it writes.
+void add_edit_flags(CLI::App& app, EditFlags& flags, const std::string& what, bool output_required);
+
+/// The one input of a command.
+void add_input(CLI::App& app, EditFlags& flags);
+
+/// The one cloud of a command line.
+CloudSource only_cloud(const EditFlags& flags, const Progress& progress);
+
+bool is_map(const std::string& path);
+
+/// Refuses outputs that are there or are inputs, and kinds that do not go together: a .pfmap makes
+/// a .pfmap, clouds make a cloud. Returns true for .pfmap.
+bool check_edit(const EditFlags& flags);
+
+/// Numbers of a flag, commas or blanks between. Throws InputError where there are not `count` of
+/// them (0: any number) or one is not finite.
+std::vector<double> parse_numbers(const std::string& text,
+                                  std::size_t count,
+                                  const std::string& flag);
+
+/// "x,y,z,roll,pitch,yaw" in metres and degrees.
+Pose parse_pose(const std::string& text, const std::string& flag);
+
+/// The folder for what does not fit into memory.
+std::string scratch_of(const EditFlags& flags);
+
+EditOptions edit_options(const EditFlags& flags, const std::string& note);
+
+/// The whole file is read: an edit must not make a sound map of a damaged one.
+std::shared_ptr<const SurfelMap> open_sound_map(const std::string& path);
+
+/// Writes an edited map, says what became of it, and draws it where --png asks.
+void finish_map(const EditFlags& flags, OutputFile output, const EditedMap& edited);
+
+/// A cloud on its way out: counted, sampled for the picture.
+class CloudOutput {
+ public:
+  CloudOutput(const EditFlags& flags, const CloudColumns& columns);
+
+  void write(std::span<const CloudPoint> points);
+  void write(std::span<const CloudRow> rows);
+
+  /// Completes the file, says what became of `points_read`, and draws it where --png asks. Throws
+  /// InputError where no point is left.
+  void finish(std::uint64_t points_read, std::uint64_t not_finite, const std::string& title);
+
+ private:
+  const EditFlags& flags_;
+  std::unique_ptr<CloudWriter> writer_;
+  PointSample sample_;
+};
+
+/// Columns of what a reader gives.
+CloudColumns columns_of(const CloudReader& reader);
+
+/// Calls `visit` with the finite points of a cloud, batch by batch; it may change them. Returns how
+/// many were not finite, and adds all to `points_read`.
+std::uint64_t stream_points(const CloudSource& source,
+                            std::uint64_t& points_read,
+                            const std::string& what,
+                            const Progress& progress,
+                            const std::function<void(std::vector<CloudPoint>&)>& visit);
+
+void add_crop(CLI::App& parent);
+void add_thin(CLI::App& parent);
+void add_transform(CLI::App& parent);
+void add_merge(CLI::App& parent);
+void add_export(CLI::App& parent);
+void add_diff(CLI::App& parent);
+
+}  // namespace pointflight::apps

@@ -1,0 +1,418 @@
+#include "pointflight/map/map_edit.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "pointflight/core/input_error.hpp"
+#include "pointflight/geometry/morton.hpp"
+#include "pointflight/map/near_surfels.hpp"
+#include "pointflight/map/voxel_moments.hpp"
+
+namespace pointflight {
+namespace {
+
+constexpr SurfelWord kPlaceBits = (SurfelWord{1} << 30) - 1;
+
+/// Surfels on their way into a new map, in voxels of its lattice.
+class SurfelGathering {
+ public:
+  /// `base_world`: corner of voxel (0, 0, 0) of the lattice.
+  SurfelGathering(const Vector3d& base_world,
+                  double resolution,
+                  std::size_t most_surfels,
+                  const EditOptions& options)
+      : base_(base_world),
+        resolution_(resolution),
+        options_(options),
+        scratch_(options.scratch_folder, options.scratch_memory),
+        entries_(scratch_, most_surfels) {}
+
+  /// A surfel of a map whose voxel (0, 0, 0) is that of the lattice: not a bit changes.
+  void add_as_is(const LeafHeader& leaf, SurfelWord word, std::uint8_t intensity) {
+    const std::array<std::uint32_t, 3> corner = {leaf.x, leaf.y, leaf.z};
+    std::array<std::int32_t, 3> voxel{};
+    SurfelWord place = 0;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const auto steps = static_cast<std::uint32_t>(word >> (10 * axis)) & 1023u;
+      voxel[axis] = static_cast<std::int32_t>(corner[axis] + (steps >> 6));
+      place |= static_cast<SurfelWord>(steps & 63u) << (10 * axis);
+    }
+    append(voxel, (word & ~kPlaceBits) | place, intensity);
+  }
+
+  /// A surfel anywhere; false where it lies too far from the lattice's base.
+  bool add(const Vector3d& center_world, Surfel surfel, std::uint8_t intensity) {
+    std::array<std::int32_t, 3> voxel{};
+    for (int axis = 0; axis < 3; ++axis) {
+      const double at = (center_world[axis] - base_[axis]) / resolution_;
+      if (!(std::abs(at) < static_cast<double>(kMaxVoxel))) return false;
+      const double low = std::floor(at);
+      voxel[static_cast<std::size_t>(axis)] = static_cast<std::int32_t>(low);
+      surfel.center_voxels[axis] = std::clamp(static_cast<float>(at - low), 0.0f, 0.999f);
+    }
+    append(voxel, encode(surfel), intensity);
+    return true;
+  }
+
+  [[nodiscard]] std::size_t count() const { return count_; }
+
+  /// `keeps_base`: the new map's voxel (0, 0, 0) is the lattice's; else it is where the surfels
+  /// begin.
+  EditedMap build(const MapDescription& description,
+                  bool keeps_base,
+                  const std::string& name,
+                  const Executor& executor) {
+    if (count_ == 0) throw InputError(fmt::format("{}: nothing is left of it", name));
+    std::array<std::int32_t, 3> base{};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      if (!keeps_base) base[axis] = min_[axis];
+      if (max_[axis] - base[axis] < (1 << 20)) continue;
+      throw InputError(
+          fmt::format("{}: wider than {:.0f} km, too wide for a resolution of {:.4g} m",
+                      name,
+                      resolution_ * 1048.576,
+                      resolution_));
+    }
+    const auto entries = entries_.span().first(count_);
+    std::stable_sort(entries.begin(), entries.end(), [](const Entry& a, const Entry& b) {
+      return a.surfel.morton < b.surfel.morton;
+    });
+    // a leaf has room for eight at one place
+    const auto crowd = std::unique(
+        entries.begin(), entries.end(), [n = 1](const Entry& a, const Entry& b) mutable {
+          n = a.surfel.morton == b.surfel.morton ? n + 1 : 1;
+          return n > 8;
+        });
+    return finish(description, static_cast<std::size_t>(crowd - entries.begin()), base, executor);
+  }
+
+ private:
+  struct Entry {
+    BuildSurfel surfel;
+    std::uint8_t intensity;
+  };
+
+  void append(const std::array<std::int32_t, 3>& voxel, SurfelWord word, std::uint8_t intensity) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      min_[axis] = std::min(min_[axis], voxel[axis]);
+      max_[axis] = std::max(max_[axis], voxel[axis]);
+    }
+    entries_[count_++] = {{voxel_key(voxel), word}, intensity};
+  }
+
+  EditedMap finish(const MapDescription& description,
+                   std::size_t count,
+                   const std::array<std::int32_t, 3>& base,
+                   const Executor& executor) {
+    EditedMap edited;
+    edited.description = description;
+    edited.description.origin_world = base_ + resolution_ * Vector3d(base[0], base[1], base[2]);
+    edited.description.surfel_count = count;
+    edited.surfels = count;
+    ScratchArray<BuildSurfel> surfels(scratch_, count);
+    ScratchArray<std::uint8_t> intensity(scratch_, description.has_intensity ? count : 0);
+    Aabb bounds;
+    for (std::size_t i = 0; i < count; ++i) {
+      surfels[i] = entries_[i].surfel;
+      if (description.has_intensity) intensity[i] = entries_[i].intensity;
+      const auto voxel = morton_decode(surfels[i].morton);
+      const Vector3d corner = Vector3d(voxel[0], voxel[1], voxel[2]).array() - kMaxVoxel;
+      bounds.add(base_ +
+                 resolution_ * (corner + decode(surfels[i].word).center_voxels.cast<double>()));
+    }
+    edited.description.bounds_world = bounds;
+    TreeInput input{surfels, intensity, {}, resolution_};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      input.low[axis] = static_cast<std::uint32_t>(base[axis] + kMaxVoxel);
+    }
+    edited.tree = build_bvh8(input, options_.quality, executor, scratch_);
+    return edited;
+  }
+
+  Vector3d base_;
+  double resolution_;
+  const EditOptions& options_;
+  Scratch scratch_;
+  ScratchArray<Entry> entries_;
+  std::size_t count_ = 0;
+  std::array<std::int32_t, 3> min_{kMaxVoxel, kMaxVoxel, kMaxVoxel};
+  std::array<std::int32_t, 3> max_{-kMaxVoxel, -kMaxVoxel, -kMaxVoxel};
+};
+
+/// The header may promise anything; this counts.
+std::size_t count_surfels(const SurfelMap& map) {
+  std::size_t count = 0;
+  for_each_surfel(map.words(), [&](const LeafHeader&, std::size_t) { ++count; });
+  return count;
+}
+
+std::uint8_t intensity_code(const SurfelMap& map, std::size_t word) {
+  return map.has_intensity() ? map.intensity_codes()[word] : std::uint8_t{0};
+}
+
+Vector3d center_world(const SurfelMap& map, const LeafHeader& leaf, const Surfel& surfel) {
+  return map.origin_world() + map.resolution() * (Vector3d(leaf.x, leaf.y, leaf.z) +
+                                                  surfel.center_voxels.cast<double>());
+}
+
+Surfel turned(Surfel surfel, const Quaterniond& rotation) {
+  surfel.axes = (rotation.toRotationMatrix() * surfel.axes.cast<double>()).cast<float>();
+  return surfel;
+}
+
+/// True where a surfel of `map` stands for the place already: its cell, turned as it is, holds it.
+bool covers(const SurfelMap& map, const Vector3d& p_map) {
+  const double r = map.resolution();
+  const Vector3d half(0.5 * r, 0.6 * r, 0.6 * r);  // centroids lie anywhere in their cells
+  bool found = false;
+  const double reach = half.norm();
+  visit_near(map, {p_map, p_map}, reach, [&](const SurfelBox& box) {
+    const Vector3d p_box = box.T_world_box.inverse() * p_map;
+    found = found || (p_box.cwiseAbs().array() <= half.array()).all();
+    return found ? -1.0 : reach;
+  });
+  return found;
+}
+
+void check_pose(const Pose& pose) {
+  const double norm = pose.rotation.norm();
+  if (pose.translation.allFinite() && std::abs(norm - 1.0) < 1e-6) return;
+  throw InputError("a map is moved by finite metres and a unit quaternion");
+}
+
+MapDescription describe(const SurfelMap& map) {
+  MapDescription d;
+  d.resolution = map.resolution();
+  d.origin_world = map.origin_world();
+  d.bounds_world = map.bounds_world();
+  d.model = map.model();
+  d.has_intensity = map.has_intensity();
+  d.intensity_offset = map.intensity_offset();
+  d.intensity_step = map.intensity_step();
+  d.surfel_count = map.surfel_count();
+  d.metadata = std::string(map.metadata());
+  return d;
+}
+
+void append_note(EditedMap& edited, const std::string& note) {
+  auto json = nlohmann::ordered_json::parse(edited.description.metadata, nullptr, false);
+  if (!json.is_object()) json = nlohmann::ordered_json::object();
+  if (!json.contains("edited") || !json["edited"].is_array()) {
+    json["edited"] = nlohmann::ordered_json::array();
+  }
+  json["edited"].push_back(note);
+  json["surfels"] = edited.surfels;
+  json.erase("planar_surfels");  // of the import; `map info` counts
+  edited.description.metadata = json.dump(1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+/// The tree and its words as they are.
+EditedMap shifted(const SurfelMap& map, const Vector3d& by, const EditOptions& options) {
+  Scratch scratch(options.scratch_folder, options.scratch_memory);
+  EditedMap edited;
+  const auto copy = [&](const auto& from, auto& to) {
+    to = std::remove_reference_t<decltype(to)>(scratch, from.size());
+    std::copy(from.begin(), from.end(), to.begin());
+  };
+  copy(map.nodes(), edited.tree.nodes);
+  copy(map.words(), edited.tree.words);
+  copy(map.intensity_codes(), edited.tree.intensity);
+  edited.description = describe(map);
+  edited.description.origin_world += by;
+  edited.description.bounds_world.min += by;
+  edited.description.bounds_world.max += by;
+  edited.surfels = edited.surfels_before = count_surfels(map);
+  append_note(edited, options.note);
+  return edited;
+}
+
+/// One scale of intensities for several maps.
+void join_intensities(const std::vector<PlacedMap>& maps, MapDescription& description) {
+  float low = std::numeric_limits<float>::infinity();
+  float high = -low;
+  for (const PlacedMap& placed : maps) {
+    if (!placed.map->has_intensity()) continue;
+    low = std::min(low, placed.map->intensity_offset());
+    high = std::max(high, placed.map->intensity_offset() + 255.0f * placed.map->intensity_step());
+  }
+  description.has_intensity = low <= high;
+  if (!description.has_intensity) return;
+  description.intensity_offset = low;
+  description.intensity_step = (high - low) / 255.0f;
+}
+
+std::uint8_t code_in(const MapDescription& description, float intensity) {
+  if (!(description.intensity_step > 0.0f)) return 0;
+  const float code =
+      std::round((intensity - description.intensity_offset) / description.intensity_step);
+  return static_cast<std::uint8_t>(std::clamp(code, 0.0f, 255.0f));
+}
+
+[[noreturn]] void refuse_width(double resolution) {
+  throw InputError(
+      fmt::format("the maps lie more than {:.0f} km apart, too far for a resolution of {:.4g} m",
+                  resolution * 1048.576,
+                  resolution));
+}
+
+}  // namespace
+
+EditedMap crop_map(const SurfelMap& map,
+                   const std::function<bool(const Vector3d& center_world)>& keep,
+                   const EditOptions& options,
+                   const Executor& executor) {
+  std::vector<bool> kept;  // a bit a surfel, so that no room is taken for those that go
+  std::size_t count = 0;
+  for_each_surfel(map.words(), [&](const LeafHeader& leaf, std::size_t word) {
+    kept.push_back(keep(center_world(map, leaf, decode(map.words()[word]))));
+    count += kept.back() ? 1 : 0;
+  });
+  SurfelGathering gathering(map.origin_world(), map.resolution(), count, options);
+  std::size_t at = 0;
+  for_each_surfel(map.words(), [&](const LeafHeader& leaf, std::size_t word) {
+    if (!kept[at++]) return;
+    gathering.add_as_is(leaf, map.words()[word], intensity_code(map, word));
+  });
+  EditedMap edited = gathering.build(describe(map), true, "crop", executor);
+  edited.surfels_before = kept.size();
+  append_note(edited, options.note);
+  return edited;
+}
+
+EditedMap transform_map(const SurfelMap& map,
+                        const Pose& T_new_old,
+                        const EditOptions& options,
+                        const Executor& executor) {
+  check_pose(T_new_old);
+  if (T_new_old.rotation.vec().isZero(0.0)) return shifted(map, T_new_old.translation, options);
+  const std::size_t count = count_surfels(map);
+  // amid the surfels: far from it a lattice ends
+  const Vector3d middle = 0.5 * (map.bounds_world().min + map.bounds_world().max);
+  SurfelGathering gathering(T_new_old * middle, map.resolution(), count, options);
+  for_each_surfel(map.words(), [&](const LeafHeader& leaf, std::size_t word) {
+    const Surfel surfel = decode(map.words()[word]);
+    const Vector3d center = T_new_old * center_world(map, leaf, surfel);
+    const std::uint8_t code = intensity_code(map, word);
+    if (!gathering.add(center, turned(surfel, T_new_old.rotation), code)) {
+      refuse_width(map.resolution());
+    }
+  });
+  EditedMap edited = gathering.build(describe(map), false, "transform", executor);
+  edited.surfels_before = count;
+  append_note(edited, options.note);
+  return edited;
+}
+
+EditedMap merge_maps(const std::vector<PlacedMap>& maps,
+                     const EditOptions& options,
+                     const Executor& executor,
+                     const Progress& progress) {
+  if (maps.empty()) throw InputError("merge: no maps are given");
+  for (const PlacedMap& placed : maps) {
+    if (placed.map == nullptr) throw InputError("merge: a map is null");
+    check_pose(placed.T_world_map);
+    const double r = maps.front().map->resolution();
+    if (std::abs(placed.map->resolution() - r) < 1e-9 * r) continue;
+    throw InputError(
+        fmt::format("the maps have resolutions of {:.4g} m and {:.4g} m; merge their clouds and "
+                    "import these, or import them again with one --resolution",
+                    r,
+                    placed.map->resolution()));
+  }
+  const SurfelMap& first = *maps.front().map;
+  const Pose& T_first = maps.front().T_world_map;
+  const bool first_stays = T_first.rotation.vec().isZero(0.0);
+  std::size_t most = 0;
+  for (const PlacedMap& placed : maps) most += count_surfels(*placed.map);
+  MapDescription description = describe(first);
+  join_intensities(maps, description);
+  const Vector3d base =
+      first_stays ? Vector3d(first.origin_world() + T_first.translation)
+                  : T_first * (0.5 * (first.bounds_world().min + first.bounds_world().max));
+  SurfelGathering gathering(base, first.resolution(), most, options);
+  std::uint64_t doubles = 0;
+  for (std::size_t m = 0; m < maps.size(); ++m) {
+    const SurfelMap& map = *maps[m].map;
+    const Pose& T = maps[m].T_world_map;
+    std::size_t done = 0;
+    for_each_surfel(map.words(), [&](const LeafHeader& leaf, std::size_t word) {
+      if (done++ % 65536 == 0) {
+        report(progress, "merging", static_cast<double>(m) / static_cast<double>(maps.size()));
+      }
+      const std::uint8_t code =
+          description.has_intensity
+              ? code_in(description, map.intensity(static_cast<std::uint32_t>(word)))
+              : std::uint8_t{0};
+      if (m == 0 && first_stays) {
+        gathering.add_as_is(leaf, map.words()[word], code);
+        return;
+      }
+      const Surfel surfel = decode(map.words()[word]);
+      const Vector3d center = T * center_world(map, leaf, surfel);
+      const bool taken =
+          std::any_of(maps.begin(),
+                      maps.begin() + static_cast<std::ptrdiff_t>(m),
+                      [&](const PlacedMap& earlier) {
+                        return covers(*earlier.map, earlier.T_world_map.inverse() * center);
+                      });
+      if (taken) {
+        ++doubles;
+      } else if (!gathering.add(center, turned(surfel, T.rotation), code)) {
+        refuse_width(first.resolution());
+      }
+    });
+  }
+  EditedMap edited = gathering.build(description, false, "merge", executor);
+  edited.surfels_before = most;
+  edited.doubles = doubles;
+  append_note(edited, options.note);
+  return edited;
+}
+
+std::uint64_t for_each_missing(
+    const SurfelMap& map,
+    const SurfelMap& other,
+    double distance,
+    double reach,
+    const Executor& executor,
+    const std::function<void(const Vector3d& center_world, double distance)>& visit,
+    const Progress& progress) {
+  if (!(distance >= 0.0) || !(reach >= distance)) {
+    throw InputError("a difference wants a distance of 0 or more and a reach beyond it");
+  }
+  constexpr std::size_t kBatch = 65536;
+  std::vector<Vector3d> centers;
+  std::vector<double> distances;
+  const auto flush = [&] {
+    distances.assign(centers.size(), reach);
+    executor.parallel_for(centers.size(), 1024, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) {
+        const auto nearest = other.nearest(centers[i], reach);
+        if (nearest) distances[i] = nearest->distance;
+      }
+    });
+    for (std::size_t i = 0; i < centers.size(); ++i) {
+      if (distances[i] > distance) visit(centers[i], distances[i]);
+    }
+    centers.clear();
+  };
+  std::uint64_t count = 0;
+  const auto all = static_cast<double>(std::max<std::size_t>(1, map.words().size()));
+  for_each_surfel(map.words(), [&](const LeafHeader& leaf, std::size_t word) {
+    ++count;
+    centers.push_back(center_world(map, leaf, decode(map.words()[word])));
+    if (centers.size() < kBatch) return;
+    flush();
+    report(progress, "comparing", static_cast<double>(word) / all);
+  });
+  flush();
+  return count;
+}
+
+}  // namespace pointflight

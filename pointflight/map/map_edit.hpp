@@ -1,0 +1,74 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "pointflight/core/parallel.hpp"
+#include "pointflight/core/progress.hpp"
+#include "pointflight/map/map_file.hpp"
+#include "pointflight/map/surfel_map.hpp"
+
+namespace pointflight {
+
+/// Makes maps of maps, surfel by surfel. Surfels that are not moved stay what they are, to the bit;
+/// a turn rounds their centres anew to r / 64 and their axes to 0.3 degrees.
+struct EditedMap {
+  Bvh8 tree;
+  MapDescription description;
+  std::uint64_t surfels_before = 0;  ///< Of all maps together.
+  std::uint64_t surfels = 0;
+  std::uint64_t doubles = 0;  ///< Left out by `merge_maps`: another map has that place.
+};
+
+/// How an edit is done.
+struct EditOptions {
+  TreeQuality quality = TreeQuality::kHigh;
+  std::string scratch_folder =
+      {};  ///< For what does not fit into memory; empty: with temporary files.
+  std::size_t scratch_memory = Scratch::kDefaultMemory;  ///< Bytes.
+  std::string note = {};  ///< What was done, appended to the metadata's list "edited".
+};
+
+/// Keeps the surfels whose centre in the world `keep` accepts; it is called from one thread. Throws
+/// InputError where none is left.
+EditedMap crop_map(const SurfelMap& map,
+                   const std::function<bool(const Vector3d& center_world)>& keep,
+                   const EditOptions& options,
+                   const Executor& executor);
+
+/// Moves a map: p_new = T_new_old * p_old. A mere shift changes no surfel.
+EditedMap transform_map(const SurfelMap& map,
+                        const Pose& T_new_old,
+                        const EditOptions& options,
+                        const Executor& executor);
+
+/// A map and where it lies among others.
+struct PlacedMap {
+  std::shared_ptr<const SurfelMap> map;
+  Pose T_world_map;
+};
+
+/// Joins maps of one resolution. A surfel of a later one that lies within the cell of an earlier
+/// one's is left out: twice the coverage would make edges fat. Throws InputError where resolutions
+/// differ or the whole is too wide.
+EditedMap merge_maps(const std::vector<PlacedMap>& maps,
+                     const EditOptions& options,
+                     const Executor& executor,
+                     const Progress& progress = {});
+
+/// Calls `visit` with the surfels of `map` whose boxes lie farther than `distance` (m) from all of
+/// `other`, in order: their centre and how far they are, at most `reach` (m). Returns how many
+/// surfels the map has.
+std::uint64_t for_each_missing(
+    const SurfelMap& map,
+    const SurfelMap& other,
+    double distance,
+    double reach,
+    const Executor& executor,
+    const std::function<void(const Vector3d& center_world, double distance)>& visit,
+    const Progress& progress = {});
+
+}  // namespace pointflight
