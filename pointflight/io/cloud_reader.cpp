@@ -6,9 +6,11 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cmath>
 #include <filesystem>
 #include <utility>
 
+#include "pointflight/core/argument.hpp"
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/io/byte_cursor.hpp"
 #include "pointflight/io/formats.hpp"
@@ -167,6 +169,10 @@ bool CloudSource::is_mesh() const {
 
 std::unique_ptr<CloudReader> CloudSource::open(const MeshSampling& sampling,
                                                const Progress& progress) const {
+  require_argument(sampling.points_per_square_metre > 0.0 && sampling.unit > 0.0 &&
+                       std::isfinite(sampling.points_per_square_metre) &&
+                       std::isfinite(sampling.unit),
+                   "open: a density and a unit above 0 are wanted");
   MappedFile file = map_file();  // a missing file is the first thing to say
   if (const Refusal* refusal = find_refusal(format_)) refuse(*refusal, name_);
   const Format* format = find_format(format_);

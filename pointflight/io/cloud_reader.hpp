@@ -69,7 +69,7 @@ struct MeshSampling {
 class CloudSource {
  public:
   /// A file. `format` is an extension ("las") that counts instead of the path's own.
-  CloudSource(std::string path, const std::string& format = {});  // NOLINT: a path is a source
+  CloudSource(std::string path, const std::string& format = {});     // NOLINT: a path is a source
   CloudSource(const char* path) : CloudSource(std::string(path)) {}  // NOLINT
 
   /// What comes through a pipe or a socket until its end. It is kept in a file without a name in

@@ -74,7 +74,7 @@ void CsvTable::parse(std::string_view text) {
 }
 
 std::string CsvTable::place(std::size_t row) const {
-  return fmt::format("{}:{}", name_, lines_[row]);
+  return fmt::format("{}:{}", name_, lines_.at(row));
 }
 
 int CsvTable::find(std::string_view prefix) const {

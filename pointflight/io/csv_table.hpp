@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cassert>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -23,10 +24,12 @@ class CsvTable {
   /// As `find`, but throws InputError where there is no such column.
   [[nodiscard]] int require(std::string_view prefix) const;
 
-  /// "file:line" of a row, for messages.
+  /// "file:line" of a row, for messages. Throws std::out_of_range where there is no such row.
   [[nodiscard]] std::string place(std::size_t row) const;
 
+  /// `row` below rows(), `column` as `find` gave it and not -1: debug builds assert it.
   [[nodiscard]] double at(std::size_t row, int column) const {
+    assert(row < rows_ && column >= 0 && static_cast<std::size_t>(column) < names_.size());
     return values_[row * names_.size() + static_cast<std::size_t>(column)];
   }
 

@@ -4,12 +4,17 @@
 
 #include <utility>
 
+#include "pointflight/core/argument.hpp"
+
 namespace pointflight {
 
 void write_pcd(OutputFile file,
                const std::vector<PcdField>& fields,
                std::size_t points,
                std::span<const std::byte> rows) {
+  std::size_t row = 0;
+  for (const PcdField& field : fields) row += field.size;
+  require_argument(rows.size() == points * row, "write_pcd: rows of all fields are wanted");
   std::string names;
   std::string sizes;
   std::string types;

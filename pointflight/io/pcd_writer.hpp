@@ -18,7 +18,8 @@ struct PcdField {
   std::size_t size;  ///< Bytes.
 };
 
-/// Writes a binary PCD 0.7 file; `rows` holds `points` rows of the fields without padding.
+/// Writes a binary PCD 0.7 file; `rows` holds `points` rows of the fields without padding;
+/// throws std::invalid_argument where it does not.
 void write_pcd(OutputFile file,
                const std::vector<PcdField>& fields,
                std::size_t points,

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <span>
 
+#include "pointflight/core/argument.hpp"
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/core/version.hpp"
 #include "pointflight/io/read_ahead.hpp"
@@ -101,6 +102,7 @@ class Import {
     report.units.clear();
     for (std::size_t i = 0; i < names_.size(); ++i) {
       const auto reader = opener_(i);
+      require_argument(reader != nullptr, "build_map: the opener gave no reader");
       const bool by_color = !reader->has_intensity() && reader->has_color();
       report.has_intensity = report.has_intensity || reader->has_intensity() || by_color;
       report.intensity_from_colors = report.intensity_from_colors || by_color;
@@ -411,6 +413,7 @@ ImportedMap build_map(const std::vector<std::string>& source_names,
                       const ImportOptions& options,
                       const Executor& executor,
                       const Progress& progress) {
+  require_argument(opener != nullptr, "build_map: an opener of sources is wanted");
   return Import(source_names, opener, options, executor, progress).run();
 }
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "pointflight/core/argument.hpp"
 #include "pointflight/core/hash.hpp"
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/core/mapped_file.hpp"
@@ -25,7 +26,23 @@ struct Layout {
   std::size_t size = 0;
 };
 
+/// A map that could not be opened again is not written.
+void check(const Bvh8& tree, const MapDescription& d) {
+  require_argument(d.resolution >= kMinResolution && d.resolution <= kMaxResolution &&
+                       d.origin_world.allFinite() && std::isfinite(d.intensity_offset) &&
+                       std::isfinite(d.intensity_step),
+                   "write_map: the resolution, the origin or the scale of intensities is no number "
+                   "that maps have");
+  require_argument(d.model.support >= 1.0f && d.model.tau >= 0.01f && d.model.tau <= 1.0f &&
+                       d.model.window >= 0.01f,
+                   "write_map: the render model is out of range");
+  require_argument(tree.words.size() >= kLeafPadding &&
+                       (tree.intensity.size() == 0 || tree.intensity.size() == tree.words.size()),
+                   "write_map: the tree is not one that build_bvh8 made");
+}
+
 Layout lay_out(const Bvh8& tree, const MapDescription& d) {
+  check(tree, d);
   Layout layout;
   layout.sections = {std::as_bytes(tree.nodes.span()),
                      std::as_bytes(tree.words.span()),

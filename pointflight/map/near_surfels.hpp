@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cassert>
 #include <cstdint>
 #include <cstring>
 
@@ -16,8 +17,10 @@ struct SurfelBox {
   std::uint32_t word = 0;  ///< Index of the surfel in `SurfelMap::words()`.
 };
 
-/// The box of the surfel at a word index, in a leaf whose header is `leaf`.
+/// The box of the surfel at a word index below `map.words().size()`, which debug builds assert, in
+/// a leaf whose header is `leaf`.
 inline SurfelBox surfel_box(const SurfelMap& map, const LeafHeader& leaf, std::uint32_t word) {
+  assert(word < map.words().size());
   const Surfel surfel = decode(map.words()[word]);
   const double r = map.resolution();
   const Vector3d corner = r * Vector3d(leaf.x, leaf.y, leaf.z);

@@ -119,11 +119,13 @@ Vector3d SpacingEstimate::middle() const {
 
 double supported_resolution(double spacing) {
   const double wanted = 2.5 * spacing;
-  if (!(wanted > 0.0)) return 0.0;
-  double step = 1.0;  // the second digit, without logarithms
-  while (step * 10.0 > wanted) step /= 10.0;
-  while (step * 100.0 <= wanted) step *= 10.0;
-  return std::ceil(wanted / step - 1e-9) * step;
+  if (!(wanted > 1e-9) || !(wanted < 1e12)) return 0.0;
+  // steps of the second digit, without logarithms; 36 / 1000 is 0.036, 36 * 0.001 is not
+  double divisor = 1.0;
+  double factor = 1.0;
+  while (wanted * divisor < 10.0) divisor *= 10.0;
+  while (wanted / factor >= 100.0) factor *= 10.0;
+  return std::ceil(wanted * divisor / factor - 1e-9) * factor / divisor;
 }
 
 }  // namespace pointflight

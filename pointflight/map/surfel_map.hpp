@@ -87,7 +87,8 @@ class SurfelMap {
   }
 
   /// The nearest surfel within `max_distance` of a point: distance to its oriented box with half
-  /// sides sqrt(3) s_k (r / 2 for a filled cell). Nothing where all are farther.
+  /// sides sqrt(3) s_k (r / 2 for a filled cell). Nothing where all are farther, or where the point
+  /// or the distance is NaN.
   [[nodiscard]] std::optional<Nearest> nearest(const Vector3d& point_world,
                                                double max_distance) const;
 

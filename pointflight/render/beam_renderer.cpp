@@ -3,6 +3,7 @@
 #include <array>
 #include <vector>
 
+#include "pointflight/core/argument.hpp"
 #include "pointflight/render/body_renderer.hpp"
 #include "pointflight/render/direction_order.hpp"
 
@@ -11,14 +12,20 @@ namespace {
 
 constexpr std::size_t kChunk = 1024;  // beams
 
+const SurfelMap& map_of(const Scene& scene) {
+  require_argument(scene.map != nullptr, "BeamRenderer: the scene has no map");
+  return *scene.map;
+}
+
 }  // namespace
 
 BeamRenderer::BeamRenderer(const Scene& scene, BeamGrouping grouping)
-    : map_(scene.map), kernel_map_(kernel_map_of(*scene.map)), grouping_(grouping) {}
+    : map_(scene.map), kernel_map_(kernel_map_of(map_of(scene))), grouping_(grouping) {}
 
 void BeamRenderer::render(const RayBatch& batch,
                           std::span<Hit> hits,
                           const Executor& executor) const {
+  check(batch, hits);
   std::vector<std::uint32_t> own_order;
   std::span<const std::uint32_t> order = batch.order;
   if (order.size() != batch.rays.size()) {

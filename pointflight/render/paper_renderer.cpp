@@ -5,6 +5,7 @@
 #include <cmath>
 #include <map>
 
+#include "pointflight/core/argument.hpp"
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/math.hpp"
 
@@ -139,6 +140,8 @@ PaperPoints points_of(const SurfelMap& map, double gamma_max) {
 
 PaperRenderer::PaperRenderer(const Scene& scene, const PaperOptions& options)
     : map_(scene.map), options_(options) {
+  require_argument(map_ != nullptr, "PaperRenderer: the scene has no map");
+  require_argument(options_.voxel_length > 0.0, "PaperRenderer: a voxel length above 0 is wanted");
   const double l = options_.voxel_length;
   std::map<std::array<std::int64_t, 3>, std::size_t> index;
   const double gamma_max = options_.gamma_threshold * map_->resolution();
@@ -242,6 +245,7 @@ void PaperRenderer::draw_bodies(const RayBatch& batch,
 void PaperRenderer::render(const RayBatch& batch,
                            std::span<Hit> hits,
                            const Executor& executor) const {
+  check(batch, hits);
   if (batch.rays.empty()) return;
   const Pose T_sensor_world = batch.T_world_sensor.inverse();
   const Matrix3f turn = T_sensor_world.rotation.toRotationMatrix().cast<float>();

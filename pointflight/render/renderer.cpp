@@ -3,6 +3,12 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <variant>
+
+#include "pointflight/core/argument.hpp"
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/render/beam_renderer.hpp"
 #include "pointflight/render/paper_renderer.hpp"
@@ -28,6 +34,27 @@ constexpr Entry kRenderers[] = {
 
 }  // namespace
 
+void Renderer::check(const RayBatch& batch, std::span<const Hit> hits) {
+  require_argument(hits.size() == batch.rays.size(), "render: as many hits as rays are wanted");
+  require_argument(batch.order.empty() || batch.order.size() == batch.rays.size(),
+                   "render: an order of all rays is wanted, or none");
+  require_argument(batch.time_offsets.empty() || batch.time_offsets.size() == batch.rays.size(),
+                   "render: a time offset for each ray is wanted, or none");
+  const Pose& pose = batch.T_world_sensor;
+  require_argument(pose.translation.allFinite() && pose.rotation.coeffs().allFinite() &&
+                       batch.image_resolution > 0.0,
+                   "render: a finite pose and an image resolution above 0 are wanted");
+  for (const Body& body : batch.bodies) {
+    const auto* cloud = std::get_if<std::shared_ptr<const SurfelMap>>(&body.shape);
+    require_argument(body.T_world_body && (cloud == nullptr || *cloud != nullptr),
+                     "render: a body wants a shape and a pose as a function of time");
+  }
+  assert(std::all_of(batch.rays.begin(), batch.rays.end(), [](const Ray& ray) {
+    return ray.origin_world.allFinite() && ray.direction_world.allFinite() &&
+           !std::isnan(ray.range_max);
+  }));
+}
+
 Hit Renderer::trace(const Ray& ray) const {
   RayBatch batch;
   batch.rays = {&ray, 1};
@@ -46,7 +73,7 @@ std::vector<std::string> renderer_names() {
 
 std::unique_ptr<Renderer> make_renderer(const std::string& name, const Scene& scene) {
   for (const Entry& entry : kRenderers) {
-    if (name == entry.name) return entry.make(scene);
+    if (name == entry.name) return entry.make(scene);  // which refuses a scene without a map
   }
   throw InputError(
       fmt::format("renderer '{}' is unknown; one of: {}", name, fmt::join(renderer_names(), ", ")));

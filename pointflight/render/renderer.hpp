@@ -58,7 +58,9 @@ class Renderer {
  public:
   virtual ~Renderer() = default;
 
-  /// Writes `hits[i]` for `batch.rays[i]`; both have the same length.
+  /// Writes `hits[i]` for `batch.rays[i]`; both have the same length. Rays are finite, which debug
+  /// builds assert; throws std::invalid_argument where sizes do not fit, the pose is not finite or
+  /// a body lacks its shape or its pose.
   virtual void render(const RayBatch& batch,
                       std::span<Hit> hits,
                       const Executor& executor) const = 0;
@@ -68,9 +70,14 @@ class Renderer {
 
   /// True if all rays are rendered from `T_world_sensor` whatever their own origins are.
   [[nodiscard]] virtual bool is_snapshot() const { return false; }
+
+ protected:
+  /// What `render` states above; every renderer calls it first.
+  static void check(const RayBatch& batch, std::span<const Hit> hits);
 };
 
-/// Makes a renderer by name ("beam", "paper") for a scene. Throws InputError that lists the names.
+/// Makes a renderer by name ("beam", "paper") for a scene. Throws InputError that lists the names,
+/// and std::invalid_argument where the scene has no map.
 std::unique_ptr<Renderer> make_renderer(const std::string& name, const Scene& scene);
 
 /// Names of the renderers.
