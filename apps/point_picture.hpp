@@ -29,7 +29,7 @@ struct PointLayer {
   const PointSample* sample = nullptr;
 };
 
-/// A top view above a side view at one scale, with coordinates in metres at the edges. Throws
+/// A top view above a side view, metres along the axes. Throws
 /// InputError if it cannot be written.
 void draw_points(const std::string& title,
                  const std::string& subtitle,
