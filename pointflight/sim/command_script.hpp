@@ -22,8 +22,9 @@ struct CommandSettings {
   Vector3d rates_deg = Vector3d::Zero();     ///< Of body rates, deg/s.
   Vector3d feed_forward = Vector3d::Zero();  ///< Velocity of a position command, m/s.
   Vector3d rpy_deg = Vector3d::Zero();       ///< Of an attitude command.
+  /// Heading of acceleration, velocity and position, from world x towards y.
   double yaw_deg = 0.0;
-  double yaw_rate_deg = 0.0;
+  double yaw_rate_deg = 0.0;   ///< Feed-forward, deg/s.
   double thrust = 0.0;         ///< N; 0: the weight.
   std::vector<double> rotors;  ///< rad/s
   double height = 1.5;         ///< Of a take-off, m.
@@ -33,6 +34,7 @@ struct CommandSettings {
   double interval = 1.0;       ///< Between its knots, s.
 };
 
+/// The keys of one entry of `commands`.
 void describe(SettingsVisitor& visitor, CommandSettings& settings);
 
 /// The command of a line. Throws InputError (files).

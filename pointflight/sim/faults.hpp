@@ -21,6 +21,7 @@ struct FaultSettings {
   double value = 0.0;
 };
 
+/// The keys of one entry of `faults`.
 void describe(SettingsVisitor& visitor, FaultSettings& settings);
 
 /// Calls `fail` with the key and what is wrong where values make no sense together.
@@ -31,8 +32,11 @@ void check(const FaultSettings& settings,
 class Faults {
  public:
   Faults() = default;
+  /// Of one vehicle, each passed by `check`. Of rotor faults that act at once the smallest share
+  /// counts.
   explicit Faults(std::vector<FaultSettings> settings) : settings_(std::move(settings)) {}
 
+  /// False for most vehicles: nothing else has to be asked then.
   [[nodiscard]] bool any() const { return !settings_.empty(); }
 
   /// Share of a rotor's commanded speed that is left, 0 to 1.

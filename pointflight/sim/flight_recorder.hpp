@@ -13,7 +13,7 @@ namespace pointflight {
 
 /// Writes a run into a folder. For each vehicle, in the folder itself where there is only one and
 /// in one of its name else: trajectory.csv, trajectory.tum, imu.csv, odometry.csv, scans.csv and
-/// scans/<lidar>_<number>.pcd. For all: scenario.yaml with what it needs (scenario_copy.hpp),
+/// `scans/<lidar>_<number>.pcd`. For all: scenario.yaml with what it needs (scenario_copy.hpp),
 /// events.csv, obstacles.csv and at last summary.json. Files appear when `finish` is called, all
 /// together; without it none do, and an earlier run stays (run_folder.hpp). Throws InputError
 /// (disk full, not writable).

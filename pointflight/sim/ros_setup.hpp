@@ -29,7 +29,9 @@ struct RosInput {
   std::string package = "quadrotor_msgs";
 };
 
+/// The keys of one entry of `ros.outputs`.
 void describe(SettingsVisitor& visitor, RosOutput& output);
+/// The keys of one entry of `ros.inputs`.
 void describe(SettingsVisitor& visitor, RosInput& input);
 
 /// A scenario's `ros`: for ROS 1, ROS 2 and recordings.
@@ -39,9 +41,10 @@ struct RosSetup {
   std::string world_alias;          ///< Empty: the profile's.
   /// Of each kind that is named here, instead of the profile's; what is left open is the profile's.
   std::vector<RosOutput> outputs;
-  std::vector<RosInput> inputs;
+  std::vector<RosInput> inputs;  ///< As `outputs`, for what comes in.
 };
 
+/// The keys of `ros`.
 void describe(SettingsVisitor& visitor, RosSetup& setup);
 
 }  // namespace pointflight

@@ -25,6 +25,7 @@ class RunFolder {
   RunFolder(const RunFolder&) = delete;
   RunFolder& operator=(const RunFolder&) = delete;
 
+  /// As it was given: where the files lie after `commit()`.
   [[nodiscard]] const std::string& path() const { return path_; }
   /// Where to write until `commit()`.
   [[nodiscard]] const std::string& staging() const { return staging_; }

@@ -19,13 +19,14 @@
 
 namespace pointflight {
 
+/// A LiDAR on a vehicle: one entry of `lidars`.
 struct LidarMount {
   std::string model = "mid360";                  ///< Name or path of a sensor file.
   Vector3d position = Vector3d(0.0, 0.0, 0.1);   ///< m, body frame.
   Vector3d rotation_rpy_deg = Vector3d::Zero();  ///< Of the sensor's axes in the body.
-  std::string renderer = "beam";
-  bool snapshot = false;  ///< One pose a scan, as in the paper.
-  bool noise = true;
+  std::string renderer = "beam";                 ///< "beam" or "paper": `renderer_names`.
+  bool snapshot = false;                         ///< One pose a scan, as in the paper.
+  bool noise = true;                             ///< Range noise of the sensor file.
 };
 
 /// Limits of the vehicle file that a scenario tightens or widens; 0: the file's.
@@ -33,18 +34,18 @@ struct LimitSetup {
   double speed_max = 0.0;               ///< m/s
   double acceleration_max = 0.0;        ///< Horizontal, m/s^2.
   double climb_acceleration_max = 0.0;  ///< m/s^2
-  double tilt_max_deg = 0.0;
-  double body_rate_max = 0.0;  ///< rad/s
+  double tilt_max_deg = 0.0;            ///< Greatest tilt.
+  double body_rate_max = 0.0;           ///< rad/s
 };
 
 /// One vehicle, or several alike.
 struct VehicleSetup {
-  std::string name;  ///< Of its files and topics; empty: "drone<number>".
-  std::string model = "quad_330";
-  Vector3d start = Vector3d::Zero();
-  double start_yaw_deg = 0.0;
-  bool landed = false;  ///< Starts with rotors off, carried by the ground.
-  std::int64_t copies = 1;
+  std::string name;                   ///< Of its files and topics; empty: "drone<number>".
+  std::string model = "quad_330";     ///< Name or path of a vehicle file.
+  Vector3d start = Vector3d::Zero();  ///< Of the body's origin, world, m.
+  double start_yaw_deg = 0.0;         ///< Heading at first, from world x towards y.
+  bool landed = false;                ///< Starts with rotors off, carried by the ground.
+  std::int64_t copies = 1;            ///< So many alike, each with its own number.
   Vector3d copy_offset =
       Vector3d(0.0, 2.0, 0.0);          ///< Of start and waypoints, from copy to copy, m.
   std::int64_t seed = -1;               ///< Of its sensors and gusts; -1: the run's.
@@ -53,45 +54,49 @@ struct VehicleSetup {
   double command_timeout = 0.5;         ///< s; 0: commands hold for ever.
   bool battery = false;                 ///< Fly on the vehicle's battery.
   std::string on_low_battery = "land";  ///< At its reserve; or "fall", "report".
-  LimitSetup limits;
-  std::vector<LidarMount> lidars = {LidarMount{}};
-  MissionSettings mission;
-  std::vector<CommandSettings> commands;
-  std::vector<FaultSettings> faults;
+  LimitSetup limits;                    ///< Tightened or widened for this vehicle.
+  std::vector<LidarMount> lidars = {LidarMount{}};  ///< One is mounted where the file says nothing.
+  MissionSettings mission;                          ///< Without waypoints it hovers at its start.
+  std::vector<CommandSettings> commands;            ///< By time; the mission comes first, at 0 s.
+  std::vector<FaultSettings> faults;                ///< What fails on board, and when.
 };
 
 /// The air.
 struct AirSetup {
-  WindSettings wind;
+  WindSettings wind;          ///< Mean wind and gusts.
   bool ground_effect = true;  ///< Where the vehicle's file has its propellers' radius.
 };
 
+/// What a flight writes (`FlightRecorder`) and how often samples come.
 struct OutputSetup {
   double trajectory_rate = 200.0;  ///< Hz
-  bool scans = true;
-  bool imu = true;
-  bool odometry = false;
-  double odometry_rate = 200.0;  ///< Hz
-  double obstacle_rate = 10.0;   ///< Hz
+  bool scans = true;               ///< PCD files; scans are taken in any case.
+  bool imu = true;                 ///< imu.csv
+  bool odometry = false;           ///< odometry.csv
+  double odometry_rate = 200.0;    ///< Hz
+  double obstacle_rate = 10.0;     ///< Hz
 };
 
 /// A run: what a scenario file says.
 struct Scenario {
   std::string path;  ///< Of the file; relative paths in it are taken from its folder.
   std::map<std::string, int> lines;  ///< Line of each key, for messages.
-  std::string map;
-  std::string map_hash;  ///< Of the map it was flown in (SurfelMap::hash); empty: any will do.
-  std::int64_t seed = 1;
-  double duration = 0.0;        ///< s; 0: as long as the mission takes.
+  std::string map;                   ///< Path of the .pfmap, as the file has it.
+  std::string map_hash;   ///< Of the map it was flown in (SurfelMap::hash); empty: any will do.
+  std::int64_t seed = 1;  ///< Of everything random.
+  double duration = 0.0;  ///< s; 0: as long as the mission takes.
   double physics_step = 0.001;  ///< s
+  /// Before copies are written out: `fleet`.
   std::vector<VehicleSetup> vehicles = {VehicleSetup{}};
   bool is_short =
       false;  ///< The file is for one vehicle: `vehicle`, `lidars`, `mission`, ... on top.
-  std::vector<ObstacleSettings> obstacles;
-  AirSetup air;
-  OutputSetup output;
-  RosSetup ros;
+  std::vector<ObstacleSettings> obstacles;  ///< What moves by itself.
+  AirSetup air;                             ///< Wind and ground effect.
+  OutputSetup output;                       ///< What is written.
+  RosSetup ros;                             ///< Names of messages, for ROS and recordings.
 
+  /// Of the file: what relative paths are taken from. Empty for a scenario made by a program, which
+  /// stands for the working folder.
   [[nodiscard]] std::string folder() const;
 
   /// The vehicles with their copies written out, each with a name. Keys of number i in messages:

@@ -14,16 +14,18 @@
 
 namespace pointflight {
 
+/// How a run ended, or that it goes on.
 enum class RunEnd {
-  kRunning,
-  kCompleted,
-  kMissionUnfinished,
-  kCollision,
+  kRunning,            ///< Not yet ended.
+  kCompleted,          ///< All that was to be done is done.
+  kMissionUnfinished,  ///< Time was up with a vehicle away from its goal, crashed or empty.
+  kCollision,          ///< A vehicle with on_collision: stop met something.
   kLeftMap,  ///< `is_lost` (sim/start_check.hpp).
-  kInterrupted,
+  kInterrupted,  ///< `Simulation::interrupt`.
   kIdle  ///< Nothing to do and no commands for `Simulation::kIdleTime`; the scenario has no
          ///< duration.
 };
+/// The word in summary.json and for users: "completed", "mission unfinished", ...
 const char* to_string(RunEnd end);
 /// Why, where the word alone does not say it: half a sentence, or empty.
 const char* reason_of(RunEnd end);
@@ -31,12 +33,12 @@ const char* reason_of(RunEnd end);
 /// Everything of a run that changes: a value. What it holds by pointer (trajectories that are
 /// flown) is immutable.
 struct SimulationState {
-  SimTime time;
-  std::uint64_t step_number = 0;
-  std::int64_t next_obstacle_sample = 0;
-  RunEnd end = RunEnd::kRunning;
+  SimTime time;                           ///< Start of the next step.
+  std::uint64_t step_number = 0;          ///< Steps that were done.
+  std::int64_t next_obstacle_sample = 0;  ///< Index in the schedule of output.obstacle_rate.
+  RunEnd end = RunEnd::kRunning;          ///< How it ended; no step is done after that.
   SimTime busy_until;  ///< That commands from the program last and what is waited after them.
-  std::vector<VehicleStatus> vehicles;
+  std::vector<VehicleStatus> vehicles;  ///< By number.
 };
 
 /// The deterministic loop: sense, control, integrate, and scans in arrears. A function of scenario,
@@ -79,25 +81,38 @@ class Simulation {
   /// Ends the run as completed: a goal that only the calling program knows is reached.
   void complete();
 
+  /// All that changes, to be copied and kept for `restore`.
   [[nodiscard]] const SimulationState& state() const { return state_; }
   /// Goes on from a state of this simulation or a copy of it: the same bytes as the first time.
   /// Throws std::invalid_argument where it is of another fleet.
   void restore(const SimulationState& state);
 
+  /// Of the states that `status` has: the start of the next step.
   [[nodiscard]] SimTime time() const { return state_.time; }
+  /// When the run ends by itself: the scenario's duration, or else the end of missions and
+  /// commands, which moves as a program gives more. A landing under way is waited for.
   [[nodiscard]] SimTime end_time() const;
+  /// `RunEnd::kRunning` until a step returns false or the run was ended.
   [[nodiscard]] RunEnd end() const { return state_.end; }
+  /// As it was given; copies of vehicles are not written out.
   [[nodiscard]] const Scenario& scenario() const;
+  /// The one that is flown in.
   [[nodiscard]] const SurfelMap& map() const;
+  /// The same, to be kept beyond the simulation.
   [[nodiscard]] std::shared_ptr<const SurfelMap> shared_map() const;
 
+  /// Copies included.
   [[nodiscard]] std::size_t vehicle_count() const { return state_.vehicles.size(); }
+  /// What does not change of a vehicle: hull, LiDARs, settings. Throws std::out_of_range.
   [[nodiscard]] const VehicleAgent& vehicle(std::size_t number) const;
+  /// What changes of a vehicle, at `time`. Throws std::out_of_range.
   [[nodiscard]] const VehicleStatus& status(std::size_t number) const;
+  /// What happened to a vehicle so far. Throws std::out_of_range.
   [[nodiscard]] const VehicleSummary& summary(std::size_t number) const {
     return status(number).summary;
   }
 
+  /// How many there are at any time: their labels follow `kFirstObstacle`.
   [[nodiscard]] std::size_t obstacle_count() const;
   /// Obstacles between two instants.
   [[nodiscard]] std::vector<Body> obstacles(SimTime from, SimTime until) const;

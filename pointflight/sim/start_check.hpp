@@ -19,8 +19,8 @@ void check_reach(const Scenario& scenario, const std::vector<VehicleSetup>& flee
 
 /// A vehicle where it starts.
 struct StartingVehicle {
-  const VehicleAgent* agent = nullptr;
-  Pose T_world_body;
+  const VehicleAgent* agent = nullptr;  ///< Never null where it is checked.
+  Pose T_world_body;                    ///< Its pose at time zero.
 };
 
 /// True for places so far outside of the map's bounds that nobody means to be there: 50 m beside or

@@ -24,6 +24,7 @@ class StateHistory {
   /// The greatest speed between records that matter for [from, until], m/s.
   [[nodiscard]] double speed_max(SimTime from, SimTime until) const;
 
+  /// True before the first record; `at` must not be called then.
   [[nodiscard]] bool empty() const { return records_.empty(); }
 
  private:

@@ -20,74 +20,75 @@ namespace pointflight {
 
 /// What happened to a vehicle in a run.
 struct VehicleSummary {
-  double distance_flown = 0.0;      ///< m
-  double speed_max = 0.0;           ///< m/s
-  double tracking_error_rms = 0.0;  ///< Of the position against its command, m.
-  double tracking_error_max = 0.0;
-  std::uint64_t states = 0;
-  std::uint64_t imu_samples = 0;
-  std::uint64_t scans = 0;
-  std::uint64_t beams = 0;
-  std::uint64_t points = 0;
-  std::uint64_t collisions = 0;
-  Duration speed_limited{0};  ///< How long its speed limit cut what was asked for.
-  Duration acceleration_limited{0};
-  Duration tilt_limited{0};
+  double distance_flown = 0.0;             ///< m
+  double speed_max = 0.0;                  ///< m/s
+  double tracking_error_rms = 0.0;         ///< Of the position against its command, m.
+  double tracking_error_max = 0.0;         ///< m
+  std::uint64_t states = 0;                ///< Samples of the truth.
+  std::uint64_t imu_samples = 0;           ///< Samples of the IMU.
+  std::uint64_t scans = 0;                 ///< Delivered: lost ones do not count.
+  std::uint64_t beams = 0;                 ///< Fired in them.
+  std::uint64_t points = 0;                ///< Returns in them.
+  std::uint64_t collisions = 0;            ///< Times that its hull entered something.
+  Duration speed_limited{0};               ///< How long its speed limit cut what was asked for.
+  Duration acceleration_limited{0};        ///< The same for the horizontal or climbing one.
+  Duration tilt_limited{0};                ///< The same for its greatest tilt.
   Duration rotors_limited{0};              ///< How long the rotors could not give the thrust.
   std::uint64_t beyond_limits = 0;         ///< Trajectories that asked for more than it has.
   std::optional<SimTime> battery_low;      ///< When it came to its reserve.
   std::optional<SimTime> battery_empty;    ///< When its rotors stopped.
   std::optional<double> closest_approach;  ///< Of the hull to anything, m; negative inside.
+  /// Of the other thing, m; as below, at the closest approach.
   Vector3d closest_place_world = Vector3d::Zero();
-  Label closest_label = kMapLabel;
+  Label closest_label = kMapLabel;  ///< What it came closest to.
 };
 
 /// All of a vehicle that changes: a value, so that a run can be saved and branched.
 struct VehicleStatus {
-  VehicleState state;
-  AutopilotState autopilot;
-  Imu::Biases imu_biases;
-  std::optional<ImuSample> last_imu;
-  GustState gusts;
-  BatteryState battery;
-  FlightConditions conditions;
-  std::vector<double> rotor_commands;
-  StateHistory history;
-  ProximityState proximity;
-  bool landed = false;               ///< The ground carries it.
-  bool crashed = false;              ///< Rotors off for good.
-  bool at_rest = false;              ///< A wreck on the ground.
-  bool commanded = false;            ///< A program has told it something.
-  std::vector<VehicleEvent> events;  ///< Not yet delivered.
-  std::size_t next_command = 0;      ///< Of the scenario's.
-  bool scripted = false;             ///< What it does is the scenario's last command.
-  std::int64_t next_state = 0;
-  std::int64_t next_imu = 0;
-  std::int64_t next_odometry = 0;
+  VehicleState state;                   ///< Body and rotors at the present time.
+  AutopilotState autopilot;             ///< What it was told, and its memory.
+  Imu::Biases imu_biases;               ///< As they have walked up to the last sample.
+  std::optional<ImuSample> last_imu;    ///< What a stuck axis repeats.
+  GustState gusts;                      ///< Unchanged in calm air.
+  BatteryState battery;                 ///< Unchanged without a battery.
+  FlightConditions conditions;          ///< Of the step under way: wind, ground, battery, faults.
+  std::vector<double> rotor_commands;   ///< rad/s, held over the step under way.
+  StateHistory history;                 ///< Poses that scans in arrears still need.
+  ProximityState proximity;             ///< What its hull is near to or touches.
+  bool landed = false;                  ///< The ground carries it.
+  bool crashed = false;                 ///< Rotors off for good.
+  bool at_rest = false;                 ///< A wreck on the ground.
+  bool commanded = false;               ///< A program has told it something.
+  std::vector<VehicleEvent> events;     ///< Not yet delivered.
+  std::size_t next_command = 0;         ///< Of the scenario's.
+  bool scripted = false;                ///< What it does is the scenario's last command.
+  std::int64_t next_state = 0;          ///< Index in the schedule of output.trajectory_rate.
+  std::int64_t next_imu = 0;            ///< Index in the schedule of the IMU's rate.
+  std::int64_t next_odometry = 0;       ///< Index in the schedule of output.odometry_rate.
   std::vector<OdometrySample> late;     ///< Measured, not yet delivered.
   std::vector<std::int64_t> next_scan;  ///< Of each lidar.
-  double squared_error_sum = 0.0;
-  std::uint64_t steps = 0;
-  VehicleSummary summary;
+  double squared_error_sum = 0.0;       ///< Of the tracking error, m^2.
+  std::uint64_t steps = 0;              ///< That it was summed over.
+  VehicleSummary summary;               ///< What happened so far.
 };
 
 /// What one vehicle delivers within a step.
 struct StepSamples {
-  std::vector<StateSample> states;
-  std::vector<ImuSample> imu;
-  std::vector<OdometrySample> odometry;
-  std::vector<CollisionEvent> collisions;
-  std::vector<VehicleEvent> events;
+  std::vector<StateSample> states;         ///< In order of time, as all of these.
+  std::vector<ImuSample> imu;              ///< Of its IMU.
+  std::vector<OdometrySample> odometry;    ///< Delivered in this step, delayed ones among them.
+  std::vector<CollisionEvent> collisions;  ///< Entered or left in this step.
+  std::vector<VehicleEvent> events;        ///< Noticed since the last step.
 };
 
 /// A LiDAR on a vehicle.
 struct MountedLidar {
-  std::unique_ptr<Lidar> lidar;
-  std::shared_ptr<const Renderer> renderer;
-  Pose T_body_sensor;
-  Schedule schedule;
-  bool snapshot;
-  bool noise;
+  std::unique_ptr<Lidar> lidar;  ///< Pattern and noise; its number is vehicle << 8 | LiDAR.
+  std::shared_ptr<const Renderer> renderer;  ///< Shared by all that name the same one.
+  Pose T_body_sensor;                        ///< From the sensor's axes to the body's.
+  Schedule schedule;                         ///< Scan k covers [at(k), at(k + 1)).
+  bool snapshot;                             ///< All beams from one pose: LidarMount.
+  bool noise;                                ///< Range noise of the sensor file.
 };
 
 /// Gives renderers by name; vehicles share them.
@@ -102,6 +103,7 @@ class VehicleAgent {
                const VehicleSetup& setup,
                const RendererByName& renderer);
 
+  /// Hovering at its start, rotors at hover speed; or landed, rotors still.
   [[nodiscard]] VehicleStatus start() const;
 
   /// Takes a command; returns why not, if so. A trajectory that is beyond the vehicle is an event.
@@ -129,16 +131,27 @@ class VehicleAgent {
   /// Its hull met something: what the scenario says happens.
   void crash(VehicleStatus& status) const;
 
+  /// What scans and collisions call it.
   [[nodiscard]] Label label() const { return kFirstVehicle + number_; }
+  /// Its index in the fleet, from 0.
   [[nodiscard]] std::uint32_t number() const { return number_; }
+  /// As the scenario has it, with a name.
   [[nodiscard]] const VehicleSetup& setup() const { return setup_; }
+  /// The vehicle file's, with the scenario's limits and controller in place.
   [[nodiscard]] const VehicleSettings& settings() const { return dynamics_.settings(); }
+  /// Turns commands into rotor speeds; its state is `VehicleStatus::autopilot`.
   [[nodiscard]] const Autopilot& autopilot() const { return autopilot_; }
+  /// Without waypoints: of zero duration, at the start.
   [[nodiscard]] const Mission& mission() const { return *mission_; }
+  /// What must not touch anything; around the body's origin, m.
   [[nodiscard]] const Solid& hull() const { return hull_; }
+  /// The hull, as LiDARs of others see it.
   [[nodiscard]] const BodyShape& shape() const { return shape_; }
+  /// In the order of the scenario.
   [[nodiscard]] const std::vector<MountedLidar>& lidars() const { return lidars_; }
+  /// Empty for most.
   [[nodiscard]] const Faults& faults() const { return faults_; }
+  /// Of its sensors and gusts: its own, or the run's.
   [[nodiscard]] std::uint64_t seed() const { return seed_; }
 
   /// What of the scenario's mission and trajectories is beyond the vehicle, a line each.

@@ -25,42 +25,44 @@ struct RotorModel {
   double speed_min = 0.0;           ///< rad/s
   double speed_max = 0.0;           ///< rad/s
   double natural_frequency = 0.0;   ///< Of the speed's second-order response, rad/s; 0: ideal.
-  double damping = 1.0;
-  double radius = 0.0;  ///< Of the propeller, m: ground effect; 0: none.
+  double damping = 1.0;  ///< Of the speed's response; used with a natural frequency only.
+  double radius = 0.0;   ///< Of the propeller, m: ground effect; 0: none.
 };
 
 /// Gains follow from these and from the airframe's mass and inertia.
 struct LoopDesign {
   double natural_frequency = 1.0;  ///< rad/s
-  double damping = 0.9;
+  double damping = 0.9;            ///< Ratio; 1 is critical.
   /// Position loops: how quickly steady disturbances are learnt, in units of natural_frequency;
   /// attitude loops: integral gain in units of natural_frequency^3.
   double integral = 0.0;
 };
 
+/// How a vehicle is controlled: loops from position to rotors.
 struct ControllerSettings {
-  std::string kind = "cascade";  ///< or "geometric"
-  LoopDesign horizontal{1.8, 0.9, 0.25};
-  LoopDesign vertical{2.5, 0.9, 0.25};
-  LoopDesign roll_pitch{12.0, 0.9, 0.0};
-  LoopDesign yaw{4.0, 0.9, 0.0};
-  double speed_max = 15.0;         ///< Of velocity and position commands, m/s.
-  double tilt_max_deg = 35.0;      ///< From 90 on: none (geometric only).
-  double acceleration_max = 10.0;  ///< Of the position loop, horizontal, m/s^2.
-  double climb_acceleration_max = 10.0;
-  double error_max = 5.0;       ///< Position errors count no more than this, m.
-  double integral_max = 4.0;    ///< Disturbance that the position loops allow for, m/s^2.
-  double body_rate_max = 10.0;  ///< Demanded rates, rad/s.
+  std::string kind = "cascade";           ///< or "geometric"
+  LoopDesign horizontal{1.8, 0.9, 0.25};  ///< Position loop, world x and y.
+  LoopDesign vertical{2.5, 0.9, 0.25};    ///< Position loop, world z.
+  LoopDesign roll_pitch{12.0, 0.9, 0.0};  ///< Attitude loop about body x and y.
+  LoopDesign yaw{4.0, 0.9, 0.0};          ///< Attitude loop about body z.
+  double speed_max = 15.0;                ///< Of velocity and position commands, m/s.
+  double tilt_max_deg = 35.0;             ///< From 90 on: none (geometric only).
+  double acceleration_max = 10.0;         ///< Of the position loop, horizontal, m/s^2.
+  double climb_acceleration_max = 10.0;   ///< The same upwards, m/s^2.
+  double error_max = 5.0;                 ///< Position errors count no more than this, m.
+  double integral_max = 4.0;              ///< Disturbance that the position loops allow for, m/s^2.
+  double body_rate_max = 10.0;            ///< Demanded rates, rad/s.
 };
 
+/// Where an IMU sits and how it errs (REP 145 axes).
 struct ImuSettings {
-  double rate = 200.0;                   ///< Hz
-  Vector3d position = Vector3d::Zero();  ///< m, body frame.
-  Vector3d rotation_rpy_deg = Vector3d::Zero();
-  double gyro_noise_density = 0.0;   ///< rad/s/sqrt(Hz)
-  double gyro_bias_walk = 0.0;       ///< rad/s^2/sqrt(Hz)
-  double accel_noise_density = 0.0;  ///< m/s^2/sqrt(Hz)
-  double accel_bias_walk = 0.0;      ///< m/s^3/sqrt(Hz)
+  double rate = 200.0;                           ///< Hz
+  Vector3d position = Vector3d::Zero();          ///< m, body frame.
+  Vector3d rotation_rpy_deg = Vector3d::Zero();  ///< Of its axes in the body.
+  double gyro_noise_density = 0.0;               ///< rad/s/sqrt(Hz)
+  double gyro_bias_walk = 0.0;                   ///< rad/s^2/sqrt(Hz)
+  double accel_noise_density = 0.0;              ///< m/s^2/sqrt(Hz)
+  double accel_bias_walk = 0.0;                  ///< m/s^3/sqrt(Hz)
 };
 
 /// LiPo battery: 3.5 V a cell when empty to 4.2 V when full, less what the current takes.
@@ -74,9 +76,9 @@ struct BatterySettings {
 
 /// A vehicle file, `data/vehicles/<name>.yaml`.
 struct VehicleSettings {
-  std::string path;
-  std::string title;
-  std::string source;
+  std::string path;                              ///< Of the file, for messages.
+  std::string title;                             ///< Name for users.
+  std::string source;                            ///< Where the figures come from.
   double mass = 1.0;                             ///< kg
   Vector3d inertia_diagonal = Vector3d::Ones();  ///< kg m^2
   std::string shape = "sphere";                  ///< Of the hull; or "box", "capsule" (upright)
@@ -85,18 +87,20 @@ struct VehicleSettings {
   double height = 1.0;                           ///< Of a capsule, caps included, m.
   double intensity = 100.0;                      ///< Of LiDAR returns from it.
   Vector3d drag_area = Vector3d::Zero();         ///< c_d A along each body axis, m^2.
-  RotorModel rotor;
+  RotorModel rotor;                              ///< One for all rotors.
+  /// Four or more; commands and states count them in this order.
   std::vector<RotorPlacement> rotors;
   /// The innermost command that its autopilot takes: "rotor_speeds", "body_rates", ...
   std::string lowest_command = "rotor_speeds";
-  ControllerSettings controller;
-  ImuSettings imu;
-  BatterySettings battery;
+  ControllerSettings controller;  ///< Loops and limits.
+  ImuSettings imu;                ///< One on each vehicle.
+  BatterySettings battery;        ///< Without cells: none.
 
   /// What must stay free of everything, and what others see of it; around the body's origin.
   [[nodiscard]] Solid hull() const;
 
   [[nodiscard]] double hover_speed() const;  ///< rad/s of each rotor.
+  /// Of all rotors at their greatest speed, against the weight.
   [[nodiscard]] double thrust_to_weight() const;
 
   /// What the air does to it as it moves at `v_body` through still air, rotors at hover speed,

@@ -14,16 +14,16 @@ namespace pointflight {
 
 /// What an autopilot does and remembers: a value.
 struct AutopilotState {
-  Command command = HoverCommand{};
+  Command command = HoverCommand{};              ///< The last that was taken; hover after a timeout.
   SimTime since;                                 ///< When the command was given.
   std::shared_ptr<const Trajectory> trajectory;  ///< That it follows from `since` on, or none.
-  bool armed = true;
+  bool armed = true;                    ///< False: rotors are off, whatever the command says.
   std::optional<PositionCommand> hold;  ///< Where it hovers, once it is slow.
   PositionCommand reference;            ///< What it last asked for; for records.
-  ControllerMemory memory;
-  std::uint64_t rejected = 0;  ///< Commands that were not taken.
-  std::uint64_t timeouts = 0;  ///< Times the watchdog made it hover.
-  std::string last_rejection;  ///< Why, in words.
+  ControllerMemory memory;              ///< Of the control loops.
+  std::uint64_t rejected = 0;           ///< Commands that were not taken.
+  std::uint64_t timeouts = 0;           ///< Times the watchdog made it hover.
+  std::string last_rejection;           ///< Why, in words.
 
   /// Counts a command that is not taken; returns the reason.
   std::string reject(std::string reason);
@@ -54,6 +54,7 @@ class Autopilot {
   /// Why the vehicle cannot take a command, if so.
   [[nodiscard]] std::optional<std::string> objection(const Command& command) const;
 
+  /// As given to the constructor.
   [[nodiscard]] const VehicleSettings& settings() const { return settings_; }
 
  private:

@@ -13,30 +13,30 @@ namespace pointflight {
 
 /// Speeds of all rotors, rad/s, in the order of the vehicle file.
 struct RotorSpeedCommand {
-  std::vector<double> speeds;
+  std::vector<double> speeds;  ///< One a rotor; 0: off.
 };
 /// Body rates (rad/s) and total thrust along body z (N).
 struct BodyRateCommand {
-  Vector3d omega_body = Vector3d::Zero();
-  double thrust = 0.0;
+  Vector3d omega_body = Vector3d::Zero();  ///< rad/s, about the body's axes.
+  double thrust = 0.0;                     ///< N
 };
 /// Attitude and total thrust along body z (N); rates are feed-forward.
 struct AttitudeCommand {
-  Quaterniond q_world_body = Quaterniond::Identity();
-  double thrust = 0.0;
-  Vector3d omega_body = Vector3d::Zero();
+  Quaterniond q_world_body = Quaterniond::Identity();  ///< Attitude: body axes in the world.
+  double thrust = 0.0;                                 ///< N
+  Vector3d omega_body = Vector3d::Zero();              ///< Feed-forward, rad/s.
 };
 /// Acceleration without gravity (zero hovers), m/s^2, and heading.
 struct AccelerationCommand {
-  Vector3d a_world = Vector3d::Zero();
-  double yaw = 0.0;
-  double yaw_rate = 0.0;
+  Vector3d a_world = Vector3d::Zero();  ///< m/s^2, world.
+  double yaw = 0.0;                     ///< rad, from world x towards y.
+  double yaw_rate = 0.0;                ///< Feed-forward, rad/s.
 };
 /// Velocity, m/s, and heading.
 struct VelocityCommand {
-  Vector3d v_world = Vector3d::Zero();
-  double yaw = 0.0;
-  double yaw_rate = 0.0;
+  Vector3d v_world = Vector3d::Zero();  ///< m/s; in the world, but see `in_body`.
+  double yaw = 0.0;                     ///< rad, from world x towards y.
+  double yaw_rate = 0.0;                ///< rad/s; feed-forward, but see `turn`.
   bool turn = false;     ///< Turn at `yaw_rate` from the present heading on; `yaw` is not used.
   bool in_body = false;  ///< `v_world` is along the level body axes: ahead, left, up.
 };
@@ -51,26 +51,30 @@ using Setpoint = std::variant<RotorSpeedCommand,
 
 /// Follow a trajectory, from its start on.
 struct TrajectoryCommand {
+  /// Never null; it starts when the command is taken.
   std::shared_ptr<const Trajectory> trajectory;
 };
 /// Fly through waypoints from where the vehicle is, straight and at rest at each.
 struct WaypointCommand {
-  MissionSettings mission;
+  MissionSettings mission;   ///< Its waypoints are in the world, m; starts where the vehicle is.
   bool keep_height = false;  ///< Waypoints are at the present height, whatever their z.
 
+  /// Two that are equal are one order said twice.
   bool operator==(const WaypointCommand&) const = default;
 };
 /// Rise by `height` (m) from the present place; arms.
 struct TakeOffCommand {
-  double height = 1.5;
-  double speed = 1.0;  ///< m/s
+  double height = 1.5;  ///< Above the present place, m.
+  double speed = 1.0;   ///< m/s
 
+  /// Two that are equal are one order said twice.
   bool operator==(const TakeOffCommand&) const = default;
 };
 /// Come down until something carries the vehicle, then stop the rotors.
 struct LandCommand {
   double speed = 0.5;  ///< m/s
 
+  /// Two that are equal are one order said twice.
   bool operator==(const LandCommand&) const = default;
 };
 /// Brake and stay.

@@ -15,10 +15,10 @@ namespace pointflight {
 
 /// Which limits a controller cut a demand to.
 struct LimitsReached {
-  bool speed = false;
-  bool acceleration = false;
-  bool tilt = false;
-  bool rotors = false;  ///< Another thrust than demanded.
+  bool speed = false;         ///< Of velocity and position setpoints.
+  bool acceleration = false;  ///< Horizontal or climbing, of the position loop.
+  bool tilt = false;          ///< The attitude for the demanded acceleration.
+  bool rotors = false;        ///< Another thrust than demanded.
 };
 
 /// What a controller remembers from one period to the next: a value, so that a run can be saved,

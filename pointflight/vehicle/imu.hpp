@@ -9,8 +9,9 @@
 
 namespace pointflight {
 
+/// One sample of an IMU.
 struct ImuSample {
-  SimTime time;
+  SimTime time;    ///< When it was measured; nothing delays it.
   Vector3d gyro;   ///< rad/s, IMU axes.
   Vector3d accel;  ///< Specific force, m/s^2, IMU axes: +9.81 on z when level and at rest.
   Quaterniond q_world_imu = Quaterniond::Identity();  ///< Truth: the attitude of its axes.
@@ -28,6 +29,7 @@ inline Vector3d specific_force_body(const Quaterniond& q_world_body, const Vecto
 /// biases are the only state, which the caller keeps.
 class Imu {
  public:
+  /// `seed` and the `vehicle`'s number address its random draws.
   Imu(const ImuSettings& settings, std::uint64_t seed, std::uint32_t vehicle);
 
   /// What walks from sample to sample.

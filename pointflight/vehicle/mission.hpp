@@ -11,10 +11,11 @@ namespace pointflight {
 
 /// Limits of a smooth move.
 struct MotionLimits {
-  double speed = 2.0;
-  double acceleration = 2.0;
-  double jerk = 4.0;
+  double speed = 2.0;         ///< m/s
+  double acceleration = 2.0;  ///< m/s^2
+  double jerk = 4.0;          ///< m/s^3
 
+  /// Exact: for orders that are said again.
   bool operator==(const MotionLimits&) const = default;
 };
 
@@ -27,11 +28,16 @@ class SmoothMove {
   /// `distance` >= 0; the limits must be positive. Peak speed shrinks where the distance is short.
   SmoothMove(double distance, const MotionLimits& limits);
 
+  /// A place on the move, along it.
   struct Sample {
-    double position, speed, acceleration, jerk;
+    double position;      ///< m
+    double speed;         ///< m/s
+    double acceleration;  ///< m/s^2
+    double jerk;          ///< m/s^3
   };
   /// At `t` seconds after the start; at rest before and after.
   [[nodiscard]] Sample at(double t) const;
+  /// Seconds from rest to rest; 0 for no distance.
   [[nodiscard]] double duration() const { return 4.0 * t_jerk_ + 2.0 * t_steady_ + t_cruise_; }
 
  private:
@@ -42,14 +48,16 @@ class SmoothMove {
   double t_cruise_ = 0.0;
 };
 
+/// Waypoints and how to fly through them: a scenario's `mission`.
 struct MissionSettings {
-  MotionLimits motion;
-  std::string yaw = "along_path";  ///< or "fixed"
-  double yaw_rate_deg = 90.0;      ///< Limit while turning.
-  double hold = 0.0;               ///< Seconds at each waypoint.
-  std::vector<Vector3d> waypoints;
+  MotionLimits motion;              ///< Of the straight legs.
+  std::string yaw = "along_path";   ///< or "fixed"
+  double yaw_rate_deg = 90.0;       ///< Limit while turning.
+  double hold = 0.0;                ///< Seconds at each waypoint.
+  std::vector<Vector3d> waypoints;  ///< World, m; empty: hover.
   std::optional<double> final_yaw;  ///< Heading to turn to in the end, rad.
 
+  /// Exact: for orders that are said again.
   bool operator==(const MissionSettings&) const = default;
 };
 
@@ -64,6 +72,7 @@ class Mission : public Trajectory {
   [[nodiscard]] PositionCommand at(double t) const override;
   [[nodiscard]] double duration() const override { return duration_; }
   [[nodiscard]] double length() const { return length_; }  ///< m
+  /// The last waypoint, or the start without any; world, m.
   [[nodiscard]] const Vector3d& goal() const { return goal_; }
 
  private:

@@ -50,6 +50,7 @@ class Multirotor {
   [[nodiscard]] BodyAcceleration acceleration(const VehicleState& state,
                                               const FlightConditions& conditions = {}) const;
 
+  /// As given to the constructor.
   [[nodiscard]] const VehicleSettings& settings() const { return settings_; }
 
  private:

@@ -13,12 +13,12 @@ namespace pointflight {
 /// Where to be and how to move there (the fields of the planners' PositionCommand messages);
 /// derivatives are feed-forward and may stay zero.
 struct PositionCommand {
-  Vector3d p_world = Vector3d::Zero();
-  Vector3d v_world = Vector3d::Zero();
-  Vector3d a_world = Vector3d::Zero();
-  Vector3d jerk_world = Vector3d::Zero();
-  double yaw = 0.0;       ///< rad, from world x towards y
-  double yaw_rate = 0.0;  ///< rad/s
+  Vector3d p_world = Vector3d::Zero();     ///< m
+  Vector3d v_world = Vector3d::Zero();     ///< m/s
+  Vector3d a_world = Vector3d::Zero();     ///< m/s^2
+  Vector3d jerk_world = Vector3d::Zero();  ///< m/s^3
+  double yaw = 0.0;                        ///< rad, from world x towards y
+  double yaw_rate = 0.0;                   ///< rad/s
 };
 
 /// A path in time. Immutable: shared by whoever follows it.
@@ -41,6 +41,7 @@ class PolynomialTrajectory : public Trajectory {
   /// Coefficients by rising power of the time since the piece's start: x, y, z (m), yaw (rad).
   struct Piece {
     double duration = 0.0;  ///< s, positive.
+    /// For each of the four, any number of coefficients: an empty one is zero.
     std::array<std::vector<double>, 4> coefficients;
   };
 
@@ -48,8 +49,9 @@ class PolynomialTrajectory : public Trajectory {
   explicit PolynomialTrajectory(std::vector<Piece> pieces);
 
   /// CSV as uav_trajectories and Crazyswarm write it: a row a piece with the columns duration, x^0
-  /// .. x^7, y^0 .. y^7, z^0 .. z^7, yaw^0 .. yaw^7. Throws InputError with file and line.
+  /// to x^7, y^0 to y^7, z^0 to z^7, yaw^0 to yaw^7. Throws InputError with file and line.
   static std::shared_ptr<const PolynomialTrajectory> read(const std::string& path);
+  /// The same from text; `name` stands for the path in messages.
   static std::shared_ptr<const PolynomialTrajectory> parse(std::string_view text,
                                                            const std::string& name);
 
