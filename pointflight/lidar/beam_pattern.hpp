@@ -45,17 +45,20 @@ std::unique_ptr<BeamPattern> make_pattern(const LidarSettings& settings);
 
 /// The shots n of a train at `phase + n / rate` that fall into scan k of a sensor with `scan_rate`.
 struct ShotTrain {
-  Schedule shots;
-  Schedule scans;
+  Schedule shots;  ///< When it fires.
+  Schedule scans;  ///< When scans start: at k / scan_rate.
 
+  /// The first shot is at `phase` after time zero. Rates must be at least 0.001 Hz.
   ShotTrain(double shot_rate_hz, Duration phase, double scan_rate_hz)
       : shots(shot_rate_hz, phase), scans(scan_rate_hz) {}
 
+  /// The shots of one scan.
   struct Range {
-    std::int64_t begin = 0;
-    std::int64_t end = 0;
-    SimTime scan_start;
+    std::int64_t begin = 0;  ///< First shot of the scan.
+    std::int64_t end = 0;    ///< One past its last shot.
+    SimTime scan_start;      ///< k / scan_rate, rounded to a nanosecond.
   };
+  /// Every shot belongs to exactly one scan, also where the rates do not divide.
   [[nodiscard]] Range in_scan(std::uint64_t scan_index) const;
 
  private:

@@ -14,11 +14,11 @@ namespace pointflight {
 
 /// Which scan to take.
 struct ScanRequest {
-  std::uint64_t index = 0;  ///< Scan number: its pattern, and its place in the noise stream.
-  SimTime start;            ///< When it starts in the run.
-  bool snapshot = false;    ///< All beams from the pose at the scan's middle, as in the paper.
-  bool noise = true;
-  std::uint64_t seed = 0;
+  std::uint64_t index = 0;       ///< Scan number: its pattern, and its place in the noise stream.
+  SimTime start;                 ///< When it starts in the run.
+  bool snapshot = false;         ///< All beams from the pose at the scan's middle, as in the paper.
+  bool noise = true;             ///< Range noise of the sensor file.
+  std::uint64_t seed = 0;        ///< Of the range noise.
   std::span<const Body> bodies;  ///< What moves in the map, without what carries the sensor.
 };
 
@@ -28,7 +28,9 @@ class Lidar {
   /// `sensor` numbers it within the run: the entity of its random streams.
   Lidar(const LidarSettings& settings, std::uint32_t sensor);
 
+  /// As given to the constructor.
   [[nodiscard]] const LidarSettings& settings() const { return settings_; }
+  /// Duration of a scan: 1 / rate, rounded to a nanosecond.
   [[nodiscard]] Duration period() const;
   /// The longest ray that it can see something at, m from the sensor.
   [[nodiscard]] double reach() const;

@@ -12,25 +12,26 @@ namespace pointflight {
 
 /// Livox Mid-360: a rotating prism and mirror behind a slower wedge.
 struct RotorSettings {
-  double shot_rate = 50000.0;      ///< Hz; all lines fire together.
-  double shot_phase = 0.5;         ///< Of the first shot, in shot periods.
-  double rotor_rpm = 10945.0;      ///< theta
-  double wedge_rpm = 600.0;        ///< phi
-  double wedge_wobble = 0.15;      ///< psi = phi + wobble sin(2 phi) + phase, rad
-  double wedge_phase = -0.010644;  ///< rad
-  double wedge_angle_deg = 31.1723;
-  double wedge_index = 1.59285;
-  double mirror_angle_deg = 10.0;
-  double mirror_index = 1.96827;
+  double shot_rate = 50000.0;        ///< Hz; all lines fire together.
+  double shot_phase = 0.5;           ///< Of the first shot, in shot periods.
+  double rotor_rpm = 10945.0;        ///< theta
+  double wedge_rpm = 600.0;          ///< phi
+  double wedge_wobble = 0.15;        ///< psi = phi + wobble sin(2 phi) + phase, rad
+  double wedge_phase = -0.010644;    ///< rad
+  double wedge_angle_deg = 31.1723;  ///< Between its faces.
+  double wedge_index = 1.59285;      ///< Refractive.
+  double mirror_angle_deg = 10.0;    ///< Of the rotor's prism.
+  double mirror_index = 1.96827;     ///< Refractive, of the rotor's prism.
+  /// Of each line in the fan.
   std::vector<double> line_angles_deg = {2.12589, 0.70863, -0.70863, -2.12589};
 };
 
 /// One refracting wedge on a rotating axis.
 struct WedgeSettings {
-  double angle_deg = 0.0;
-  double index = 1.51;
-  double rate = 0.0;  ///< Turns a second; the sign is the sense.
-  double phase_deg = 0.0;
+  double angle_deg = 0.0;   ///< Between the faces.
+  double index = 1.51;      ///< Refractive.
+  double rate = 0.0;        ///< Turns a second; the sign is the sense.
+  double phase_deg = 0.0;   ///< At time zero.
   bool flat_first = false;  ///< Light meets the flat face first ("out"), else the inclined one.
 };
 
@@ -39,8 +40,8 @@ struct PrismsSettings {
   double shot_rate = 40000.0;  ///< Hz; all lines fire together.
   double shot_phase = 0.0;     ///< Of the first shot, in shot periods.
   std::vector<double> line_heights = {
-      0.0};  ///< z of each unit input direction (sqrt(1-s^2), 0, s).
-  std::vector<WedgeSettings> wedges;
+      0.0};                           ///< z of each unit input direction (sqrt(1-s^2), 0, s).
+  std::vector<WedgeSettings> wedges;  ///< In the order in which light passes them.
 };
 
 /// Spinning LiDARs: channels from a table, as a list or evenly spaced.
@@ -49,9 +50,9 @@ struct RingsSettings {
   std::vector<double> elevations_deg;       ///< Instead of a table, in the order of firing.
   std::vector<double> azimuth_offsets_deg;  ///< Of the same channels, as a table has them.
   std::int64_t channels = 0;                ///< Instead of both: so many, from the lowest up.
-  double elevation_min_deg = -15.0;
-  double elevation_max_deg = 15.0;
-  std::string convention = "velodyne";
+  double elevation_min_deg = -15.0;         ///< Of evenly spaced channels: the lowest.
+  double elevation_max_deg = 15.0;          ///< The highest.
+  std::string convention = "velodyne";      ///< Of the angles: "velodyne" or "ouster".
   double cycle_us = 55.296;          ///< velodyne: from one firing of all channels to the next.
   double channel_interval_us = 0.0;  ///< velodyne: between channels, where the table has no times.
   std::int64_t columns = 1024;       ///< ouster: a turn.
@@ -61,22 +62,22 @@ struct RingsSettings {
 
 /// Depth cameras and dense angular grids: all beams at the scan's start.
 struct GridSettings {
-  std::string projection = "angular";
-  std::int64_t columns = 385;
-  std::int64_t rows = 350;
-  double fov_horizontal_deg = 77.0;  ///< angular: beams at the centres of the grid's cells.
-  double fov_vertical_deg = 70.0;
-  double fx = 0.0;  ///< pinhole: pixels.
-  double fy = 0.0;
-  double cx = 0.0;
-  double cy = 0.0;
+  std::string projection = "angular";  ///< "angular" or "pinhole" (x right, y down).
+  std::int64_t columns = 385;          ///< Beams in a row.
+  std::int64_t rows = 350;             ///< Rows.
+  double fov_horizontal_deg = 77.0;    ///< angular: beams at the centres of the grid's cells.
+  double fov_vertical_deg = 70.0;      ///< angular: as above.
+  double fx = 0.0;                     ///< pinhole: pixels.
+  double fy = 0.0;                     ///< pinhole: focal length along the rows' axis, pixels.
+  double cx = 0.0;                     ///< pinhole: principal point, pixels.
+  double cy = 0.0;                     ///< pinhole: principal point, pixels.
 };
 
 /// A user's own table of directions, replayed in a loop.
 struct CsvSettings {
-  std::string file;  ///< Columns azimuth and elevation or zenith, degrees.
-  double points_per_second = 200000.0;
-  std::int64_t lines = 1;  ///< Ring of row i = i mod lines.
+  std::string file;                     ///< Columns azimuth and elevation or zenith, degrees.
+  double points_per_second = 200000.0;  ///< Rows replayed in a second.
+  std::int64_t lines = 1;               ///< Ring of row i = i mod lines.
 };
 
 /// Standard deviation of the range: sqrt(range_sigma^2 + (range_sigma_per_m2 R^2)^2).
@@ -88,32 +89,32 @@ struct RangeNoiseSettings {
 /// Figures of the optics for models to come (angular noise, divergence, detection); they are read,
 /// shown by `lidar show` and not used yet.
 struct OpticsSettings {
-  double wavelength_nm = 0.0;
-  double divergence_horizontal_deg = 0.0;
-  double divergence_vertical_deg = 0.0;
-  double angle_sigma_deg = 0.0;
-  double range_at_10_percent = 0.0;  ///< Detection range on a 10 % target, m.
-  double range_at_80_percent = 0.0;
+  double wavelength_nm = 0.0;              ///< Not used yet.
+  double divergence_horizontal_deg = 0.0;  ///< Full angle at half maximum.
+  double divergence_vertical_deg = 0.0;    ///< Full angle at half maximum.
+  double angle_sigma_deg = 0.0;            ///< Of the beam's direction.
+  double range_at_10_percent = 0.0;        ///< Detection range on a 10 % target, m.
+  double range_at_80_percent = 0.0;        ///< Detection range on an 80 % target, m.
 };
 
 /// A sensor file, `data/lidars/<name>.yaml`.
 struct LidarSettings {
-  std::string path;  ///< Of the file, for messages and for files beside it.
-  std::string title;
-  std::string source;  ///< Where the figures come from.
-  double rate = 10.0;  ///< Scans a second.
-  double range_min = 0.1;
-  double range_max = 100.0;
+  std::string path;                   ///< Of the file, for messages and for files beside it.
+  std::string title;                  ///< Maker and model.
+  std::string source;                 ///< Where the figures come from.
+  double rate = 10.0;                 ///< Scans a second.
+  double range_min = 0.1;             ///< m; nearer returns are lost (a depth camera's: depth).
+  double range_max = 100.0;           ///< m; farther returns are lost (a depth camera's: depth).
   double image_resolution_deg = 0.2;  ///< theta_res of the `paper` renderer.
-  RangeNoiseSettings noise;
-  OpticsSettings optics;
-  std::string pattern;
-  RotorSettings rotor;
-  PrismsSettings prisms;
-  RingsSettings rings;
-  GridSettings grid;
-  CsvSettings csv;
-  std::map<std::string, int> lines;  ///< Of each key in the file, for messages.
+  RangeNoiseSettings noise;           ///< Of every return.
+  OpticsSettings optics;              ///< For models to come.
+  std::string pattern;                ///< Which of the sections below counts: "rotor", ...
+  RotorSettings rotor;                ///< Where `pattern` says so.
+  PrismsSettings prisms;              ///< Where `pattern` says so.
+  RingsSettings rings;                ///< Where `pattern` says so.
+  GridSettings grid;                  ///< Where `pattern` says so.
+  CsvSettings csv;                    ///< Where `pattern` says so.
+  std::map<std::string, int> lines;   ///< Of each key in the file, for messages.
 
   /// "mid360.yaml:12" for a key, or the path where the key is not in the file.
   [[nodiscard]] std::string place(const std::string& key) const;

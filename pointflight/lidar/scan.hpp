@@ -16,22 +16,22 @@ struct ScanPoint {
   float range;               ///< Measured, noise included, m.
   float intensity;           ///< Of the map, in its cloud's scale; 0 where it had none.
   Duration time_offset;      ///< After the scan's start.
-  std::uint16_t ring;
-  std::uint32_t beam;       ///< Index of the beam in the scan's pattern.
-  Label label = kMapLabel;  ///< What it is of: the map, a vehicle, an obstacle.
+  std::uint16_t ring;        ///< As the maker's driver numbers it.
+  std::uint32_t beam;        ///< Index of the beam in the scan's pattern.
+  Label label = kMapLabel;   ///< What it is of: the map, a vehicle, an obstacle.
 };
 
 /// What a LiDAR delivers for one scan: the returns in firing order.
 struct Scan {
-  std::uint64_t index = 0;
-  std::uint32_t vehicle = 0;  ///< Number of the vehicle in the scenario.
-  std::uint32_t sensor = 0;   ///< Number of the LiDAR on it.
-  SimTime start;
-  SimTime end;
-  std::size_t beams = 0;  ///< Fired, whether they returned or not.
-  bool snapshot = false;  ///< All beams left from the sensor's pose at `middle`.
-  SimTime middle;         ///< Between first and last beam (a camera's: its start).
-  std::vector<ScanPoint> points;
+  std::uint64_t index = 0;        ///< Number of the scan since time zero; lost ones are counted.
+  std::uint32_t vehicle = 0;      ///< Number of the vehicle in the scenario.
+  std::uint32_t sensor = 0;       ///< Number of the LiDAR on it.
+  SimTime start;                  ///< Inclusive.
+  SimTime end;                    ///< Exclusive: the next scan's start.
+  std::size_t beams = 0;          ///< Fired, whether they returned or not.
+  bool snapshot = false;          ///< All beams left from the sensor's pose at `middle`.
+  SimTime middle;                 ///< Between first and last beam (a camera's: its start).
+  std::vector<ScanPoint> points;  ///< In firing order; beams without a return have none.
 
   /// When the sensor was where it saw a point from.
   [[nodiscard]] SimTime seen_at(const ScanPoint& point) const {

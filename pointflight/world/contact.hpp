@@ -11,7 +11,7 @@ namespace pointflight {
 struct Contact {
   double distance = 0.0;                    ///< m; negative where they overlap: minus the depth.
   Vector3d place_world = Vector3d::Zero();  ///< Of the thing, about where it is nearest.
-  Label label = kMapLabel;
+  Label label = kMapLabel;                  ///< What the thing is.
 };
 
 /// Distance of a hull to the map within `reach`; nothing where all is farther. To the surfels'

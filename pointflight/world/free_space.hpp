@@ -10,6 +10,7 @@
 
 namespace pointflight {
 
+/// What a tour must keep to.
 struct TourOptions {
   double radius = 0.3;            ///< Of the vehicle, m.
   double margin = 0.4;            ///< Kept free beyond it, m.

@@ -53,6 +53,7 @@ class Keyframes : public ObstacleMotion {
   /// qw, qx, qy, qz. Times ascend. With `repeat` it starts again after the last; without, it stays
   /// there. Throws InputError with file and line.
   static std::unique_ptr<Keyframes> read(const std::string& path, bool repeat);
+  /// The same from text; `name` stands for the path in messages.
   static std::unique_ptr<Keyframes> parse(std::string_view text,
                                           const std::string& name,
                                           bool repeat);

@@ -19,7 +19,7 @@ namespace pointflight {
 
 /// One entry of a scenario's `obstacles`: one or more bodies alike.
 struct ObstacleSettings {
-  std::int64_t count = 1;
+  std::int64_t count = 1;                   ///< So many alike; more than one only in random motion.
   std::string shape = "sphere";             ///< or "box", "cylinder", "cloud"
   double radius = 0.3;                      ///< Of spheres and cylinders, m.
   double radius_max = 0.0;                  ///< Above `radius`: drawn between the two.
@@ -35,12 +35,12 @@ struct ObstacleSettings {
   std::string directions = "any";          ///< or "horizontal"
   std::string at_border = "replace";       ///< or "bounce"
   Vector3d bounds_min = Vector3d::Zero();  ///< Both zero: the map's bounds.
-  Vector3d bounds_max = Vector3d::Zero();
-  Vector3d position = Vector3d::Zero();  ///< Where a still one stands.
-  double yaw_deg = 0.0;
-  std::vector<Vector3d> waypoints;  ///< Of a loop.
-  std::string keyframes;            ///< CSV: `Keyframes`.
-  bool repeat = true;               ///< Keyframes start again after the last.
+  Vector3d bounds_max = Vector3d::Zero();  ///< As bounds_min: world, m.
+  Vector3d position = Vector3d::Zero();    ///< Where a still one stands.
+  double yaw_deg = 0.0;                    ///< Of a still one, from world x towards y.
+  std::vector<Vector3d> waypoints;         ///< Of a loop.
+  std::string keyframes;                   ///< CSV: `Keyframes`.
+  bool repeat = true;                      ///< Keyframes start again after the last.
 };
 
 /// The keys of an entry.
@@ -48,16 +48,16 @@ void describe(SettingsVisitor& visitor, ObstacleSettings& settings);
 
 /// A place that must be free of obstacles at the start.
 struct KeepFree {
-  Vector3d center_world;
-  double radius;
+  Vector3d center_world;  ///< m
+  double radius;          ///< m
 };
 
 /// What obstacles are made from.
 struct ObstacleWorld {
-  std::shared_ptr<const SurfelMap> map;
-  std::uint64_t seed = 1;
-  std::vector<KeepFree> keep_free;
-  std::string folder;  ///< Relative paths are taken from here.
+  std::shared_ptr<const SurfelMap> map;  ///< Never null: where free places are looked for.
+  std::uint64_t seed = 1;                ///< The run's.
+  std::vector<KeepFree> keep_free;       ///< Starts of vehicles.
+  std::string folder;                    ///< Relative paths are taken from here.
   /// Where a key of entry i stands ("scenario.yaml:12: obstacles[0].radius"), for messages.
   std::function<std::string(std::size_t entry, const char* key)> place;
 };
@@ -84,6 +84,7 @@ class Obstacles {
             const ObstacleWorld& world,
             const Executor& executor);
 
+  /// How many there are at any time; what replaces one counts as the same.
   [[nodiscard]] std::size_t size() const { return obstacles_.size(); }
 
   /// Bodies between two instants. Callable from several threads.

@@ -17,20 +17,22 @@ struct WindSettings {
   Vector3d gust_length = Vector3d(50, 50, 20);  ///< custom: scale lengths, m
 };
 
+/// The keys of `air.wind`.
 void describe(SettingsVisitor& visitor, WindSettings& settings);
 
 /// What a vehicle's gusts remember, in units of their deviations: a value.
 struct GustState {
-  double along = 0.0;
-  std::array<double, 2> across{};
-  std::array<double, 2> up{};
+  double along = 0.0;              ///< State of the first-order filter of the along-wind gusts.
+  std::array<double, 2> across{};  ///< States of the second-order filter across the wind.
+  std::array<double, 2> up{};      ///< States of the second-order filter of the vertical gusts.
+  /// False: the filters draw their first state from the stationary distribution.
   bool started = false;
 };
 
 /// Deviations (m/s) and scale lengths (m) of gusts along the mean wind, across it and up.
 struct GustScales {
-  Vector3d sigma;
-  Vector3d length;
+  Vector3d sigma;   ///< Standard deviations, m/s: along, across, up.
+  Vector3d length;  ///< Scale lengths, m: along, across, up.
 };
 
 /// MIL-F-8785C, 3.7.3.4, low altitudes: of `height` above ground (m, 3.048 to 304.8) and the wind
@@ -44,6 +46,7 @@ GustScales low_altitude_gusts(double height, double wind_at_20_feet);
 /// the air. Every vehicle has gusts of its own; draws are addressed by (seed, vehicle, step).
 class Wind {
  public:
+  /// The seed is the vehicle's own, or the run's.
   Wind(const WindSettings& settings, std::uint64_t seed) : settings_(settings), seed_(seed) {}
 
   /// Wind (world, m/s) over physics step number `step` of `dt` seconds, for a vehicle with velocity
@@ -55,6 +58,7 @@ class Wind {
                                    const Vector3d& v_world,
                                    double height) const;
 
+  /// True without mean wind and gusts: `over_step` need not be called.
   [[nodiscard]] bool is_calm() const {
     return settings_.mean.isZero(0.0) && settings_.turbulence == "none";
   }
