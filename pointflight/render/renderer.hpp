@@ -15,12 +15,12 @@ namespace pointflight {
 
 /// What is always there to see: the map. Bodies that move come with each batch of rays.
 struct Scene {
-  std::shared_ptr<const SurfelMap> map;
+  std::shared_ptr<const SurfelMap> map;  ///< Never null.
 };
 
 /// The rays of one scan and what a renderer that makes images needs to lay them out.
 struct RayBatch {
-  std::span<const Ray> rays;
+  std::span<const Ray> rays;  ///< World; those of a snapshot may differ in origin.
   /// The rays' `direction_order`, or empty: the renderer finds it where it needs one. For patterns
   /// that repeat.
   std::span<const std::uint32_t> order;
@@ -36,6 +36,7 @@ struct RayBatch {
   std::span<const Duration> time_offsets;  ///< Of each ray, or empty: all at `time`.
   SimTime snapshot_time;                   ///< Of `T_world_sensor`: for renderers of images.
 
+  /// When a ray leaves: its bodies are where they are then.
   [[nodiscard]] SimTime time_of(std::size_t ray) const {
     return time_offsets.empty() ? time : time + time_offsets[ray];
   }
@@ -47,6 +48,7 @@ struct Hit {
   float cos_incidence = 0.0f;  ///< |cos| of the angle between the ray and the surface normal.
   float intensity = 0.0f;      ///< The cloud's own scale; 0 where it had none.
   Label label = kMapLabel;     ///< What it is of.
+  /// False: it met nothing within its range.
   [[nodiscard]] bool is_return() const { return range >= 0.0f; }
 };
 
