@@ -10,20 +10,29 @@
 
 namespace pointflight {
 
+/// Two-sided.
 struct Triangle {
-  Vector3d a, b, c;  ///< Two-sided.
+  Vector3d a;  ///< m, as the other corners.
+  Vector3d b;  ///< In either sense of turning.
+  Vector3d c;  ///< Not on the line through a and b.
 };
+/// The mantle of a cone or, with equal radii, of a cylinder: no caps.
 struct Cone {
-  Vector3d from, to;              ///< Axis.
-  double radius_from, radius_to;  ///< No caps; equal radii make a cylinder.
+  Vector3d from;       ///< One end of the axis, m.
+  Vector3d to;         ///< The other end, m.
+  double radius_from;  ///< m
+  double radius_to;    ///< m
 };
+/// Two-sided.
 struct Disc {
-  Vector3d center, normal;
-  double radius;  ///< Two-sided.
+  Vector3d center;  ///< m
+  Vector3d normal;  ///< Unit vector, of either side.
+  double radius;    ///< m
 };
+/// The surface of a ball; rays that start inside meet it too.
 struct Sphere {
-  Vector3d center;
-  double radius;
+  Vector3d center;  ///< m
+  double radius;    ///< m
 };
 
 /// Shapes with exact ranges: what tests and generated maps are made of.
@@ -60,7 +69,7 @@ void sample_shape(const Shape& shape,
 
 /// A list of shapes with exact ray casting by brute force.
 struct ShapeScene {
-  std::vector<Shape> shapes;
+  std::vector<Shape> shapes;  ///< In the order of their numbers.
 
   /// First meeting of the ray with any shape.
   [[nodiscard]] std::optional<double> intersect(const Vector3d& origin,
@@ -73,21 +82,23 @@ struct ShapeScene {
               std::uint64_t seed,
               const std::function<void(const Vector3d&)>& emit) const;
 
+  /// From `corner` along both edges, m, as two triangles.
   void add_rectangle(const Vector3d& corner, const Vector3d& edge_u, const Vector3d& edge_v);
+  /// Twelve triangles between two opposite corners, m.
   void add_box(const Vector3d& min, const Vector3d& max);
 };
 
 /// Parameters of a made-up forest: relief ground, tapered trunks, branches and leaves.
 struct ForestOptions {
-  double size_x = 60.0;  ///< m
-  double size_y = 60.0;  ///< m
-  double trees_per_hectare = 600.0;
-  double trunk_radius_min = 0.08;
-  double trunk_radius_max = 0.25;
-  double height_min = 6.0;
-  double height_max = 14.0;
-  double min_spacing = 2.0;  ///< Least distance between trunks, m.
-  std::uint64_t seed = 1;
+  double size_x = 60.0;              ///< m
+  double size_y = 60.0;              ///< m
+  double trees_per_hectare = 600.0;  ///< Fewer where the spacing leaves no room.
+  double trunk_radius_min = 0.08;    ///< At the foot, m.
+  double trunk_radius_max = 0.25;    ///< At the foot, m.
+  double height_min = 6.0;           ///< Of a trunk, m.
+  double height_max = 14.0;          ///< Of a trunk, m.
+  double min_spacing = 2.0;          ///< Least distance between trunks, m.
+  std::uint64_t seed = 1;            ///< Of places, sizes and branches.
 };
 
 /// A forest from x, y = 0 to (size_x, size_y), ground around z = 0. Deterministic in the options.

@@ -7,13 +7,15 @@
 
 namespace pointflight {
 
-/// Convex solids around the origin of their own frame: hulls of vehicles and obstacles.
+/// Around the origin of its own frame, as all solids here.
 struct Ball {
   double radius = 0.0;  ///< m
 };
+/// A box along its own axes.
 struct Cuboid {
   Vector3d half = Vector3d::Zero();  ///< Half sides, m.
 };
+/// Upright, with flat ends.
 struct Cylinder {
   double radius = 0.0;       ///< m
   double half_height = 0.0;  ///< Along z, m.
@@ -23,6 +25,7 @@ struct Capsule {
   double radius = 0.0;       ///< m
   double half_length = 0.0;  ///< Of the segment, without the caps, m.
 };
+/// Convex solids around the origin of their own frame: hulls of vehicles and obstacles.
 using Solid = std::variant<Ball, Cuboid, Cylinder, Capsule>;
 
 /// Where a ray enters a solid.
