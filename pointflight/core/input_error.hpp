@@ -12,6 +12,7 @@ namespace pointflight {
 /// The command line prints it and exits with 2. Our own mistakes are assertions, not InputErrors.
 class InputError : public std::runtime_error {
  public:
+  /// Control characters in `text` become '?': what it quotes comes from outside.
   explicit InputError(std::string text) : std::runtime_error(one_line(std::move(text))) {}
 
  private:

@@ -21,10 +21,14 @@ class MappedFile {
   /// Maps an open file, which stays open; `name` stands for its path in messages.
   MappedFile(int descriptor, std::string name);
   ~MappedFile();
+  /// The other one is empty then; its views stay valid here.
   MappedFile(MappedFile&& other) noexcept;
+  /// Changes places with `other`, which closes this one's file later.
   MappedFile& operator=(MappedFile&& other) noexcept;
 
+  /// The whole file; valid as long as this one lives. Zeros where it was cut (`survive_cut_files`).
   [[nodiscard]] std::span<const std::byte> bytes() const { return {data_, size_}; }
+  /// As given to the constructor.
   [[nodiscard]] const std::string& path() const { return path_; }
 
   /// Tells the kernel that the file will be read once from front to back.

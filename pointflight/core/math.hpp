@@ -12,38 +12,49 @@
 /// tools/check_source.sh holds it. All within 1.0 ULP.
 namespace pointflight::math {
 
+/// Of `x` in radians.
 inline double sin(double x) {
   return Sleef_cinz_sind1_u10purec(x);
 }
+/// Of `x` in radians.
 inline double cos(double x) {
   return Sleef_cinz_cosd1_u10purec(x);
 }
+/// Of `x` in radians.
 inline double tan(double x) {
   return Sleef_cinz_tand1_u10purec(x);
 }
+/// Radians, -pi/2 to pi/2; NaN outside [-1, 1].
 inline double asin(double x) {
   return Sleef_cinz_asind1_u10purec(x);
 }
+/// Radians, 0 to pi; NaN outside [-1, 1].
 inline double acos(double x) {
   return Sleef_cinz_acosd1_u10purec(x);
 }
+/// Angle of (x, y) from the x axis, radians, -pi to pi.
 inline double atan2(double y, double x) {
   return Sleef_cinz_atan2d1_u10purec(y, x);
 }
+/// Infinity where it overflows, 0 where it underflows.
 inline double exp(double x) {
   return Sleef_cinz_expd1_u10purec(x);
 }
+/// Natural logarithm.
 inline double log(double x) {
   return Sleef_cinz_logd1_u10purec(x);
 }
+/// As std::pow, special cases included.
 inline double pow(double x, double y) {
   return Sleef_cinz_powd1_u10purec(x, y);
 }
 
+/// Of one angle.
 struct SinCos {
-  double sin;
-  double cos;
+  double sin;  ///< -1 to 1
+  double cos;  ///< -1 to 1
 };
+/// Both of `x` in radians, for the price of one.
 inline SinCos sincos(double x) {
   const auto both = Sleef_cinz_sincosd1_u10purec(x);
   return {both.x, both.y};

@@ -17,17 +17,24 @@ namespace pointflight {
 /// where a file that was read has been cut short meanwhile (core/mapped_file.hpp).
 class OutputFile {
  public:
+  /// Opens and locks the partial file. Throws InputError where it cannot, where another program is
+  /// writing it, and where `path` is there and is no regular file.
   explicit OutputFile(std::string path);
   ~OutputFile();
+  /// Takes over the open file; the other one may only be destroyed.
   OutputFile(OutputFile&& other) noexcept;
   OutputFile& operator=(OutputFile&&) = delete;
 
+  /// Appends.
   void write(std::span<const std::byte> bytes);
+  /// Appends.
   void write(std::string_view text);
   /// Replaces bytes written before: a header that counts what came after it.
   void write_at(std::size_t offset, std::span<const std::byte> bytes);
+  /// All was written: gives the file its name, in place of one that was there.
   void commit();
 
+  /// The name that it will have.
   [[nodiscard]] const std::string& path() const { return path_; }
 
  private:

@@ -16,9 +16,12 @@ class Executor {
   /// `threads` = 0 uses every core this process may run on.
   explicit Executor(int threads = 0);
   ~Executor();
+  /// The other one has no threads then and may only be destroyed or assigned to.
   Executor(Executor&&) noexcept;
+  /// The same.
   Executor& operator=(Executor&&) noexcept;
 
+  /// How many loops run on, the caller's included; never 0.
   [[nodiscard]] int threads() const { return threads_; }
 
   /// Calls `body(begin, end)` for the chunks [0, chunk), [chunk, 2 chunk), ... of [0, count), in

@@ -9,6 +9,7 @@ namespace pointflight {
 /// line prints a line from it; an empty function is fine.
 using Progress = std::function<void(std::string_view what, double share)>;
 
+/// Calls `progress` if there is one.
 inline void report(const Progress& progress, std::string_view what, double share) {
   if (progress) progress(what, share);
 }

@@ -31,6 +31,7 @@ enum class StreamId : std::uint32_t {
 /// changes nothing else. `entity` numbers the vehicle or sensor.
 class RandomStream {
  public:
+  /// `entity`: see the stream's own comment.
   RandomStream(std::uint64_t seed, StreamId stream, std::uint32_t entity)
       : seed_(seed), stream_(stream), entity_(entity) {}
 
@@ -39,13 +40,16 @@ class RandomStream {
 
   /// Two independent uniforms in [0, 1) with 53 bits each.
   [[nodiscard]] std::array<double, 2> uniform2(std::uint64_t index) const;
+  /// The first of `uniform2`.
   [[nodiscard]] double uniform(std::uint64_t index) const { return uniform2(index)[0]; }
+  /// Uniform in [low, high).
   [[nodiscard]] double uniform(std::uint64_t index, double low, double high) const {
     return low + (high - low) * uniform(index);
   }
 
   /// Two independent standard normals (Box-Muller; never rejection, which would need state).
   [[nodiscard]] std::array<double, 2> normal2(std::uint64_t index) const;
+  /// The first of `normal2`.
   [[nodiscard]] double normal(std::uint64_t index) const { return normal2(index)[0]; }
 
  private:

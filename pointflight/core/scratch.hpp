@@ -27,7 +27,9 @@ class Scratch {
   /// `folder` empty: that of temporary files. `memory_bytes` 0: every array is a file.
   explicit Scratch(std::string folder = {}, std::size_t memory_bytes = kDefaultMemory);
 
+  /// Of all arrays that are alive and lie in memory.
   [[nodiscard]] std::size_t bytes_in_memory() const { return state_->in_memory; }
+  /// The same for those that are files.
   [[nodiscard]] std::size_t bytes_in_files() const { return state_->in_files; }
 
  private:
@@ -48,9 +50,12 @@ class ScratchBlock {
   /// Throws InputError where the folder has no room.
   ScratchBlock(Scratch& scratch, std::size_t bytes);
   ~ScratchBlock();
+  /// The other one is empty then.
   ScratchBlock(ScratchBlock&& other) noexcept;
+  /// Changes places with `other`, which frees later what was here.
   ScratchBlock& operator=(ScratchBlock&& other) noexcept;
 
+  /// Aligned to a page; null for no bytes.
   [[nodiscard]] std::byte* data() const { return data_; }
 
   /// These bytes will not be touched for a while: a block in a file stops counting as the process's
@@ -71,21 +76,30 @@ class ScratchArray {
 
  public:
   ScratchArray() = default;
+  /// Throws InputError where the folder has no room.
   ScratchArray(Scratch& scratch, std::size_t size)
       : block_(scratch, size * sizeof(T)), size_(size) {}
+  /// The other one is empty then.
   ScratchArray(ScratchArray&& other) noexcept
       : block_(std::move(other.block_)), size_(std::exchange(other.size_, 0)) {}
+  /// The other one is empty then, and frees later what was here.
   ScratchArray& operator=(ScratchArray&& other) noexcept {
     block_ = std::move(other.block_);
     size_ = std::exchange(other.size_, 0);
     return *this;
   }
 
+  /// Values, not bytes.
   [[nodiscard]] std::size_t size() const { return size_; }
+  /// Null where empty. Constness is the array's, not the values'.
   [[nodiscard]] T* data() const { return reinterpret_cast<T*>(block_.data()); }
+  /// Not checked.
   [[nodiscard]] T& operator[](std::size_t i) const { return data()[i]; }
+  /// The first value.
   [[nodiscard]] T* begin() const { return data(); }
+  /// One past the last.
   [[nodiscard]] T* end() const { return data() + size_; }
+  /// All of them.
   [[nodiscard]] std::span<T> span() const { return {data(), size_}; }
 
   /// See ScratchBlock.

@@ -17,12 +17,13 @@ namespace pointflight {
 /// One key of a settings file, for the reader, the generated documentation and the written
 /// template.
 struct Key {
-  std::string_view name;
+  std::string_view name;  ///< As in the file, without the section's.
   std::string_view unit;  ///< "m", "deg", "" for pure numbers and text.
-  std::string_view help;
+  std::string_view help;  ///< Half a sentence.
+  /// Least value, inclusive; of each number in a list.
   double min = -std::numeric_limits<double>::infinity();
-  double max = std::numeric_limits<double>::infinity();
-  bool required = false;
+  double max = std::numeric_limits<double>::infinity();  ///< Greatest value, inclusive.
+  bool required = false;                                 ///< Missing: an error.
 };
 
 /// Walks over the keys of a settings struct. Each struct has one `describe(SettingsVisitor&, T&)`;
@@ -32,6 +33,8 @@ class SettingsVisitor {
  public:
   virtual ~SettingsVisitor() = default;
 
+  /// One key: readers set `value` where the file has it, writers and tables print it as it is.
+  ///@{
   virtual void value(const Key& key, double& value) = 0;
   virtual void value(const Key& key, std::int64_t& value) = 0;
   virtual void value(const Key& key, bool& value) = 0;
@@ -39,6 +42,7 @@ class SettingsVisitor {
   virtual void value(const Key& key, Eigen::Vector3d& value) = 0;
   virtual void value(const Key& key, std::vector<double>& value) = 0;
   virtual void value(const Key& key, std::vector<Eigen::Vector3d>& value) = 0;
+  ///@}
   /// Text that must be one of `choices`.
   virtual void choice(const Key& key,
                       std::string& value,
@@ -82,12 +86,16 @@ class SettingsVisitor {
   virtual void leave_condition() {}
   /// Returns false to skip the section (absent from the file: its defaults stay).
   virtual bool enter(const Key& key) = 0;
+  /// Ends the section or list item that was entered last.
   virtual void leave() = 0;
   /// Returns the number of items to visit, or kAbsent to leave the list as it is.
   virtual std::size_t enter_list(const Key& key, std::size_t size) = 0;
+  /// Item `index` begins; `leave` ends it.
   virtual void enter_item(std::size_t index) = 0;
+  /// After the last item.
   virtual void leave_list() = 0;
 
+  /// `enter_list`: not in the file.
   static constexpr std::size_t kAbsent = std::numeric_limits<std::size_t>::max();
 };
 
@@ -95,6 +103,7 @@ class SettingsVisitor {
 /// unit written behind them throw InputError with file, line and what would do.
 class SettingsReader : public SettingsVisitor {
  public:
+  /// Opens a file. Throws InputError where it cannot be read or is no YAML.
   explicit SettingsReader(const std::string& path);
   /// From text; `name` stands for the path in messages.
   SettingsReader(std::string_view text, const std::string& name);
@@ -180,6 +189,7 @@ void check_settings(T settings, const std::string& name) {
 /// Writes the values as YAML with a comment per key: `scenario new`.
 class SettingsWriter : public SettingsVisitor {
  public:
+  /// The file so far.
   [[nodiscard]] const std::string& text() const { return text_; }
 
   void value(const Key& key, double& value) override;
@@ -211,6 +221,7 @@ class SettingsWriter : public SettingsVisitor {
 /// Writes a Markdown table of the keys: name, unit, default, range, meaning.
 class SettingsTable : public SettingsVisitor {
  public:
+  /// The rows so far, without the table's head.
   [[nodiscard]] const std::string& text() const { return text_; }
 
   void value(const Key& key, double& value) override;

@@ -8,11 +8,11 @@ namespace pointflight {
 
 /// The simulation's own clock. It has no `now()`: nothing in the library reads the wall clock.
 struct SimClock {
-  using rep = std::int64_t;
-  using period = std::nano;
-  using duration = std::chrono::nanoseconds;
-  using time_point = std::chrono::time_point<SimClock, duration>;
-  static constexpr bool is_steady = true;
+  using rep = std::int64_t;                                        ///< Nanoseconds.
+  using period = std::nano;                                        ///< For std::chrono.
+  using duration = std::chrono::nanoseconds;                       ///< Same as `Duration`.
+  using time_point = std::chrono::time_point<SimClock, duration>;  ///< Same as `SimTime`.
+  static constexpr bool is_steady = true;  ///< Simulated time never goes back.
 };
 
 /// Length of time in integer nanoseconds.
@@ -26,6 +26,7 @@ using SimTime = SimClock::time_point;
 inline double to_seconds(Duration duration) {
   return static_cast<double>(duration.count()) * 1e-9;
 }
+/// Since the start of the run.
 inline double to_seconds(SimTime time) {
   return to_seconds(time.time_since_epoch());
 }
