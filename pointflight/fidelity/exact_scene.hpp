@@ -12,9 +12,9 @@ namespace pointflight {
 
 /// A world of analytic shapes: what a map of it should answer is known exactly.
 struct ExactScene {
-  std::string name;
-  std::string about;  ///< One line: what it is there to show.
-  ShapeScene geometry;
+  std::string name;                      ///< As `scene_names` has it, or the path.
+  std::string about;                     ///< One line: what it is there to show.
+  ShapeScene geometry;                   ///< World, m.
   std::vector<std::string> tags;         ///< Kinds of shapes: "wall", "rod", ...
   std::vector<std::uint16_t> shape_tag;  ///< Of each shape, an index in `tags`.
   /// Points of each shape relative to the rest of the cloud; empty: all 1.
@@ -42,6 +42,7 @@ std::vector<std::pair<std::string, std::string>> scene_names();
 
 /// The small exact cases by name; nothing for another name.
 std::optional<ExactScene> make_small_scene(const std::string& name);
+/// Names and one line each.
 std::vector<std::pair<std::string, std::string>> small_scene_names();
 
 /// How a scene is sampled to a cloud.
@@ -50,7 +51,7 @@ struct SceneSampling {
   double resolution = 0.05;      ///< m
   double density_min = 2000.0;   ///< At least so many a square metre.
   double noise = 0.0;            ///< Deviation along the surface normal, m.
-  std::uint64_t seed = 1;
+  std::uint64_t seed = 1;        ///< Of where the points lie.
   /// Of the points in a cube of the resolution only the first is kept, as maps are often thinned.
   bool one_per_cell = false;
 };

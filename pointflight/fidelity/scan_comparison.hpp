@@ -14,8 +14,8 @@ namespace pointflight {
 
 /// A real scan: returns in the sensor frame and the sensor's pose.
 struct RealScan {
-  std::string file;  ///< Name without folder.
-  Pose T_world_sensor;
+  std::string file;                     ///< Name without folder.
+  Pose T_world_sensor;                  ///< At the scan's stamp: one pose for all of its points.
   std::vector<Vector3f> points_sensor;  ///< m
 };
 
@@ -30,6 +30,7 @@ class SupportCloud {
   /// Reads the whole cloud. Throws InputError.
   explicit SupportCloud(const std::string& path);
   ~SupportCloud();
+  /// Callable from several threads.
   [[nodiscard]] bool supports(const Vector3d& point_world) const;
 
  private:
@@ -41,7 +42,7 @@ class SupportCloud {
 struct ComparedRay {
   float range = 0.0f;      ///< Measured, m.
   float rendered = -1.0f;  ///< m; negative where nothing was met.
-  bool supported = false;
+  bool supported = false;  ///< By the cloud that was given: `SupportCloud`.
 };
 
 /// Renders the ray of each real return from the scan's pose; one result a point, in their order.

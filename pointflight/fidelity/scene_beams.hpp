@@ -14,13 +14,13 @@ namespace pointflight {
 
 /// Which beams look at a scene.
 struct BeamPlan {
-  std::string name;
+  std::string name;  ///< For reports.
   /// Unit vectors in the sensor frame; empty: aimed at the scene's targets, or all around.
   std::vector<Vector3f> directions_sensor;
   float range_max = 40.0f;          ///< m
   std::size_t poses = 8;            ///< Random ones where the scene has none of its own.
   std::size_t aimed_beams = 20000;  ///< A pose, without directions.
-  std::uint64_t seed = 1;
+  std::uint64_t seed = 1;           ///< Of poses and aimed directions.
 };
 
 /// The patterns that the scenes' tables were measured with: "avia_grid" (385 x 350 over 77 x 70
@@ -30,7 +30,7 @@ std::optional<BeamPlan> table_beams(const std::string& name);
 
 /// A beam and what it meets in truth.
 struct TrueBeam {
-  Ray ray;
+  Ray ray;                     ///< World; ends at the plan's range_max.
   float range = -1.0f;         ///< m; negative where it meets nothing within its range.
   float cos_incidence = 0.0f;  ///< |cos| of the angle to the surface normal.
   std::uint16_t tag = 0;       ///< Of the shape met.
@@ -39,10 +39,11 @@ struct TrueBeam {
 
 /// All beams of a plan in a scene.
 struct SceneBeams {
-  BeamPlan plan;
-  std::vector<Pose> poses;
+  BeamPlan plan;                ///< What they were cast by.
+  std::vector<Pose> poses;      ///< T_world_sensor: the scene's own, or found at random.
   std::vector<TrueBeam> beams;  ///< Pose after pose, as many for each.
 
+  /// Beams of each pose; 0 without poses.
   [[nodiscard]] std::size_t per_pose() const {
     return poses.empty() ? 0 : beams.size() / poses.size();
   }
@@ -58,21 +59,23 @@ SceneBeams cast_exactly(const ExactScene& scene,
 
 /// One class of beams.
 struct FidelityRow {
-  std::string name;
-  ErrorStatistics statistics;
+  std::string name;            ///< The tag, or "30-60 deg", "5-10 m".
+  ErrorStatistics statistics;  ///< Of its beams.
 };
 
 /// How rendered ranges compare with the exact ones.
 struct FidelityReport {
-  ErrorStatistics all;
-  ErrorStatistics interior;    ///< No range jump near.
-  ErrorStatistics silhouette;  ///< The others.
-  std::vector<FidelityRow> by_tag;
+  ErrorStatistics all;                    ///< All beams.
+  ErrorStatistics interior;               ///< No range jump near.
+  ErrorStatistics silhouette;             ///< The others.
+  std::vector<FidelityRow> by_tag;        ///< Of each tag of the scene.
   std::vector<FidelityRow> by_incidence;  ///< 0 is face on.
-  std::vector<FidelityRow> by_range;
-  std::vector<float> rendered;  ///< Of each beam, m; negative where nothing was met.
+  std::vector<FidelityRow> by_range;      ///< By the true range.
+  std::vector<float> rendered;            ///< Of each beam, m; negative where nothing was met.
 };
 
+/// Renders all beams, each pose as one batch, and sorts them into classes. Rays that meet nothing
+/// in truth count as false returns where one is rendered, and are in none of the last three lists.
 FidelityReport measure_fidelity(const ExactScene& scene,
                                 const SceneBeams& beams,
                                 const Renderer& renderer,
