@@ -13,10 +13,10 @@ namespace pointflight {
 
 /// A message of a recording; valid during the callback.
 struct RecordedMessage {
-  const std::string& topic;
-  const std::string& type;  ///< "sensor_msgs/msg/Imu"
-  std::int64_t time = 0;    ///< ns since the Unix epoch.
-  std::span<const std::byte> data;
+  const std::string& topic;         ///< "/quad_0/imu"
+  const std::string& type;          ///< "sensor_msgs/msg/Imu"
+  std::int64_t time = 0;            ///< ns since the Unix epoch.
+  std::span<const std::byte> data;  ///< CDR, its header of four bytes included.
 };
 
 /// Reads all messages of an MCAP file in the order in which they lie there, from its chunks: of a

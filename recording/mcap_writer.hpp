@@ -11,6 +11,7 @@
 
 namespace pointflight {
 
+/// How the messages are stored.
 struct McapOptions {
   std::string compression = "zstd";               ///< or "lz4", "none"
   std::size_t chunk_size = std::size_t{4} << 20;  ///< Bytes before compression.

@@ -34,6 +34,7 @@ class Recording : public Outlet {
   void send(int topic, const Bytes& bytes, std::int64_t time) override;
   void close() override;
 
+  /// As given to the constructor.
   [[nodiscard]] const std::string& path() const { return path_; }
   /// True once it has ended too early.
   [[nodiscard]] bool has_failed() const { return !failure_.empty(); }

@@ -48,6 +48,7 @@ class RosBridge : public SampleSink {
 
   /// After a reset the run starts again at zero, but stamps go on.
   void shift_epoch(Duration by);
+  /// As given, and shifted since.
   [[nodiscard]] Duration epoch() const { return epoch_; }
 
   /// So many messages from outside were left out, and why the last one was: for diagnostics.

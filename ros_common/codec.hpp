@@ -41,15 +41,21 @@ T swapped(T value) {
 template <Wire W>
 class WireWriter {
  public:
+  /// Which table of fields messages show it.
   static constexpr int kRos = W == Wire::kRos1 ? 1 : 2;
 
+  /// Appends to `bytes`, which must outlive the writer; CDR aligns from their present end on.
   explicit WireWriter(std::vector<std::byte>& bytes) : bytes_(bytes), start_(bytes.size()) {}
 
+  /// Called by a message's `fields`.
   template <class T>
   void operator()(const char* /*name*/, const T& value) {
     write(value);
   }
 
+  /// Numbers little-endian; texts and lists behind their lengths, arrays without; messages field by
+  /// field.
+  ///@{
   template <detail::Number T>
   void write(T value) {
     align(sizeof(T));
@@ -73,6 +79,7 @@ class WireWriter {
   void write(const M& message) {
     M::fields(message, *this);
   }
+  ///@}
 
  private:
   template <class T>
@@ -105,19 +112,26 @@ class WireWriter {
 template <Wire W>
 class WireReader {
  public:
+  /// Which table of fields messages show it.
   static constexpr int kRos = W == Wire::kRos1 ? 1 : 2;
 
+  /// CDR aligns from the start of `bytes`, which must outlive the reader.
   WireReader(std::span<const std::byte> bytes, bool big_endian)
       : bytes_(bytes), big_endian_(big_endian) {}
 
+  /// False from the first value on that the bytes do not hold; the message must not be used then.
   [[nodiscard]] bool ok() const { return ok_; }
+  /// Bytes that were not read yet.
   [[nodiscard]] std::size_t left() const { return bytes_.size() - at_; }
 
+  /// Called by a message's `fields`.
   template <class T>
   void operator()(const char* /*name*/, T& value) {
     read(value);
   }
 
+  /// What the writer wrote; a value that is not there is left as it was.
+  ///@{
   template <detail::Number T>
   void read(T& value) {
     align(sizeof(T));
@@ -172,6 +186,7 @@ class WireReader {
   void read(M& message) {
     M::fields(message, *this);
   }
+  ///@}
 
  private:
   template <class T>

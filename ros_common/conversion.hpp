@@ -16,12 +16,18 @@ namespace pointflight {
 /// header.stamp and header.frame_id.
 msg::Header header_of(SimTime time, Duration epoch, const std::string& frame);
 
+/// A place.
 msg::Point point_of(const Vector3d& v);
+/// A direction.
 msg::Vector3 vector_of(const Vector3d& v);
+/// As it is: not normalised.
 msg::Quaternion quaternion_of(const Quaterniond& q);
+/// In the frame that it is given in.
 msg::Pose pose_of(const Pose& pose);
 
+/// A place; what is not finite stays so.
 Vector3d vector_of(const msg::Point& v);
+/// A direction; what is not finite stays so.
 Vector3d vector_of(const msg::Vector3& v);
 /// Normalised; identity where it is zero or not finite.
 Quaterniond rotation_of(const msg::Quaternion& q);
@@ -46,6 +52,7 @@ msg::Imu imu_of(const ImuSample& sample,
                 const msg::Header& header,
                 const ImuCustoms& customs);
 
+/// `header`: the parent's frame.
 msg::TransformStamped transform_of(const Pose& T_parent_child,
                                    const msg::Header& header,
                                    const std::string& child_frame);

@@ -31,19 +31,24 @@ enum class FieldKind : std::uint8_t {
 
 struct TypeDescription;
 
+/// One row of a message's table.
 struct FieldDescription {
+  /// What a field holds: one item, as many as `capacity`, or any number.
   enum class Many : std::uint8_t { kOne, kArray, kSequence };
-  std::string name;
-  FieldKind kind = FieldKind::kNested;
-  Many many = Many::kOne;
-  std::size_t capacity = 0;                       ///< Of an array.
+  std::string name;                     ///< On the wire; it may differ between the two ROSes.
+  FieldKind kind = FieldKind::kNested;  ///< Of one item.
+  Many many = Many::kOne;               ///< How many.
+  std::size_t capacity = 0;             ///< Of an array.
   std::shared_ptr<const TypeDescription> nested;  ///< For kNested.
 };
 
 /// A message's table of fields as data, for one of the two ROSes.
 struct TypeDescription {
+  /// The constants are lines "uint8 READY = 1".
+  ///@{
   std::string package, name, constants;
-  std::vector<FieldDescription> fields;
+  ///@}
+  std::vector<FieldDescription> fields;  ///< In the order of the wire.
 };
 
 /// The message as .msg text with those of its nested types behind it, as ROS 1 connection headers
@@ -130,6 +135,7 @@ class Describer {
 
 }  // namespace detail
 
+/// The table of message M for ROS 1 or 2.
 template <class M>
 TypeDescription describe_message(int ros) {
   return ros == 1 ? detail::Describer<1>::of<M>() : detail::Describer<2>::of<M>();

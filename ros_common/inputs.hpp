@@ -17,23 +17,25 @@ namespace pointflight {
 
 /// What a message from outside asks for.
 struct VehicleOrder {
-  std::size_t vehicle = 0;
-  Command command;
-  bool is_answer = false;  ///< A planner's: what lockstep waits for.
+  std::size_t vehicle = 0;  ///< Number in the fleet.
+  Command command;          ///< What the message says, in the program's units and frames.
+  bool is_answer = false;   ///< A planner's: what lockstep waits for.
 };
+/// Stop the run, or go on.
 struct PauseOrder {
-  bool pause = true;
+  bool pause = true;  ///< False: go on.
 };
 struct StepOrder {};  ///< While paused: go on until the next scan.
 struct ResetOrder {};
+/// One of them; those without a vehicle are about the run.
 using Order = std::variant<VehicleOrder, PauseOrder, StepOrder, ResetOrder>;
 
 /// One topic that is read, for one vehicle and one kind of message.
 struct InputStream {
-  RosInput settings;  ///< Names written out.
-  Topic topic;
-  std::size_t vehicle = 0;
-  bool for_all = false;  ///< A topic that all vehicles share.
+  RosInput settings;        ///< Names written out.
+  Topic topic;              ///< Where it is read, and its type.
+  std::size_t vehicle = 0;  ///< Number in the fleet; of a shared topic each has a stream.
+  bool for_all = false;     ///< A topic that all vehicles share.
 };
 
 /// The streams of a profile in a run.
@@ -44,7 +46,10 @@ struct OrderContext {
   double mass = 1.0;        ///< kg
   double thrust_max = 0.0;  ///< Of all rotors, N: what a thrust of 1 stands for.
   MotionLimits motion;      ///< Of goals.
-  std::string world_frame, world_alias, body_frame;  ///< That what comes in may be in.
+  /// What frames may be called in what comes in, without leading slashes.
+  ///@{
+  std::string world_frame, world_alias, body_frame;
+  ///@}
 };
 
 /// The order that a message stands for. Nothing, and the reason, where it is malformed or in a
@@ -58,6 +63,7 @@ std::optional<Order> order_of(const InputStream& stream,
 /// Takes messages from the threads of transports and gives orders to the one that flies.
 class Inbox {
  public:
+  /// Both must outlive the inbox.
   Inbox(const Simulation& simulation, const RosProfile& profile);
 
   /// Subscribes to everything that the profile reads, and answers the services of the run.
@@ -68,9 +74,10 @@ class Inbox {
 
   /// Messages that were left out, and why the last one was.
   struct Refused {
-    std::uint64_t count = 0;
-    std::string last;
+    std::uint64_t count = 0;  ///< Since the start.
+    std::string last;         ///< One line for users; empty where none was.
   };
+  /// Callable from any thread.
   [[nodiscard]] Refused refused() const;
   /// Why the first message of each topic was left out; each is told once.
   std::vector<std::string> take_new_reasons();

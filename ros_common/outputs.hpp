@@ -11,7 +11,7 @@
 
 namespace pointflight {
 
-/// What a profile's outputs can say, and what they are made from.
+/// What a profile's outputs can say; `OutputType::help` has each in words.
 enum class OutputKind {
   kOdometry,
   kImu,
@@ -46,15 +46,17 @@ enum class OutputKind {
 
 /// A row of the table of kinds.
 struct OutputType {
+  /// One message stream for the run, each vehicle or each LiDAR.
   enum class Per { kRun, kVehicle, kLidar };
-  OutputKind kind = OutputKind::kOdometry;
-  const char* name = "";    ///< In profiles.
-  Per per = Per::kVehicle;  ///< What there is one of each for.
+  OutputKind kind = OutputKind::kOdometry;  ///< What it is about.
+  const char* name = "";                    ///< In profiles.
+  Per per = Per::kVehicle;                  ///< What there is one of each for.
+  /// Its type in both ROSes.
   MessageType (*type)() = nullptr;
-  const char* help = "";
-  bool latched = false;
-  bool large = false;  ///< Paced on ROS 2.
-  std::size_t depth = 10;
+  const char* help = "";   ///< For `--help` and docs/ros.md; half a sentence.
+  bool latched = false;    ///< Whoever comes late gets the last message.
+  bool large = false;      ///< Paced on ROS 2.
+  std::size_t depth = 10;  ///< Messages that a reader's queue should hold.
 };
 
 /// What the optical frame (z ahead, x right, y down) of a camera ends in.
@@ -65,11 +67,11 @@ std::span<const OutputType> output_types();
 
 /// One message stream of a run: an output of the profile for one vehicle or LiDAR.
 struct OutputStream {
-  const OutputType* type = nullptr;
-  RosOutput settings;  ///< Names written out.
-  Topic topic;
-  std::size_t vehicle = 0;
-  std::size_t lidar = 0;
+  const OutputType* type = nullptr;  ///< Its row of the table; never null.
+  RosOutput settings;                ///< Names written out.
+  Topic topic;                       ///< What an outlet is told of it.
+  std::size_t vehicle = 0;           ///< Number in the fleet; 0 for what is of the run.
+  std::size_t lidar = 0;             ///< On that vehicle; 0 for what is of no LiDAR.
 };
 
 /// Names of a vehicle's LiDARs, as ROS takes them: their model's, with a number where several are
@@ -79,6 +81,7 @@ std::vector<std::string> lidar_names(const VehicleAgent& vehicle);
 /// The frames of a vehicle and of its LiDAR. Where the profile's pattern does not tell them apart,
 /// the first keeps the name; others have their vehicle's in front and their LiDAR's behind.
 std::string body_frame_of(const RosProfile& profile, const RosNames& names, std::size_t vehicle);
+/// The sensor's own axes; in optical axes it ends in `kOpticalSuffix`.
 std::string sensor_frame_of(const RosProfile& profile,
                             const RosNames& names,
                             std::size_t vehicle,

@@ -29,17 +29,18 @@ struct PointLayout {
     kRangeMillimetres,
     kZero,
   };
+  /// One value of a point.
   struct Field {
-    const char* name;
-    std::uint32_t offset;
-    msg::PointField::Datatype type;
-    Source source;
+    const char* name;                ///< "x", "intensity", "t", ...
+    std::uint32_t offset;            ///< Bytes from the point's first.
+    msg::PointField::Datatype type;  ///< Values are rounded and clamped to it.
+    Source source;                   ///< What it holds.
   };
-  const char* name;
-  const char* help;
-  std::uint32_t step;  ///< Bytes a point.
-  std::span<const Field> fields;
-  bool timed;  ///< Points have times: stamped with the first one.
+  const char* name;               ///< In profiles.
+  const char* help;               ///< Whose it is: for error messages and docs.
+  std::uint32_t step;             ///< Bytes a point.
+  std::span<const Field> fields;  ///< By rising offset; bytes between them are 0.
+  bool timed;                     ///< Points have times: stamped with the first one.
 };
 
 /// Layout of a name. Throws InputError with the names there are.

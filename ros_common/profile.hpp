@@ -11,20 +11,21 @@ namespace pointflight {
 
 /// Names, frames and customs of a family of programs: `data/ros_profiles/<name>.yaml`.
 struct RosProfile {
-  std::string path;
-  std::string title;
-  std::string source;
-  std::string world_frame = "world";
-  std::string world_alias;  ///< Another name of it that goals and commands may have.
-  std::string body_frame = "{vehicle}/base_link";
-  std::string sensor_frame = "{vehicle}/{lidar}";
-  std::int64_t first_id = 0;
+  std::string path;                   ///< Of the file, for messages.
+  std::string title;                  ///< Whose names these are.
+  std::string source;                 ///< Where they were read.
+  std::string world_frame = "world";  ///< ENU, the map's own origin.
+  std::string world_alias;            ///< Another name of it that goals and commands may have.
+  std::string body_frame = "{vehicle}/base_link";  ///< The vehicle's, at its centre of mass.
+  std::string sensor_frame = "{vehicle}/{lidar}";  ///< A LiDAR's own axes.
+  std::int64_t first_id = 0;                       ///< `{id}` of the first vehicle.
   std::string epoch = "fixed";  ///< Of stamps: "fixed" (1.7e9 s and the run's time) or "now".
   std::string twist = "body";   ///< Odometry's velocities: "body" (REP 105's child frame), "world"
   std::string imu_unit = "mps2";   ///< or "g", as Livox' driver sends
   std::string imu_gravity = "up";  ///< At rest +9.81 on z (REP 145); "down": MARSIM's a + g
   std::string livox_package = "livox_ros_driver2";  ///< ROS 1: of CustomMsg.
-  std::vector<RosOutput> outputs;
+  std::vector<RosOutput> outputs;  ///< Each is one kind of message; several may be of one kind.
+  /// Topics that are read; a shipped profile names what its programs send.
   std::vector<RosInput> inputs;
 };
 
@@ -44,9 +45,9 @@ RosProfile profile_for(const Scenario& scenario, const std::string& name = {});
 
 /// What `{vehicle}`, `{id}` and `{lidar}` stand for.
 struct RosNames {
-  std::string vehicle;
-  std::int64_t id = 0;
-  std::string lidar;
+  std::string vehicle;  ///< The vehicle's name in the scenario.
+  std::int64_t id = 0;  ///< first_id + number.
+  std::string lidar;    ///< As `lidar_names` has it; empty where a name is of no LiDAR.
 };
 
 /// True where a topic or frame is another for each vehicle.

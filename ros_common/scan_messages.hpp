@@ -30,10 +30,12 @@ msg::CameraInfo camera_info_of(const LidarSettings& lidar);
 /// The map's surfels as points, one for each cell of `resolution` (m) at least; coarser where there
 /// would be more than `points_max`.
 struct MapCloud {
-  std::vector<Vector3f> points;
+  std::vector<Vector3f> points;  ///< World, m.
+  /// Of each point, in the cloud's scale; 0 where the map has none.
   std::vector<float> intensities;
   double resolution = 0.0;  ///< That was taken, m.
 };
+/// As many points as the map has, in the order of its file, where `resolution` is at most its own.
 MapCloud map_cloud(const SurfelMap& map, double resolution, std::size_t points_max);
 
 /// Points on the surface of a shape, about `spacing` apart, in the world.

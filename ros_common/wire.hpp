@@ -23,6 +23,7 @@ struct MessageType {
 
   /// "sensor_msgs/Imu" and "sensor_msgs/msg/Imu".
   std::string ros1_name() const { return package + "/" + name; }
+  /// "sensor_msgs/msg/Imu"
   std::string ros2_name() const { return ros2_package + "/msg/" + name; }
 };
 
@@ -34,31 +35,34 @@ enum class Wire { kRos1, kCdr };
 
 /// A topic that goes out or comes in.
 struct Topic {
-  std::string name;  ///< "/quad_0/imu"
-  MessageType type;
-  bool latched = false;  ///< Whoever comes late gets the last message.
-  std::size_t depth = 10;
-  bool large = false;     ///< Clouds and images: paced on ROS 2.
-  bool reliable = false;  ///< Comes in once and counts: read reliably on ROS 2.
-  bool answers = false;   ///< Comes in from a planner: what lockstep waits for.
+  std::string name;        ///< "/quad_0/imu"
+  MessageType type;        ///< Checked by both ROSes before they connect.
+  bool latched = false;    ///< Whoever comes late gets the last message.
+  std::size_t depth = 10;  ///< Messages that a queue holds.
+  bool large = false;      ///< Clouds and images: paced on ROS 2.
+  bool reliable = false;   ///< Comes in once and counts: read reliably on ROS 2.
+  bool answers = false;    ///< Comes in from a planner: what lockstep waits for.
 };
 
 /// A service that the node offers.
 struct Service {
-  std::string kind;                         ///< What it is for.
-  std::string name;                         ///< "/pointflight/reset"
-  std::string package;                      ///< "std_srvs"
-  std::string type;                         ///< "Trigger"
-  std::string md5;                          ///< ROS 1.
-  std::string request_hash, response_hash;  ///< ROS 2.
+  std::string kind;     ///< What it is for.
+  std::string name;     ///< "/pointflight/reset"
+  std::string package;  ///< "std_srvs"
+  std::string type;     ///< "Trigger"
+  std::string md5;      ///< ROS 1.
+  /// ROS 2: of the two halves.
+  ///@{
+  std::string request_hash, response_hash;
+  ///@}
 };
 
 /// A message that came in, in the sender's own words.
 struct Received {
-  const std::byte* data = nullptr;
-  std::size_t size = 0;
-  std::string md5;         ///< ROS 1: the sender's.
-  std::string definition;  ///< ROS 1: the sender's.
+  const std::byte* data = nullptr;  ///< Valid during the callback.
+  std::size_t size = 0;             ///< Bytes.
+  std::string md5;                  ///< ROS 1: the sender's.
+  std::string definition;           ///< ROS 1: the sender's.
 };
 
 /// Where serialised messages go: a ROS, or a recording. Called from one thread.
@@ -66,6 +70,7 @@ class Outlet {
  public:
   virtual ~Outlet() = default;
 
+  /// How this outlet wants its messages.
   virtual Wire wire() const = 0;
 
   /// Makes a topic known; returns its number for `send`. All topics come before the first message.
@@ -107,6 +112,7 @@ class Transport : public Outlet {
 
   /// Answers requests of a service by `answer`, which is called from a thread of the transport's.
   using Answer = std::function<std::vector<std::byte>(const Received& request)>;
+  /// One answer for each service; what it returns is the response's bytes, in this outlet's wire.
   virtual void serve(const Service& service, Answer answer) = 0;
 
   /// Ends what is open, both ways: when it returns no message comes in any more.
@@ -130,43 +136,61 @@ class Transport : public Outlet {
   virtual std::uint64_t dropped() const { return 0; }
 };
 
+/// How a transport joins its ROS.
 struct TransportOptions {
-  std::string node = "pointflight";
-  bool localhost_only = false;  ///< ROS 2.
-  double large_rate = 0.0;      ///< Bytes a second of clouds and pictures, all read: for ROS 2.
+  std::string node = "pointflight";  ///< Name of the node, without a slash.
+  bool localhost_only = false;       ///< ROS 2.
+  double large_rate = 0.0;  ///< Bytes a second of clouds and pictures, all read: for ROS 2.
   std::function<void(const std::string&)> log;  ///< Lines for the user, from any thread.
 };
 
 /// What is in a recording.
 struct RecordingInfo {
+  /// One of its topics.
   struct Topic {
+    /// "/quad_0/imu" and "sensor_msgs/msg/Imu".
+    ///@{
     std::string name, type;
-    std::uint64_t messages = 0;
+    ///@}
+    std::uint64_t messages = 0;  ///< That can be read.
   };
+  /// A file inside the recording.
   struct Attachment {
+    /// "scenario.yaml" and "text/yaml", say.
+    ///@{
     std::string name, media_type;
-    std::uint64_t size = 0;
+    ///@}
+    std::uint64_t size = 0;  ///< Bytes.
   };
   std::string format;       ///< "MCAP, profile ros2", "ROS 1 bag 2.0"
   std::string library;      ///< What wrote it, if it says so.
   std::string compression;  ///< "zstd", "lz4", "none"; several with commas.
+  /// That can be read.
+  ///@{
   std::uint64_t messages = 0, chunks = 0;
-  std::int64_t start = 0, end = 0;  ///< ns since the Unix epoch, of the first and last message.
-  std::vector<Topic> topics;        ///< By name.
-  std::vector<Attachment> attachments;
-  bool complete = true;  ///< False: cut short, what is counted is what can be read.
+  ///@}
+  /// ns since the Unix epoch, of the first and last message.
+  ///@{
+  std::int64_t start = 0, end = 0;
+  ///@}
+  std::vector<Topic> topics;            ///< By name.
+  std::vector<Attachment> attachments;  ///< None in bags of ROS 1.
+  bool complete = true;                 ///< False: cut short, what is counted is what can be read.
 };
 
 /// What the ROS 1 module gives; errors are std::runtime_error with words for the user.
 struct Ros1Module {
+  /// Joins ROS 1; its master may come later.
   std::unique_ptr<Transport> (*transport)(const TransportOptions& options);
   /// A .bag by Debian's rosbag; compression "lz4", "bz2" or "none".
   std::unique_ptr<Outlet> (*bag_writer)(const std::string& path, const std::string& compression);
+  /// Errors as above; counts without decoding.
   RecordingInfo (*read_bag)(const std::string& path);
 };
 
 /// What the ROS 2 module gives.
 struct Ros2Module {
+  /// Joins ROS 2: the domain of ROS_DOMAIN_ID.
   std::unique_ptr<Transport> (*transport)(const TransportOptions& options);
 };
 

@@ -10,6 +10,7 @@
 
 namespace pointflight::msg {
 
+/// An attitude or body rates with a thrust, as MAVROS takes them.
 struct AttitudeTarget {
   static constexpr TypeName kType{
       "mavros_msgs",
@@ -17,6 +18,7 @@ struct AttitudeTarget {
       "mavros_msgs",
       "uint8 IGNORE_ROLL_RATE = 1\nuint8 IGNORE_PITCH_RATE = 2\nuint8 IGNORE_YAW_RATE = 4\n"
       "uint8 IGNORE_THRUST = 64\nuint8 IGNORE_ATTITUDE = 128\n"};
+  /// Bits of `type_mask`: parts that do not count.
   enum Mask : std::uint8_t {
     kIgnoreRollRate = 1,
     kIgnorePitchRate = 2,
@@ -25,11 +27,11 @@ struct AttitudeTarget {
     kIgnoreThrust = 64,
     kIgnoreAttitude = 128
   };
-  Header header;
-  std::uint8_t type_mask = 0;
-  Quaternion orientation;
-  Vector3 body_rate;
-  float thrust = 0.0f;
+  Header header;               ///< Its frame is not looked at.
+  std::uint8_t type_mask = 0;  ///< `Mask`; MAVROS has no bit for the attitude's parts.
+  Quaternion orientation;      ///< Body axes (x forward, y left, z up) in the world.
+  Vector3 body_rate;           ///< rad/s, about the body's axes.
+  float thrust = 0.0f;         ///< Share of the thrust of all rotors, 0 to 1.
   template <class M, class V>
   static void fields(M& m, V& v) {
     v("header", m.header);
@@ -50,13 +52,22 @@ struct PositionCommandShort {
       "uint8 TRAJECTORY_STATUS_COMPLETED = 3\nuint8 TRAJECTROY_STATUS_ABORT = 4\n"
       "uint8 TRAJECTORY_STATUS_ILLEGAL_START = 5\nuint8 TRAJECTORY_STATUS_ILLEGAL_FINAL = 6\n"
       "uint8 TRAJECTORY_STATUS_IMPOSSIBLE = 7\n"};
-  Header header;
-  Point position;
+  Header header;   ///< World frame or its alias; the stamp is not looked at.
+  Point position;  ///< m
+  /// m/s and m/s^2: feed-forward.
+  ///@{
   Vector3 velocity, acceleration;
+  ///@}
+  /// rad from world x towards y, and rad/s.
+  ///@{
   double yaw = 0.0, yaw_dot = 0.0;
+  ///@}
+  /// Gains for the follower: not used, vehicles have their own.
+  ///@{
   std::array<double, 3> kx{}, kv{};
-  std::uint32_t trajectory_id = 0;
-  std::uint8_t trajectory_flag = 0;
+  ///@}
+  std::uint32_t trajectory_id = 0;   ///< The planner's count: not used.
+  std::uint8_t trajectory_flag = 0;  ///< Not used: the command is followed whatever it says.
   template <class M, class V>
   static void fields(M& m, V& v) {
     v("header", m.header);
@@ -83,13 +94,22 @@ struct PositionCommandLong {
       "uint8 TRAJECTROY_STATUS_ABORT = 4\nuint8 TRAJECTORY_STATUS_ILLEGAL_START = 5\n"
       "uint8 TRAJECTORY_STATUS_ILLEGAL_FINAL = 6\nuint8 TRAJECTORY_STATUS_IMPOSSIBLE = 7\n"
       "uint32 ACTION_STOP = 8\n"};
-  Header header;
-  Point position;
+  Header header;   ///< World frame or its alias; the stamp is not looked at.
+  Point position;  ///< m
+  /// Feed-forward in m/s, m/s^2 and m/s^3; angular_velocity, attitude and thrust are not used.
+  ///@{
   Vector3 velocity, acceleration, jerk, angular_velocity, attitude, thrust;
+  ///@}
+  /// rad from world x towards y, and rad/s; the two norms are not used.
+  ///@{
   double yaw = 0.0, yaw_dot = 0.0, vel_norm = 0.0, acc_norm = 0.0;
+  ///@}
+  /// Gains for the follower: not used, vehicles have their own.
+  ///@{
   std::array<double, 3> kx{}, kv{};
-  std::uint32_t trajectory_id = 0;
-  std::uint8_t trajectory_flag = 0;
+  ///@}
+  std::uint32_t trajectory_id = 0;   ///< The planner's count: not used.
+  std::uint8_t trajectory_flag = 0;  ///< Not used: the command is followed whatever it says.
   template <class M, class V>
   static void fields(M& m, V& v) {
     v("header", m.header);
@@ -114,11 +134,20 @@ struct PositionCommandLong {
 /// multi_map_server's copy in FUEL and RACER ("oldest").
 struct PositionCommandOldest {
   static constexpr TypeName kType{"quadrotor_msgs", "PositionCommand", "quadrotor_msgs", "", true};
-  Header header;
-  Point position;
+  Header header;   ///< World frame or its alias; the stamp is not looked at.
+  Point position;  ///< m
+  /// m/s and m/s^2: feed-forward.
+  ///@{
   Vector3 velocity, acceleration;
+  ///@}
+  /// rad from world x towards y, and rad/s.
+  ///@{
   double yaw = 0.0, yaw_dot = 0.0;
+  ///@}
+  /// Gains for the follower: not used, vehicles have their own.
+  ///@{
   std::array<double, 3> kx{}, kv{};
+  ///@}
   template <class M, class V>
   static void fields(M& m, V& v) {
     v("header", m.header);
@@ -136,8 +165,9 @@ struct PositionCommandOldest {
 struct TakeoffLand {
   static constexpr TypeName kType{
       "quadrotor_msgs", "TakeoffLand", "quadrotor_msgs", "uint8 TAKEOFF = 1\nuint8 LAND = 2\n"};
+  /// Values of `takeoff_land_cmd`.
   enum Command : std::uint8_t { kTakeoff = 1, kLand = 2 };
-  std::uint8_t takeoff_land_cmd = 0;
+  std::uint8_t takeoff_land_cmd = 0;  ///< `Command`; all but kTakeoff lands.
   template <class M, class V>
   static void fields(M& m, V& v) {
     v("takeoff_land_cmd", m.takeoff_land_cmd);

@@ -10,9 +10,13 @@
 
 namespace pointflight::msg {
 
+/// A place in a texture.
 struct UVCoordinate {
   static constexpr TypeName kType{"visualization_msgs", "UVCoordinate"};
+  /// Shares of its width and height, 0 to 1.
+  ///@{
   float u = 0.0f, v = 0.0f;
+  ///@}
   template <class M, class V>
   static void fields(M& m, V& visitor) {
     visitor("u", m.u);
@@ -20,10 +24,11 @@ struct UVCoordinate {
   }
 };
 
+/// A mesh inside a message: ROS 2 only, always empty here.
 struct MeshFile {
   static constexpr TypeName kType{"visualization_msgs", "MeshFile"};
-  std::string filename;
-  std::vector<std::uint8_t> data;
+  std::string filename;            ///< With the extension that tells its format.
+  std::vector<std::uint8_t> data;  ///< The file's bytes.
   template <class M, class V>
   static void fields(M& m, V& v) {
     v("filename", m.filename);
@@ -31,6 +36,7 @@ struct MeshFile {
   }
 };
 
+/// A shape that RViz draws.
 struct Marker {
   static constexpr TypeName kType{
       "visualization_msgs",
@@ -40,6 +46,7 @@ struct Marker {
       "uint8 LINE_LIST=5\nuint8 CUBE_LIST=6\nuint8 SPHERE_LIST=7\nuint8 POINTS=8\n"
       "uint8 TEXT_VIEW_FACING=9\nuint8 MESH_RESOURCE=10\nuint8 TRIANGLE_LIST=11\n"
       "uint8 ADD=0\nuint8 MODIFY=0\nuint8 DELETE=2\nuint8 DELETEALL=3\n"};
+  /// Of those that ROS has, the ones that are sent.
   enum Type : std::int32_t {
     kArrow = 0,
     kCube = 1,
@@ -49,23 +56,30 @@ struct Marker {
     kPoints = 8,
     kText = 9
   };
+  /// kAdd also replaces what has the same ns and id.
   enum Action : std::int32_t { kAdd = 0, kDelete = 2, kDeleteAll = 3 };
-  Header header;
-  std::string ns;
+  Header header;   ///< Of `pose` and `points`.
+  std::string ns;  ///< Namespace: RViz shows and hides it as one.
+  /// Number within the namespace; `Type`; `Action`.
+  ///@{
   std::int32_t id = 0, type = 0, action = 0;
-  Pose pose;
-  Vector3 scale;
-  ColorRGBA color;
-  Duration lifetime;
-  bool frame_locked = false;
-  std::vector<Point> points;
-  std::vector<ColorRGBA> colors;
-  std::string texture_resource;  ///< ROS 2 only, as the next two.
-  CompressedImage texture;
-  std::vector<UVCoordinate> uv_coordinates;
+  ///@}
+  Pose pose;        ///< Of the shape's own frame in the header's.
+  Vector3 scale;    ///< Whole sides or diameters, m; of lines x is the width, of text z the height.
+  ColorRGBA color;  ///< Of all that `colors` does not say.
+  Duration lifetime;                         ///< After the last message; zero: for ever.
+  bool frame_locked = false;                 ///< RViz moves it along with its frame.
+  std::vector<Point> points;                 ///< Of lines, points and arrows, m.
+  std::vector<ColorRGBA> colors;             ///< One a point, or none.
+  std::string texture_resource;              ///< ROS 2 only, as the next two.
+  CompressedImage texture;                   ///< Empty here.
+  std::vector<UVCoordinate> uv_coordinates;  ///< Empty here.
+  /// What a kText says; address of a mesh, empty here.
+  ///@{
   std::string text, mesh_resource;
-  MeshFile mesh_file;  ///< ROS 2 only.
-  bool mesh_use_embedded_materials = false;
+  ///@}
+  MeshFile mesh_file;                        ///< ROS 2 only.
+  bool mesh_use_embedded_materials = false;  ///< Of no use without a mesh.
   template <class M, class V>
   static void fields(M& m, V& v) {
     v("header", m.header);
@@ -92,18 +106,23 @@ struct Marker {
   }
 };
 
+/// Markers that arrive together.
 struct MarkerArray {
   static constexpr TypeName kType{"visualization_msgs", "MarkerArray"};
-  std::vector<Marker> markers;
+  std::vector<Marker> markers;  ///< Each has a header of its own.
   template <class M, class V>
   static void fields(M& m, V& v) {
     v("markers", m.markers);
   }
 };
 
+/// One figure of a status.
 struct KeyValue {
   static constexpr TypeName kType{"diagnostic_msgs", "KeyValue"};
+  /// Both are text, whatever the figure is.
+  ///@{
   std::string key, value;
+  ///@}
   template <class M, class V>
   static void fields(M& m, V& v) {
     v("key", m.key);
@@ -114,14 +133,18 @@ struct KeyValue {
 /// ROS type `byte`: an octet that is no number.
 enum class Octet : std::uint8_t {};
 
+/// How something is: one for each vehicle.
 struct DiagnosticStatus {
   static constexpr TypeName kType{"diagnostic_msgs",
                                   "DiagnosticStatus",
                                   "diagnostic_msgs",
                                   "byte OK=0\nbyte WARN=1\nbyte ERROR=2\nbyte STALE=3\n"};
-  Octet level{};
+  Octet level{};  ///< 0 fine, 1 warning (in contact), 2 error (crashed), 3 stale (never sent).
+  /// "pointflight: " and the vehicle's name; one line; the vehicle's model.
+  ///@{
   std::string name, message, hardware_id;
-  std::vector<KeyValue> values;
+  ///@}
+  std::vector<KeyValue> values;  ///< Clearance, collisions, rejected commands, ...
   template <class M, class V>
   static void fields(M& m, V& v) {
     v("level", m.level);
@@ -132,10 +155,11 @@ struct DiagnosticStatus {
   }
 };
 
+/// All vehicles' states, for rqt_robot_monitor and the like.
 struct DiagnosticArray {
   static constexpr TypeName kType{"diagnostic_msgs", "DiagnosticArray"};
-  Header header;
-  std::vector<DiagnosticStatus> status;
+  Header header;                         ///< Its frame says nothing.
+  std::vector<DiagnosticStatus> status;  ///< By number of the vehicle.
   template <class M, class V>
   static void fields(M& m, V& v) {
     v("header", m.header);

@@ -5,18 +5,20 @@
 
 namespace pointflight::msg {
 
+/// Asks for something without saying more.
 struct TriggerRequest {
   static constexpr TypeName kType{"std_srvs", "Trigger_Request"};
-  std::uint8_t none = 0;
+  std::uint8_t none = 0;  ///< Of no meaning: see kNoField.
   template <class M, class V>
   static void fields(M& m, V& v) {
     if constexpr (V::kRos == 2) v(kNoField, m.none);
   }
 };
 
+/// Turns something on or off.
 struct SetBoolRequest {
   static constexpr TypeName kType{"std_srvs", "SetBool_Request"};
-  bool data = false;
+  bool data = false;  ///< True: on.
   template <class M, class V>
   static void fields(M& m, V& v) {
     v("data", m.data);
@@ -26,8 +28,8 @@ struct SetBoolRequest {
 /// Of Trigger and of SetBool.
 struct DoneResponse {
   static constexpr TypeName kType{"std_srvs", "Trigger_Response"};
-  bool success = false;
-  std::string message;
+  bool success = false;  ///< False: it was not taken.
+  std::string message;   ///< Why not, in words, or empty.
   template <class M, class V>
   static void fields(M& m, V& v) {
     v("success", m.success);
