@@ -83,6 +83,7 @@ class SettingsVisitor {
  protected:
   /// Returns false to skip the keys.
   virtual bool enter_condition(bool holds, std::string_view condition) = 0;
+  /// Ends what `enter_condition` has begun; called only where that returned true.
   virtual void leave_condition() {}
   /// Returns false to skip the section (absent from the file: its defaults stay).
   virtual bool enter(const Key& key) = 0;

@@ -29,6 +29,7 @@ static_assert(std::endian::native == std::endian::little);
 /// Walks over the lines of a text in memory and knows the line number.
 class LineCursor {
  public:
+  /// `text` must outlive the cursor and the lines.
   explicit LineCursor(std::string_view text) : text_(text) {}
 
   /// The next line without its end ("\n" or "\r\n"). False at the end of the text.
@@ -43,10 +44,13 @@ class LineCursor {
     return true;
   }
 
+  /// Bytes up to the end of the last line that was given.
   [[nodiscard]] std::size_t offset() const {
     return offset_ < text_.size() ? offset_ : text_.size();
   }
+  /// Of the last line that was given, from 1; 0 before the first.
   [[nodiscard]] std::size_t number() const { return number_; }
+  /// Of the text that was gone through, 0 to 1.
   [[nodiscard]] double share() const {
     return text_.empty() ? 1.0 : static_cast<double>(offset()) / static_cast<double>(text_.size());
   }

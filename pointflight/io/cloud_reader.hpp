@@ -56,6 +56,7 @@ class CloudReader {
   [[nodiscard]] virtual double share_read() const = 0;
 
  protected:
+  /// Points that readers of formats put in one batch.
   static constexpr std::size_t kBatch = 65536;
 };
 

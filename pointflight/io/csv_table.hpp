@@ -13,8 +13,10 @@ class CsvTable {
  public:
   /// Throws InputError with file and line.
   explicit CsvTable(const std::string& path);
+  /// From text; `name` stands for the path in messages.
   CsvTable(std::string_view text, const std::string& name);
 
+  /// Without the line of names and comments.
   [[nodiscard]] std::size_t rows() const { return rows_; }
 
   /// Index of the column of that name, else of the first whose name starts with it (lower case), or
@@ -27,7 +29,8 @@ class CsvTable {
   /// "file:line" of a row, for messages. Throws std::out_of_range where there is no such row.
   [[nodiscard]] std::string place(std::size_t row) const;
 
-  /// `row` below rows(), `column` as `find` gave it and not -1: debug builds assert it.
+  /// NaN for an empty cell. `row` below rows(), `column` as `find` or `require` gave it and not -1:
+  /// debug builds assert it.
   [[nodiscard]] double at(std::size_t row, int column) const {
     assert(row < rows_ && column >= 0 && static_cast<std::size_t>(column) < names_.size());
     return values_[row * names_.size() + static_cast<std::size_t>(column)];

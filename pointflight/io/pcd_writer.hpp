@@ -13,7 +13,7 @@ namespace pointflight {
 
 /// One field of a binary PCD file.
 struct PcdField {
-  std::string name;
+  std::string name;  ///< "x", "intensity", ...
   char type;         ///< 'F', 'I' or 'U'.
   std::size_t size;  ///< Bytes.
 };

@@ -9,9 +9,9 @@ namespace pointflight {
 
 /// One line of a TUM trajectory: `time tx ty tz qx qy qz qw [file]`.
 struct TumPose {
-  double time = 0.0;  ///< The file's own number: a time, or an index.
-  Pose T_world_sensor;
-  std::string file;  ///< Ninth column; empty where there is none.
+  double time = 0.0;    ///< The file's own number: a time, or an index.
+  Pose T_world_sensor;  ///< In the world that the file's map has.
+  std::string file;     ///< Ninth column; empty where there is none.
 };
 
 /// Reads a TUM trajectory; lines that start with # are comments. Quaternions are normalised. Throws

@@ -13,15 +13,15 @@ namespace pointflight {
 /// hi up), metres from the map's origin. Inner children are consecutive from `first_inner`; leaves
 /// are consecutive from word `first_leaf_word`, in lane order.
 struct alignas(16) Bvh8Node {
-  float origin[3];
-  float scale;
-  std::uint32_t first_inner;
-  std::uint32_t first_leaf_word;
-  std::uint8_t meta[8];  ///< 0 empty, kInner, or the number of surfels of a leaf (1..8).
-  std::uint8_t lo[3][8];
-  std::uint8_t hi[3][8];
+  float origin[3];                ///< Low corner of its box, m from the map's origin.
+  float scale;                    ///< Metres of one step of lo and hi, the same on all axes.
+  std::uint32_t first_inner;      ///< Index of its first inner child in `Bvh8::nodes`.
+  std::uint32_t first_leaf_word;  ///< Index of its first leaf's header in `Bvh8::words`.
+  std::uint8_t meta[8];           ///< 0 empty, kInner, or the number of surfels of a leaf (1..8).
+  std::uint8_t lo[3][8];          ///< Low corners of the children, by axis and lane.
+  std::uint8_t hi[3][8];          ///< High corners of the children, by axis and lane.
 
-  static constexpr std::uint8_t kInner = 0x80;
+  static constexpr std::uint8_t kInner = 0x80;  ///< Of `meta`: the child is a node.
 };
 static_assert(sizeof(Bvh8Node) == 80);
 
@@ -38,8 +38,9 @@ struct BuildSurfel {
   SurfelWord word = 0;       ///< With its centre in voxels from the voxel's low corner, in [0, 1].
 };
 
+/// A hierarchy over surfels as a map's file holds it; the first node is the root.
 struct Bvh8 {
-  ScratchArray<Bvh8Node> nodes;
+  ScratchArray<Bvh8Node> nodes;          ///< Inner nodes; the root first.
   ScratchArray<SurfelWord> words;        ///< Leaf header and surfels, plus kLeafPadding.
   ScratchArray<std::uint8_t> intensity;  ///< Beside `words`, one byte a word; empty without.
 };
@@ -49,7 +50,7 @@ enum class TreeQuality { kNormal, kHigh };
 
 /// What a tree is built of.
 struct TreeInput {
-  const ScratchArray<BuildSurfel>& surfels;
+  const ScratchArray<BuildSurfel>& surfels;     ///< In Morton order.
   const ScratchArray<std::uint8_t>& intensity;  ///< Beside them, or empty.
   std::array<std::uint32_t, 3> low{};           ///< Decoded key that becomes voxel (0, 0, 0).
   double resolution = 1.0;                      ///< r, m.

@@ -10,8 +10,8 @@ namespace pointflight {
 
 /// Statistical outlier removal (the paper, section IV; Rusu et al. 2008) on occupied cells.
 struct OutlierOptions {
-  bool enabled = true;
-  int neighbours = 8;
+  bool enabled = true;  ///< False: all cells stay.
+  int neighbours = 8;   ///< Cells that a cell is measured by.
   /// A cell goes if its mean distance to its neighbours is above mean + sigmas * deviation of all.
   double sigmas = 4.0;
 };
@@ -19,7 +19,7 @@ struct OutlierOptions {
 /// What was dropped.
 struct Outliers {
   std::vector<CloudPoint> centroids_world;  ///< With the cells' mean intensities.
-  std::uint64_t points = 0;
+  std::uint64_t points = 0;                 ///< In the dropped cells.
 };
 
 /// Takes the outliers out of the cells: those whose mean distance to the `neighbours` nearest cell

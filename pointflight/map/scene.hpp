@@ -12,8 +12,9 @@ namespace pointflight {
 
 /// What was seen or met: 0 the map, from 1 on the vehicles, from `kFirstObstacle` on the obstacles.
 using Label = std::uint32_t;
-inline constexpr Label kMapLabel = 0;
-inline constexpr Label kFirstVehicle = 1;
+inline constexpr Label kMapLabel = 0;      ///< The map.
+inline constexpr Label kFirstVehicle = 1;  ///< Label of vehicle 0.
+/// Label of obstacle 0: there are no more vehicles than fit below.
 inline constexpr Label kFirstObstacle = 10001;
 
 /// Shape of a body: an exact solid, or surfels of a cloud or mesh of its own.
@@ -21,8 +22,8 @@ using BodyShape = std::variant<Solid, std::shared_ptr<const SurfelMap>>;
 
 /// Something that moves through the map, from one instant to another.
 struct Body {
-  Label label = kMapLabel;
-  BodyShape shape;
+  Label label = kMapLabel;         ///< What scans call it.
+  BodyShape shape;                 ///< In the body's own frame.
   float intensity = 0.0f;          ///< Of a solid's returns; surfels have their own.
   PoseAt T_world_body;             ///< Known at least from `from` until `until`.
   double speed_max = 0.0;          ///< Of its origin in that time, m/s.

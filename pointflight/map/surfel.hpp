@@ -11,9 +11,9 @@ namespace pointflight {
 /// Axes are the columns of `axes`: column 0 is the normal. Standard deviations in units of the
 /// voxel size r, s[0] <= s[1] <= s[2].
 struct Surfel {
-  Vector3f center_voxels;  ///< From the leaf's origin, in voxels, each in [0, 16).
-  Matrix3f axes = Matrix3f::Identity();
-  Vector3f s = Vector3f::Constant(0.29f);
+  Vector3f center_voxels;                  ///< From the leaf's origin, in voxels, each in [0, 16).
+  Matrix3f axes = Matrix3f::Identity();    ///< Orthonormal, of either hand.
+  Vector3f s = Vector3f::Constant(0.29f);  ///< Those of a filled cell: r / sqrt(12).
 };
 
 /// A surfel in 8 bytes, low bits first:
@@ -28,12 +28,15 @@ using SurfelWord = std::uint64_t;
 
 /// s0 of a planar surfel: its hit lies within 0.005 r of the plane even at grazing angles.
 inline constexpr float kPlanarThickness = 0.005f;
+/// s0 of each class, in units of r.
 inline constexpr float kThicknessClasses[4] = {kPlanarThickness, 0.06f, 0.14f, 0.27f};
 
 /// Steps of s1 and s2 start here, in units of r.
 inline constexpr float kMinSpread = 0.06f;
 
+/// The nearest that eight bytes can say; `center_voxels` must lie in [0, 16).
 SurfelWord encode(const Surfel& surfel);
+/// Axes come out as one of four that stand for the same ellipsoid.
 Surfel decode(SurfelWord word);
 
 /// True for surfels of thickness class 0.
@@ -43,13 +46,18 @@ inline bool is_planar(SurfelWord word) {
 
 /// First word of a leaf: 20-bit voxel coordinates of its origin and the number of surfels (1..8).
 struct LeafHeader {
+  /// Voxels from the map's origin.
+  ///@{
   std::uint32_t x, y, z;
-  std::uint32_t count;
+  ///@}
+  std::uint32_t count;  ///< Surfels that follow, 1 to 8.
 };
+/// Coordinates below 2^20.
 inline SurfelWord encode(const LeafHeader& leaf) {
   return static_cast<SurfelWord>(leaf.x) | static_cast<SurfelWord>(leaf.y) << 20 |
          static_cast<SurfelWord>(leaf.z) << 40 | static_cast<SurfelWord>(leaf.count) << 60;
 }
+/// Of any word, also one that is no header: counts up to 15.
 inline LeafHeader decode_leaf(SurfelWord word) {
   constexpr std::uint32_t kMask = (1u << 20) - 1;
   return {static_cast<std::uint32_t>(word) & kMask,

@@ -58,9 +58,13 @@ class SurfelMap {
   [[nodiscard]] double resolution() const { return resolution_; }         ///< r, m.
   [[nodiscard]] const Vector3d& origin_world() const { return origin_; }  ///< Of voxel (0, 0, 0).
   [[nodiscard]] const Aabb& bounds_world() const { return bounds_; }  ///< Of the surfel centres.
+  /// Constants of the hit rule that it was made for.
   [[nodiscard]] const RenderModel& model() const { return model_; }
+  /// What decoding its surfels takes.
   [[nodiscard]] const SurfelScale& scale() const { return scale_; }
+  /// As its header says.
   [[nodiscard]] std::uint64_t surfel_count() const { return surfel_count_; }
+  /// Bytes.
   [[nodiscard]] std::uint64_t file_size() const { return file_size_; }
 
   /// Sixteen hexadecimal digits of what is in the map, its metadata left out. Read from the header:
@@ -70,8 +74,11 @@ class SurfelMap {
   /// How the map was made, as JSON text.
   [[nodiscard]] std::string_view metadata() const { return metadata_; }
 
+  /// The hierarchy's inner nodes, the root first; empty for an empty map.
   [[nodiscard]] std::span<const Bvh8Node> nodes() const { return nodes_; }
+  /// Leaf headers, each with its surfels behind it, and kLeafPadding words.
   [[nodiscard]] std::span<const SurfelWord> words() const { return words_; }
+  /// False: `intensity` is 0 everywhere.
   [[nodiscard]] bool has_intensity() const { return !intensity_.empty(); }
 
   /// Codes of the intensities beside `words`, empty without: offset + step * code.

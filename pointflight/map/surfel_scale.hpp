@@ -7,6 +7,7 @@ namespace pointflight {
 /// What decoding surfel words takes at one resolution: the word holds classes and codes.
 struct SurfelScale {
   SurfelScale() : SurfelScale(1.0f) {}
+  /// `r`: the map's resolution, m.
   explicit SurfelScale(float r) : r_squared(r * r), place_step(r / 64.0f) {
     for (int i = 0; i < 4; ++i) {
       thickness[i] = kThicknessClasses[i] * r;
@@ -20,12 +21,14 @@ struct SurfelScale {
     }
   }
 
-  float r_squared;
+  float r_squared;                      ///< r^2, m^2.
   float place_step;                     ///< Of the surfels' places, m.
   alignas(16) float thickness[4] = {};  ///< s0 of each class, m.
+  /// 1 / thickness.
   alignas(16) float inverse_thickness[4] = {};
   alignas(16) float widest[4] = {};  ///< s0^2 of the classes that can lie above s2^2, else 0.
   alignas(32) float ratio[8] = {};   ///< s1 / s2 of each code.
+  /// 1 / ratio.
   alignas(32) float inverse_ratio[8] = {};
 };
 
