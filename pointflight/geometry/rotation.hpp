@@ -2,6 +2,7 @@
 
 #include "pointflight/geometry/types.hpp"
 
+/// @file
 /// Rotations through core/math.hpp: the same bits on every CPU (Eigen's AngleAxis and slerp call
 /// libm).
 namespace pointflight {

@@ -7,6 +7,7 @@
 #include "pointflight/core/progress.hpp"
 #include "pointflight/io/cloud_reader.hpp"
 
+/// @file
 /// One function per format; each takes a mapped file and throws InputError where it is not valid.
 namespace pointflight {
 

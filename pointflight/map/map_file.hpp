@@ -8,6 +8,7 @@
 #include "pointflight/map/bvh8.hpp"
 #include "pointflight/map/surfel_map.hpp"
 
+/// @file
 /// The `.pfmap` file: little endian, sections aligned to 64 bytes, used in place through mmap.
 ///
 ///   byte 0      header (below), 4096 bytes, zero-filled

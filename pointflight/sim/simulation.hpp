@@ -20,8 +20,8 @@ enum class RunEnd {
   kCompleted,          ///< All that was to be done is done.
   kMissionUnfinished,  ///< Time was up with a vehicle away from its goal, crashed or empty.
   kCollision,          ///< A vehicle with on_collision: stop met something.
-  kLeftMap,  ///< `is_lost` (sim/start_check.hpp).
-  kInterrupted,  ///< `Simulation::interrupt`.
+  kLeftMap,            ///< `is_lost` (sim/start_check.hpp).
+  kInterrupted,        ///< `Simulation::interrupt`.
   kIdle  ///< Nothing to do and no commands for `Simulation::kIdleTime`; the scenario has no
          ///< duration.
 };
