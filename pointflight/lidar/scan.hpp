@@ -27,7 +27,7 @@ struct Scan {
   std::uint32_t vehicle = 0;      ///< Number of the vehicle in the scenario.
   std::uint32_t sensor = 0;       ///< Number of the LiDAR on it.
   SimTime start;                  ///< Inclusive.
-  SimTime end;                    ///< Exclusive: the next scan's start.
+  SimTime end;                    ///< Exclusive.
   std::size_t beams = 0;          ///< Fired, whether they returned or not.
   bool snapshot = false;          ///< All beams left from the sensor's pose at `middle`.
   SimTime middle;                 ///< Between first and last beam (a camera's: its start).

@@ -90,7 +90,7 @@ class Simulation {
   /// Of the states that `status` has: the start of the next step.
   [[nodiscard]] SimTime time() const { return state_.time; }
   /// When the run ends by itself: the scenario's duration, or else the end of missions and
-  /// commands, which moves as a program gives more. A landing under way is waited for.
+  /// commands, which moves as a program gives more; then a landing under way is waited for.
   [[nodiscard]] SimTime end_time() const;
   /// `RunEnd::kRunning` until a step returns false or the run was ended.
   [[nodiscard]] RunEnd end() const { return state_.end; }

@@ -14,8 +14,8 @@ namespace pointflight {
 
 /// What an autopilot does and remembers: a value.
 struct AutopilotState {
-  Command command = HoverCommand{};              ///< The last that was taken; hover after a timeout.
-  SimTime since;                                 ///< When the command was given.
+  Command command = HoverCommand{};  ///< The last that was taken; hover after a timeout.
+  SimTime since;                     ///< When the command was given.
   std::shared_ptr<const Trajectory> trajectory;  ///< That it follows from `since` on, or none.
   bool armed = true;                    ///< False: rotors are off, whatever the command says.
   std::optional<PositionCommand> hold;  ///< Where it hovers, once it is slow.
