@@ -17,7 +17,8 @@ if [ ! -x "$root/bin/bash" ]; then
   mirror=$(sed -n 's/^URIs: *//p; s/^deb \(\[[^]]*\] \)\?\([^ ]*\) .*/\2/p' $sources/sources.list \
            $sources/sources.list.d/* 2>/dev/null | head -1)
   debootstrap --variant=minbase bookworm "$root" "${mirror:-http://deb.debian.org/debian}" >/dev/null
-  # the same sources of packages as here
+  # the same sources of packages as here, and no others
+  rm -f "$root/etc/apt/sources.list"
   for file in $sources/apt.conf.d $sources/sources.list $sources/sources.list.d $sources/auth.conf.d; do
     [ ! -e "$file" ] || cp -a "$file" "$root/etc/apt/"
   done

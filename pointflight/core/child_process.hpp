@@ -10,7 +10,7 @@ namespace pointflight {
 
 /// What a child may use before it is ended.
 struct ChildLimits {
-  double cpu_seconds = 20.0;
+  double cpu_seconds = 20.0;                        ///< Of its own threads together.
   std::size_t memory_bytes = std::size_t{2} << 30;  ///< Beyond what the process has; not under
                                                     ///< sanitizers, whose shadow would count.
 };
@@ -18,6 +18,7 @@ struct ChildLimits {
 /// Where a child's work leaves its results.
 class ChildOutput {
  public:
+  /// Writes to a descriptor, which stays the caller's.
   explicit ChildOutput(int pipe) : pipe_(pipe) {}
   /// Bytes for the parent, after those of earlier calls.
   void write(std::span<const std::byte> bytes);
@@ -28,8 +29,8 @@ class ChildOutput {
 
 /// What came back from a child.
 struct ChildResult {
-  std::vector<std::byte> bytes;
-  std::string failure;  ///< Empty where the work was done, else why not: for a message.
+  std::vector<std::byte> bytes;  ///< All that was written, in order.
+  std::string failure;           ///< Empty where the work was done, else why not: for a message.
 };
 
 /// Runs `work` in a copy of this process (fork), so that a library that crashes, hangs or takes all

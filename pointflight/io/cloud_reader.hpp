@@ -71,6 +71,7 @@ class CloudSource {
  public:
   /// A file. `format` is an extension ("las") that counts instead of the path's own.
   CloudSource(std::string path, const std::string& format = {});     // NOLINT: a path is a source
+  /// The same, for literals.
   CloudSource(const char* path) : CloudSource(std::string(path)) {}  // NOLINT
 
   /// What comes through a pipe or a socket until its end. It is kept in a file without a name in
@@ -81,6 +82,7 @@ class CloudSource {
                                  const std::string& folder,
                                  const Progress& progress = {});
 
+  /// For messages: the path, or what stands for a stream.
   [[nodiscard]] const std::string& name() const { return name_; }
 
   /// True if it is a mesh (by extension, or a PLY with faces).

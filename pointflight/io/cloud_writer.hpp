@@ -14,15 +14,15 @@ namespace pointflight {
 
 /// What the points of a written cloud carry beside x, y and z.
 struct CloudColumns {
-  bool intensity = false;
-  bool color = false;
+  bool intensity = false;  ///< float32; 16 bits in LAS.
+  bool color = false;      ///< Red, green, blue.
   bool normal = false;     ///< Not in LAS.
   bool ellipsoid = false;  ///< Deviations and axes of a surfel; not in LAS.
 };
 
 /// One row of a written cloud; what its columns lack is not looked at.
 struct CloudRow {
-  CloudPoint point;
+  CloudPoint point;                                          ///< World, m.
   Vector3f normal = Vector3f::Zero();                        ///< Unit length.
   Vector3f spread = Vector3f::Zero();                        ///< Standard deviations, m.
   Eigen::Quaternionf axes = Eigen::Quaternionf::Identity();  ///< World <- surfel.
@@ -36,26 +36,31 @@ class CloudWriter {
  public:
   virtual ~CloudWriter() = default;
 
+  /// Appends points without normals and ellipsoids. Throws InputError.
   void write(std::span<const CloudPoint> points);
+  /// Appends rows. Throws InputError.
   void write(std::span<const CloudRow> rows);
 
   /// Completes the header and the file.
   virtual void commit() = 0;
 
+  /// Rows written so far.
   [[nodiscard]] std::uint64_t count() const { return count_; }
 
   /// What the format could not hold, for a warning; empty where nothing was lost.
   [[nodiscard]] virtual std::string loss() const { return {}; }
 
  protected:
+  /// Of a format: writes into `file`, whose header is completed by `commit`.
   explicit CloudWriter(OutputFile file) : file_(std::move(file)) {}
   /// Called once, with the first rows.
   virtual void begin(std::span<const CloudRow> rows) = 0;
+  /// Adds the bytes of a row to `bytes`, which are written in blocks.
   virtual void append(const CloudRow& row, std::vector<std::byte>& bytes) = 0;
 
-  OutputFile file_;
-  std::uint64_t count_ = 0;
-  bool begun_ = false;
+  OutputFile file_;          ///< What is written.
+  std::uint64_t count_ = 0;  ///< Rows so far.
+  bool begun_ = false;       ///< `begin` was called.
 
  private:
   std::vector<CloudRow> rows_;

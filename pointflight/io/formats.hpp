@@ -32,8 +32,8 @@ std::unique_ptr<CloudReader> open_las(MappedFile file);
 
 /// What the import of a mesh may use; a damaged file can make it want without end.
 struct MeshLimits {
-  double cpu_seconds;
-  std::size_t memory_bytes;
+  double cpu_seconds;        ///< Of the process that reads it.
+  std::size_t memory_bytes;  ///< Of its address space, beside what it shares.
 };
 /// More than any sound mesh of that size takes.
 MeshLimits mesh_limits(std::size_t file_bytes);

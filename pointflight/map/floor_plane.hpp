@@ -18,7 +18,7 @@ struct FloorPlane {
   /// What walls say, where there are some that the tilt would show on: whether they stand upright
   /// on the floor (the whole map is tilted) or in the world (the floor is a ramp).
   enum class Walls { kNone, kOnTheFloor, kInTheWorld };
-  Walls walls = Walls::kNone;
+  Walls walls = Walls::kNone;  ///< kNone: the floor is level, or there are too few.
 
   /// Where the floor is level after this; it turns about `middle_world`.
   [[nodiscard]] Pose levelling() const;

@@ -35,8 +35,8 @@ struct ImportOptions {
 
 /// A source whose file names the unit of its coordinates.
 struct SourceUnit {
-  std::string source;
-  FileUnit unit;
+  std::string source;  ///< File name without folder.
+  FileUnit unit;       ///< As its file names it.
 };
 
 /// What an import did, for the user and for the map's metadata.

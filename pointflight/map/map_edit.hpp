@@ -16,18 +16,18 @@ namespace pointflight {
 /// Makes maps of maps, surfel by surfel. Surfels that are not moved stay what they are, to the bit;
 /// a turn rounds their centres anew to r / 64 and their axes to 0.3 degrees.
 struct EditedMap {
-  Bvh8 tree;
-  MapDescription description;
+  Bvh8 tree;                         ///< For `write_map`.
+  MapDescription description;        ///< For `write_map`.
   std::uint64_t surfels_before = 0;  ///< Of all maps together.
-  std::uint64_t surfels = 0;
-  std::uint64_t doubles = 0;  ///< Left out by `merge_maps`: another map has that place.
+  std::uint64_t surfels = 0;         ///< That are left.
+  std::uint64_t doubles = 0;         ///< Left out by `merge_maps`: another map has that place.
 };
 
 /// How an edit is done.
 struct EditOptions {
-  TreeQuality quality = TreeQuality::kHigh;
-  std::string scratch_folder =
-      {};  ///< For what does not fit into memory; empty: with temporary files.
+  TreeQuality quality = TreeQuality::kHigh;  ///< Of the hierarchy, which is built anew.
+  /// For what does not fit into memory; empty: with temporary files.
+  std::string scratch_folder = {};
   std::size_t scratch_memory = Scratch::kDefaultMemory;  ///< Bytes.
   std::string note = {};  ///< What was done, appended to the metadata's list "edited".
 };
@@ -47,8 +47,8 @@ EditedMap transform_map(const SurfelMap& map,
 
 /// A map and where it lies among others.
 struct PlacedMap {
-  std::shared_ptr<const SurfelMap> map;
-  Pose T_world_map;
+  std::shared_ptr<const SurfelMap> map;  ///< Not null.
+  Pose T_world_map;                      ///< Of the joined map's frame.
 };
 
 /// Joins maps of one resolution. A surfel of a later one that lies within the cell of an earlier

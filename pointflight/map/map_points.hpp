@@ -21,9 +21,9 @@ void for_each_row(const SurfelMap& map,
 
 /// What a thinning took and gave.
 struct ThinReport {
-  std::uint64_t points_read = 0;
+  std::uint64_t points_read = 0;     ///< Of the cloud.
   std::uint64_t points_dropped = 0;  ///< NaN, infinite, or more than 2^20 cells from the first.
-  std::uint64_t points = 0;
+  std::uint64_t points = 0;          ///< Written.
 };
 
 /// Thins a cloud: one point for each occupied cell of `spacing` (m), the mean of its points with

@@ -83,7 +83,9 @@ class SurfelMap {
 
   /// Codes of the intensities beside `words`, empty without: offset + step * code.
   [[nodiscard]] std::span<const std::uint8_t> intensity_codes() const { return intensity_; }
+  /// In the cloud's own scale.
   [[nodiscard]] float intensity_offset() const { return intensity_offset_; }
+  /// In the cloud's own scale, for each step of a code.
   [[nodiscard]] float intensity_step() const { return intensity_step_; }
 
   /// Intensity of the surfel at a word index, in the cloud's own scale; 0 without intensities.

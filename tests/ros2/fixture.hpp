@@ -29,8 +29,8 @@ class Ros2 : public Program {
                             const std::string& map_file,
                             const std::string& more = "") {
     const std::string path = *folder_ / (lidars.front() + ".yaml");
-    const auto made = run(
-        fmt::format("scenario new {} -o {} --lidar {} --length 1", map_file, path, lidars.front()));
+    const auto made = run(fmt::format(
+        "scenario new {} -o {} --lidar {} --length 1 --force", map_file, path, lidars.front()));
     EXPECT_EQ(made.code, 0) << made.err;
     std::string mounts;
     for (const std::string& lidar : lidars) mounts += fmt::format("{{model: {}}}, ", lidar);
