@@ -113,7 +113,7 @@ void restrict_child(const ChildLimits& limits, pid_t parent) {
   }
   sigset_t none;
   ::sigemptyset(&none);
-  ::sigprocmask(SIG_SETMASK, &none, nullptr);
+  ::pthread_sigmask(SIG_SETMASK, &none, nullptr);
   set_limit(RLIMIT_CORE, 0, 0);
   const auto seconds = static_cast<rlim_t>(std::ceil(std::max(1.0, limits.cpu_seconds)));
   set_limit(RLIMIT_CPU, seconds, seconds + 1);  // SIGXCPU, then SIGKILL

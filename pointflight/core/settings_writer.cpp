@@ -19,6 +19,7 @@ std::string vector_text(const Eigen::Vector3d& v) {
 
 std::string list_text(const std::vector<double>& values) {
   std::vector<std::string> texts;
+  texts.reserve(values.size());
   for (const double value : values) texts.push_back(number_text(value));
   return fmt::format("[{}]", fmt::join(texts, ", "));
 }

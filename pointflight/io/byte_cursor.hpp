@@ -20,7 +20,7 @@ T load(const std::byte* bytes, bool big_endian = false) {
   for (std::size_t i = 0; i < sizeof(T); ++i) {
     copy[i] = bytes[big_endian ? sizeof(T) - 1 - i : i];
   }
-  T value;
+  T value{};
   std::memcpy(&value, copy, sizeof(T));
   return value;
 }

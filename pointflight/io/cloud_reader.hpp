@@ -70,7 +70,7 @@ struct MeshSampling {
 class CloudSource {
  public:
   /// A file. `format` is an extension ("las") that counts instead of the path's own.
-  CloudSource(std::string path, const std::string& format = {});     // NOLINT: a path is a source
+  CloudSource(std::string path, const std::string& format = {});  // NOLINT: a path is a source
   /// The same, for literals.
   CloudSource(const char* path) : CloudSource(std::string(path)) {}  // NOLINT
 

@@ -304,8 +304,10 @@ def main():
         globals()[NAME]()
     except Exception as error:  # noqa: BLE001: whatever it is, it is what is wrong
         FAULTS.append(f"{type(error).__name__}: {error}")
-    with open(os.environ["STUB_RESULTS"] + "/" + NAME, "w") as out:
+    result = os.environ["STUB_RESULTS"] + "/" + NAME
+    with open(result + ".partial", "w") as out:
         out.write("\n".join(FAULTS) if FAULTS else "ok")
+    os.replace(result + ".partial", result)  # nobody shall read half of it
     while True:  # as the program would
         time.sleep(1)
 
