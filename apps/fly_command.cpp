@@ -381,6 +381,7 @@ int fly(const FlyFlags& flags) {
   if (flags.output.empty() && !flags.ros.any()) {
     throw InputError("give a folder for the results with -o, or --ros1, --ros2 or --record");
   }
+  check_ros_flags(flags.ros);
   // others live on the wall clock
   const double rate =
       parse_rate(flags.rate.empty() ? (flags.ros.is_live() ? "1.0" : "max") : flags.rate);

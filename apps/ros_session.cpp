@@ -128,7 +128,7 @@ void add_ros_flags(CLI::App& app, RosFlags& flags) {
       ->capture_default_str();
 }
 
-void prepare_for_ros(const RosFlags& flags, double rate, Scenario& scenario) {
+void check_ros_flags(const RosFlags& flags) {
   for (const auto& [flag, given] : {std::pair{"--lockstep", flags.lockstep > 0.0},
                                     std::pair{"--stay", flags.stay},
                                     std::pair{"--no-wait", flags.no_wait}}) {
@@ -139,6 +139,9 @@ void prepare_for_ros(const RosFlags& flags, double rate, Scenario& scenario) {
   if (!flags.profile.empty() && !flags.any()) {
     throw InputError("--profile: has no effect without --ros1, --ros2 or --record");
   }
+}
+
+void prepare_for_ros(const RosFlags& flags, double rate, Scenario& scenario) {
   if (!flags.any()) return;
   const RosProfile profile = profile_for(scenario, flags.profile);
   scenario.output.odometry_rate =

@@ -36,6 +36,9 @@ struct RosFlags {
 
 void add_ros_flags(CLI::App& app, RosFlags& flags);
 
+/// Throws InputError for a flag that has no effect without others.
+void check_ros_flags(const RosFlags& flags);
+
 /// What a profile needs of a scenario: samples as often as it sends them. A live flight goes on
 /// until it is interrupted where nobody has planned it, and after its mission where it is flown in
 /// real time (`rate` > 0) and not told to end (--no-stay, a duration, lockstep). Throws InputError.

@@ -56,12 +56,15 @@ Vector3d commonest_normal(const std::vector<Facet>& flat) {
   constexpr int kBins = 61;
   constexpr double kWidth = 2.0 * kMostTilt / kBins;
   std::vector<std::uint32_t> counts(kBins * kBins, 0);
+  const auto index = [](int i, int j) {
+    return static_cast<std::size_t>(i) * kBins + static_cast<std::size_t>(j);
+  };
   const auto bin_of = [](double slope) {
     return std::clamp(static_cast<int>((slope + kMostTilt) / kWidth), 0, kBins - 1);
   };
   for (const Facet& facet : flat) {
     const Vector3d& n = facet.normal;
-    ++counts[static_cast<std::size_t>(bin_of(n.x() / n.z()) * kBins + bin_of(n.y() / n.z()))];
+    ++counts[index(bin_of(n.x() / n.z()), bin_of(n.y() / n.z()))];
   }
   std::uint32_t most = 0;
   Vector3d mode = Vector3d::UnitZ();
@@ -71,7 +74,7 @@ Vector3d commonest_normal(const std::vector<Facet>& flat) {
       for (int k = 0; k < 9; ++k) {
         const int a = std::clamp(i + k / 3 - 1, 0, kBins - 1);
         const int b = std::clamp(j + k % 3 - 1, 0, kBins - 1);
-        around += counts[static_cast<std::size_t>(a * kBins + b)];
+        around += counts[index(a, b)];
       }
       if (around <= most) continue;
       most = around;

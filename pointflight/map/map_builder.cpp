@@ -433,6 +433,7 @@ ImportedMap import_clouds(const std::vector<CloudSource>& sources,
         kMeshPointsPerCell / (*chosen.resolution * *chosen.resolution);
   }
   std::vector<std::string> names;
+  names.reserve(sources.size());
   for (const CloudSource& source : sources) names.push_back(source.name());
   const auto opener = [&](std::size_t i) { return sources[i].open(sampling, progress); };
   ImportedMap map = build_map(names, opener, chosen, executor, progress);

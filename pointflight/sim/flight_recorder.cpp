@@ -298,7 +298,8 @@ std::string summary_json(const Simulation& simulation) {
   json["map"] = fs::path(scenario.map).filename().string();
   json["map_bytes"] = simulation.map().file_size();
   json["map_hash"] = simulation.map().hash();
-  json["simulated_time"] = to_seconds(simulation.time());
+  // divided and not multiplied: 0.3 and not 0.30000000000000004
+  json["simulated_time"] = static_cast<double>(simulation.time().time_since_epoch().count()) / 1e9;
   json["obstacles"] = simulation.obstacle_count();
   json["vehicles"] = nlohmann::ordered_json::array();
   for (std::size_t v = 0; v < simulation.vehicle_count(); ++v) {

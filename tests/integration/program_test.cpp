@@ -88,6 +88,79 @@ TEST_F(Program, ScansWithEverySensorAndBothRenderers) {
   }
 }
 
+TEST_F(Program, SaysWhichCommandOrFlagWasMeant) {
+  expect_user_error(run("flyy x"), "'flyy' is no command, did you mean 'fly'?; see pointflight");
+  expect_user_error(run("map improt a"), "did you mean 'import'?; see pointflight map --help");
+  expect_user_error(run("map zzz"), "'zzz' is no command, these are: import, info");
+  expect_user_error(run("map"), "a command is missing, one of: import, info");
+  expect_user_error(run("fly x -o y --bogus --zeta 1"), "not expected: --bogus --zeta 1;");
+  expect_user_error(run("scan x --lidr avia --pose 0"), "--lidr avia, did you mean '--lidar'?");
+  for (const char* arguments : {"help", "help map import", "map import --help"}) {
+    const Result help = run(arguments);
+    EXPECT_EQ(help.code, 0);
+    expect_contains(help.out, "Usage: pointflight");
+  }
+  const Result version = run("--version");
+  EXPECT_EQ(version.code, 0);
+  for (const char* words : {"pointflight 0.", "(commit ", "meshes ", "ROS 1 ", "ROS 2 "}) {
+    expect_contains(version.out, words);
+  }
+}
+
+TEST_F(Program, ManualAndCompletionComeFromTheCommandTree) {
+  const TemporaryFolder folder;
+  const Result man = run("man");
+  EXPECT_EQ(man.out.rfind(".TH POINTFLIGHT 1", 0), 0u);
+  for (const char* words : {".SS pointflight map import", "\\-\\-resolution", "EXIT STATUS"}) {
+    expect_contains(man.out, words);
+  }
+  write_file(folder / "completion", run("completion").out);
+  const auto completed = [&](const std::string& words, int at) {
+    const std::string script = fmt::format(
+        "source {}; COMP_WORDS=({}); COMP_CWORD={}; _pointflight; echo \"${{COMPREPLY[*]}}\"",
+        folder / "completion",
+        words,
+        at);
+    write_file(folder / "script", script);
+    EXPECT_EQ(std::system(fmt::format("bash {} >{}", folder / "script", folder / "out").c_str()),
+              0);
+    return read_file(folder / "out");
+  };
+  EXPECT_EQ(completed("pointflight sc", 1), "scenario scan\n");
+  EXPECT_EQ(completed("pointflight map imp", 2), "import\n");
+  EXPECT_EQ(completed("pointflight map import --resol", 3), "--resolution\n");
+}
+
+TEST_F(Program, FliesWhatTheCommandLineSays) {
+  const TemporaryFolder folder;
+  const Result fly = run(fmt::format(
+      "fly {} --lidar avia --vehicle hexa_550 --start 12,10,9 --mission 12,12,9 -1,12,9 --duration "
+      "0.3 --no-scans --json -o {}",
+      map(),
+      folder / "run"));
+  EXPECT_EQ(fly.code, 1) << fly.err;  // the mission takes longer
+  const auto json = nlohmann::json::parse(fly.out);
+  EXPECT_EQ(json["vehicles"][0]["model"], "hexa_550");
+  EXPECT_EQ(json["vehicles"][0]["scans"], 3);
+  EXPECT_EQ(json["simulated_time"], 0.3);
+  EXPECT_EQ(json["folder"], folder / "run");
+  EXPECT_FALSE(std::filesystem::exists(folder / "run/scans"));
+  for (const char* words : {"model: avia", "[12, 12, 9]", "[-1, 12, 9]", "duration: 0.3"}) {
+    expect_contains(read_file(folder / "run/scenario.yaml"), words);
+  }
+  const Result again = run(fmt::format("fly {} --lidar mid360 --vehicle quad_330 -o {}",
+                                       folder / "run/scenario.yaml",
+                                       folder / "again"));
+  EXPECT_EQ(again.code, 1) << again.err;
+  expect_contains(read_file(folder / "again/scenario.yaml"), "model: mid360");
+  expect_user_error(run(fmt::format("fly {} -o {} --mission 1,2", map(), folder / "no")),
+                    "--mission: '1,2'; waypoints x,y,z");
+  expect_user_error(run(fmt::format("fly {} -o {} --lockstep 1", map(), folder / "no")),
+                    "--lockstep: has no effect without --ros1 or --ros2");
+  const Result check = run(fmt::format("scenario check {} --json", folder / "run/scenario.yaml"));
+  EXPECT_EQ(nlohmann::json::parse(check.out)["vehicles"][0]["waypoints"], 2);
+}
+
 TEST_F(Program, TheSameScanForTheSameSeed) {
   const TemporaryFolder folder;
   const auto scan = [&](int seed, int threads) {
