@@ -149,7 +149,8 @@ void draw_errors(std::span<const ErrorPanel> panels,
   for (std::size_t i = 0; i < panels.size(); ++i) {
     Plot plot = plot_of(panels[i]);
     plot.left = kLeft + static_cast<double>(i % columns) * column_width;
-    plot.top = header + kCaption + static_cast<double>(i / columns) * row_height;
+    const std::size_t row = i / columns;
+    plot.top = header + kCaption + static_cast<double>(row) * row_height;
     draw_panel(canvas, panels[i], plot);
   }
   canvas.save(path);

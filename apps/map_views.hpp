@@ -37,7 +37,7 @@ struct Raster {
 /// A page with a top view above a side view, metres along the axes.
 struct Page {
   Plot top, side;
-  int width, height;
+  int width = 0, height = 0;
   Aabb shown;  ///< World, m.
 
   [[nodiscard]] std::pair<double, double> on_top(const Vector3d& p) const {

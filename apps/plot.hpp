@@ -37,7 +37,7 @@ struct Axis {
 
 /// A rectangle of the canvas with axes.
 struct Plot {
-  double left, top, width, height;
+  double left = 0.0, top = 0.0, width = 0.0, height = 0.0;
   Axis x, y;
 
   /// Pixels of a point.
