@@ -71,8 +71,8 @@ class RosSession::ScanCount : public SampleSink {
   void on_scan(const Scan& scan, const PoseAt& /*pose_at*/) override {
     ++scans;
     if (const auto late = lateness ? lateness(scan.end) : std::nullopt) {
-      const double bin = std::clamp(*late / kBin, 0.0, static_cast<double>(delays.size() - 1));
-      ++delays[static_cast<std::size_t>(bin)];
+      const double bin = std::clamp(*late / kBin, 0.0, static_cast<double>(delays_.size() - 1));
+      ++delays_[static_cast<std::size_t>(bin)];
       ++delayed;
     }
   }
@@ -82,8 +82,8 @@ class RosSession::ScanCount : public SampleSink {
     std::uint64_t below = 0;
     std::size_t bin = 0;
     const auto wanted = static_cast<std::uint64_t>(share * static_cast<double>(delayed));
-    while (bin + 1 < delays.size() && below + delays[bin] <= wanted) {
-      below += delays[bin++];
+    while (bin + 1 < delays_.size() && below + delays_[bin] <= wanted) {
+      below += delays_[bin++];
     }
     return kBin * (static_cast<double>(bin) + 0.5);
   }
@@ -94,8 +94,8 @@ class RosSession::ScanCount : public SampleSink {
   std::uint64_t delayed = 0;  ///< Scans whose delay was measured.
 
  private:
-  static constexpr double kBin = 1e-4;         // s
-  std::array<std::uint64_t, 100000> delays{};  ///< From a scan's end until it was handed over.
+  static constexpr double kBin = 1e-4;          // s
+  std::array<std::uint64_t, 100000> delays_{};  ///< From a scan's end until it was handed over.
 };
 
 void add_ros_flags(CLI::App& app, RosFlags& flags) {

@@ -76,10 +76,11 @@ void draw_step_responses(const VehicleSettings& vehicle,
               50.0,
               room);
   for (std::size_t i = 0; i < responses.size(); ++i) {
+    const std::size_t row = i / 2;
     draw_panel(canvas,
                responses[i],
                kLeft + static_cast<double>(i % 2) * column_width,
-               kTop + static_cast<double>(i / 2) * (kHeight + kGap));
+               kTop + static_cast<double>(row) * (kHeight + kGap));
   }
   canvas.save(path);
 }
