@@ -12,6 +12,7 @@
 #include "apps/commands.hpp"
 #include "apps/error_picture.hpp"
 #include "apps/flags.hpp"
+#include "apps/settings_json.hpp"
 #include "apps/terminal.hpp"
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/fidelity/scan_comparison.hpp"
@@ -139,7 +140,7 @@ void compare(const CompareFlags& flags) {
          {{"all", to_json(all.statistics())}, {"supported", to_json(supported.statistics())}}},
         {"scans", rows}};
     if (floor) json["floor"] = to_json(floor->statistics());
-    fmt::print("{}\n", json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
+    print_json(json);
     return;
   }
   print_row("all", all.statistics());

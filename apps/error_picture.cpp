@@ -26,7 +26,7 @@ struct Kind {
 };
 enum : std::size_t { kRight, kEarly, kLate, kMissing, kFalse, kNothing };
 constexpr std::array<Kind, 6> kKinds = {
-    {{"right (white: exact, grey: to 0.1 m)", {0.75, 0.75, 0.75}},
+    {{"right (light: exact, dark: off by up to 0.1 m)", {0.75, 0.75, 0.75}},
      {"early", {1.0, 0.2, 0.2}},
      {"late", {0.25, 0.45, 1.0}},
      {"missing", {0.1, 0.9, 0.9}},

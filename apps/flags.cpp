@@ -4,9 +4,12 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 
+#include "pointflight/core/constants.hpp"
 #include "pointflight/core/input_error.hpp"
+#include "pointflight/geometry/rotation.hpp"
 #include "pointflight/io/byte_cursor.hpp"
 
 namespace pointflight::apps {
@@ -19,6 +22,30 @@ CLI::Validator within(double min, double max) {
     return fmt::format("'{}' is not a number from {} to {}", excerpt(text), min, max);
   };
   return {check, fmt::format("in [{} - {}]", min, max)};
+}
+
+std::vector<double> parse_numbers(const std::string& text,
+                                  std::size_t count,
+                                  const std::string& flag) {
+  std::vector<double> numbers;
+  std::string_view rest = text;
+  for (auto word = take_word(rest); !word.empty(); word = take_word(rest)) {
+    double value = 0.0;
+    if (!parse_number(word, value) || !(std::abs(value) <= 1e9)) {
+      throw InputError(fmt::format("{}: '{}' is no number up to 1e9", flag, excerpt(word)));
+    }
+    numbers.push_back(value);
+  }
+  if (count > 0 && numbers.size() != count) {
+    throw InputError(fmt::format("{}: {} numbers; {} are wanted", flag, numbers.size(), count));
+  }
+  return numbers;
+}
+
+Pose parse_pose(const std::string& text, const std::string& flag) {
+  const std::vector<double> n =
+      parse_numbers(text, 6, flag + " (x,y,z,roll,pitch,yaw: metres, degrees)");
+  return {quaternion_from_rpy(n[3] * kDegree, n[4] * kDegree, n[5] * kDegree), {n[0], n[1], n[2]}};
 }
 
 void add_force_flag(CLI::App& app, bool& force) {

@@ -16,6 +16,15 @@ CLI::Validator within(double min, double max);
 void add_start_in_flag(CLI::App& app, std::vector<double>& numbers);
 Aabb box_from(const std::vector<double>& numbers, const std::string& flag);
 
+/// Numbers of a flag, commas or blanks between. Throws InputError where there are not `count` of
+/// them (0: any number) or one is not finite.
+std::vector<double> parse_numbers(const std::string& text,
+                                  std::size_t count,
+                                  const std::string& flag);
+
+/// "x,y,z,roll,pitch,yaw" in metres and degrees.
+Pose parse_pose(const std::string& text, const std::string& flag);
+
 /// --force: outputs may replace what is there.
 void add_force_flag(CLI::App& app, bool& force);
 

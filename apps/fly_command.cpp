@@ -6,7 +6,6 @@
 #include <CLI/Formatter.hpp>
 #include <chrono>
 #include <cmath>
-#include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -18,6 +17,7 @@
 #include "apps/pictures.hpp"
 #include "apps/ros_session.hpp"
 #include "apps/scenario_command.hpp"
+#include "apps/settings_json.hpp"
 #include "apps/terminal.hpp"
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/core/number_text.hpp"
@@ -52,11 +52,6 @@ struct FlyFlags {
   RosFlags ros;
 };
 
-std::string place_text(const Vector3d& p) {
-  return fmt::format(
-      "({}, {}, {})", fixed_text(p.x(), 2), fixed_text(p.y(), 2), fixed_text(p.z(), 2));
-}
-
 /// Says collisions and what happens on board as they happen.
 class CollisionLog : public SampleSink {
  public:
@@ -69,9 +64,9 @@ class CollisionLog : public SampleSink {
                          : fmt::format("warning: collision at {:.3f} s, {} at {}, with {} at {}",
                                        to_seconds(event.time),
                                        simulation_.vehicle(event.vehicle).setup().name,
-                                       place_text(event.vehicle_world),
+                                       point_text(event.vehicle_world),
                                        label_name(simulation_, event.partner),
-                                       place_text(event.place_world)));
+                                       point_text(event.place_world)));
   }
 
   void on_vehicle_event(const VehicleEvent& event) override {
@@ -154,21 +149,9 @@ double parse_rate(const std::string& text) {
 
 std::vector<Vector3d> waypoints_from(const std::vector<std::string>& words) {
   std::vector<Vector3d> waypoints;
+  waypoints.reserve(words.size());
   for (const std::string& word : words) {
-    Vector3d p;
-    int end = 0;
-    const bool three = std::sscanf(  // NOLINT(cert-err34-c): all of it is looked at below
-                           word.c_str(),
-                           "%lf,%lf,%lf%n",
-                           &p.x(),
-                           &p.y(),
-                           &p.z(),
-                           &end) == 3;
-    if (!three || static_cast<std::size_t>(end) != word.size() || !(p.norm() < 1e7)) {
-      throw InputError(
-          fmt::format("--mission: '{}'; waypoints x,y,z in metres, such as 10,4,2 20,4,2", word));
-    }
-    waypoints.push_back(p);
+    waypoints.emplace_back(parse_numbers(word, 3, "--mission (x,y,z x,y,z ...)").data());
   }
   return waypoints;
 }
@@ -277,7 +260,7 @@ void print_vehicle(const Simulation& simulation, std::size_t v) {
              s.closest_approach ? fmt::format("{} m to {} at {}",
                                               fixed_text(*s.closest_approach, 2),
                                               label_name(simulation, s.closest_label),
-                                              place_text(s.closest_place_world))
+                                              point_text(s.closest_place_world))
                                 : std::string("over 10 m"));
   fmt::print("  collisions        {}\n", s.collisions);
   fmt::print("  tracking error    {:.0f} mm RMS, {:.0f} mm at most\n",
@@ -305,7 +288,7 @@ void print_result(const FlyFlags& flags, const Simulation& simulation, double wa
     auto json = nlohmann::ordered_json::parse(summary_json(simulation));
     if (!flags.output.empty()) json["folder"] = flags.output;
     json["real_time_factor"] = to_seconds(simulation.time()) / wall;
-    fmt::print("{}\n", json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
+    print_json(json);
     return;
   }
   fmt::print("{}\n", flags.output.empty() ? flags.input : flags.output);

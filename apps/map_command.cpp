@@ -13,8 +13,10 @@
 #include "apps/flags.hpp"
 #include "apps/map_edit.hpp"
 #include "apps/pictures.hpp"
+#include "apps/settings_json.hpp"
 #include "apps/terminal.hpp"
 #include "pointflight/core/input_error.hpp"
+#include "pointflight/core/number_text.hpp"
 #include "pointflight/geometry/shape_scene.hpp"
 #include "pointflight/io/pcd_writer.hpp"
 #include "pointflight/map/map_builder.hpp"
@@ -268,19 +270,17 @@ void print_info(const SurfelMap& map, const InfoFlags& flags) {
     json["has_intensity"] = map.has_intensity();
     json["verified"] = flags.verify;
     json["made"] = metadata;
-    fmt::print("{}\n", json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
+    print_json(json);
     return;
   }
   fmt::print("{}\n", flags.map);
   fmt::print("  surfels     {}, {:.0f} % planar\n", surfels, 100.0 * planar_share);
   fmt::print("  resolution  {:.4g} m\n", map.resolution());
-  fmt::print("  extent      {:.2f} x {:.2f} x {:.2f} m, from ({:.2f}, {:.2f}, {:.2f})\n",
+  fmt::print("  extent      {:.2f} x {:.2f} x {:.2f} m, from {}\n",
              b.size().x(),
              b.size().y(),
              b.size().z(),
-             no_minus(b.min.x()),
-             no_minus(b.min.y()),
-             no_minus(b.min.z()));
+             point_text(b.min));
   fmt::print("  size        {:.1f} MB, {:.1f} bytes a surfel\n",
              static_cast<double>(map.file_size()) * 1e-6,
              bytes_each);

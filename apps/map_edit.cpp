@@ -4,16 +4,13 @@
 
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
-#include <cmath>
 #include <filesystem>
 #include <utility>
 
 #include "apps/flags.hpp"
 #include "apps/terminal.hpp"
-#include "pointflight/core/constants.hpp"
 #include "pointflight/core/input_error.hpp"
-#include "pointflight/geometry/rotation.hpp"
-#include "pointflight/io/byte_cursor.hpp"
+#include "pointflight/core/number_text.hpp"
 
 namespace pointflight::apps {
 namespace {
@@ -79,29 +76,6 @@ bool check_edit(const EditFlags& flags) {
   return makes_map;
 }
 
-std::vector<double> parse_numbers(const std::string& text,
-                                  std::size_t count,
-                                  const std::string& flag) {
-  std::vector<double> numbers;
-  std::string_view rest = text;
-  for (auto word = take_word(rest); !word.empty(); word = take_word(rest)) {
-    double value = 0.0;
-    if (!parse_number(word, value) || !(std::abs(value) <= 1e9)) {
-      throw InputError(fmt::format("{}: '{}' is no number up to 1e9", flag, excerpt(word)));
-    }
-    numbers.push_back(value);
-  }
-  if (count > 0 && numbers.size() != count) {
-    throw InputError(fmt::format("{}: {} numbers; {} are wanted", flag, numbers.size(), count));
-  }
-  return numbers;
-}
-
-Pose parse_pose(const std::string& text, const std::string& flag) {
-  const std::vector<double> n = parse_numbers(text, 6, flag + " (x,y,z,roll,pitch,yaw)");
-  return {quaternion_from_rpy(n[3] * kDegree, n[4] * kDegree, n[5] * kDegree), {n[0], n[1], n[2]}};
-}
-
 std::string scratch_of(const EditFlags& flags) {
   if (!flags.scratch.empty()) return flags.scratch;
   if (flags.output.empty()) return {};
@@ -133,11 +107,7 @@ void finish_map(const EditFlags& flags, OutputFile output, const EditedMap& edit
           ? fmt::format("; {} left out where an earlier map has the place", edited.doubles)
           : ""));
   const Aabb& b = edited.description.bounds_world;
-  log(fmt::format("extent        {}, from ({:.2f}, {:.2f}, {:.2f})",
-                  extent_of(b),
-                  no_minus(b.min.x()),
-                  no_minus(b.min.y()),
-                  no_minus(b.min.z())));
+  log(fmt::format("extent        {}, from {}", extent_of(b), point_text(b.min)));
   if (!flags.png.empty()) {
     PointSample sample;
     sample_map(edited.tree, edited.description, sample);

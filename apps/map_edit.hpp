@@ -39,15 +39,6 @@ bool is_map(const std::string& path);
 /// a .pfmap, clouds make a cloud. Returns true for .pfmap.
 bool check_edit(const EditFlags& flags);
 
-/// Numbers of a flag, commas or blanks between. Throws InputError where there are not `count` of
-/// them (0: any number) or one is not finite.
-std::vector<double> parse_numbers(const std::string& text,
-                                  std::size_t count,
-                                  const std::string& flag);
-
-/// "x,y,z,roll,pitch,yaw" in metres and degrees.
-Pose parse_pose(const std::string& text, const std::string& flag);
-
 /// The folder for what does not fit into memory.
 std::string scratch_of(const EditFlags& flags);
 

@@ -9,8 +9,10 @@
 
 #include "apps/flags.hpp"
 #include "apps/map_edit.hpp"
+#include "apps/settings_json.hpp"
 #include "apps/terminal.hpp"
 #include "pointflight/core/input_error.hpp"
+#include "pointflight/core/number_text.hpp"
 
 namespace pointflight::apps {
 namespace {
@@ -127,19 +129,14 @@ void print_diff(const std::vector<OneWay>& ways, double distance) {
                100.0 * way.share(),
                way.missing == 0
                    ? fmt::format("none farther than {:.3g} m from the other", distance)
-                   : fmt::format("farther than {:.3g} m from the other, between ({:.2f}, {:.2f}, "
-                                 "{:.2f}) and ({:.2f}, {:.2f}, {:.2f})",
+                   : fmt::format("farther than {:.3g} m from the other, between {} and {}",
                                  distance,
-                                 no_minus(way.where.min.x()),
-                                 no_minus(way.where.min.y()),
-                                 no_minus(way.where.min.z()),
-                                 no_minus(way.where.max.x()),
-                                 no_minus(way.where.max.y()),
-                                 no_minus(way.where.max.z())));
+                                 point_text(way.where.min),
+                                 point_text(way.where.max)));
   }
 }
 
-void print_json(const std::vector<OneWay>& ways, double distance) {
+nlohmann::ordered_json json_of(const std::vector<OneWay>& ways, double distance) {
   nlohmann::ordered_json json;
   json["distance"] = distance;
   for (std::size_t i = 0; i < ways.size(); ++i) {
@@ -153,7 +150,7 @@ void print_json(const std::vector<OneWay>& ways, double distance) {
     way["min"] = {b.min.x(), b.min.y(), b.min.z()};
     way["max"] = {b.max.x(), b.max.y(), b.max.z()};
   }
-  fmt::print("{}\n", json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
+  return json;
 }
 
 void diff(const DiffFlags& flags) {
@@ -229,7 +226,7 @@ void diff(const DiffFlags& flags) {
     log("picture: " + flags.png);
   }
   if (flags.json) {
-    print_json(ways, distance);
+    print_json(json_of(ways, distance));
   } else {
     print_diff(ways, distance);
   }

@@ -12,6 +12,7 @@
 #include "apps/terminal.hpp"
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/input_error.hpp"
+#include "pointflight/core/number_text.hpp"
 #include "pointflight/io/byte_cursor.hpp"
 #include "pointflight/io/tum.hpp"
 
@@ -105,10 +106,10 @@ void complete(const TransformFlags& flags,
           flags.inputs.front()));
     }
     if (flags.level) then(all, floor->levelling());
-    log(fmt::format("floor         tilted by {:.2f} degrees{}, at z = {:.2f} m{}",
+    log(fmt::format("floor         tilted by {:.2f} degrees{}, at z = {} m{}",
                     floor->tilt / kDegree,
                     flags.level ? " and made level" : "",
-                    no_minus(floor->middle_world.z()),
+                    fixed_text(floor->middle_world.z(), 2),
                     flags.ground_zero ? ", now 0" : ""));
     if (flags.ground_zero) {
       then(all, {Quaterniond::Identity(), {0.0, 0.0, -floor->middle_world.z()}});

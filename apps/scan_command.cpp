@@ -4,18 +4,15 @@
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
 #include <algorithm>
-#include <cmath>
 #include <memory>
 #include <nlohmann/json.hpp>
 
 #include "apps/commands.hpp"
 #include "apps/flags.hpp"
 #include "apps/pictures.hpp"
+#include "apps/settings_json.hpp"
 #include "apps/terminal.hpp"
-#include "pointflight/core/constants.hpp"
 #include "pointflight/core/input_error.hpp"
-#include "pointflight/geometry/rotation.hpp"
-#include "pointflight/io/byte_cursor.hpp"
 #include "pointflight/lidar/lidar.hpp"
 
 namespace pointflight::apps {
@@ -35,25 +32,6 @@ struct ScanFlags {
   bool force = false;
   int threads = 0;
 };
-
-Pose parse_pose(const std::string& text) {
-  std::vector<double> numbers;
-  std::string_view rest = text;
-  for (auto word = take_word(rest); !word.empty(); word = take_word(rest)) {
-    double value = 0.0;
-    if (!parse_number(word, value) || !std::isfinite(value)) {
-      throw InputError(fmt::format("--pose: '{}' is no number", excerpt(word)));
-    }
-    numbers.push_back(value);
-  }
-  if (numbers.size() != 6) {
-    throw InputError(
-        fmt::format("--pose: {} numbers; six are wanted: x,y,z,roll,pitch,yaw (metres, degrees)",
-                    numbers.size()));
-  }
-  return {quaternion_from_rpy(numbers[3] * kDegree, numbers[4] * kDegree, numbers[5] * kDegree),
-          {numbers[0], numbers[1], numbers[2]}};
-}
 
 void print_scan(const Scan& scan, const ScanFlags& flags) {
   std::vector<float> ranges;
@@ -75,7 +53,7 @@ void print_scan(const Scan& scan, const ScanFlags& flags) {
     json["range_median"] = at(0.5);
     json["range_max"] = at(1.0);
     if (!flags.output.empty()) json["file"] = flags.output;
-    fmt::print("{}\n", json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
+    print_json(json);
     return;
   }
   fmt::print("{} of {} beams returned; range {:.2f} to {:.2f} m, median {:.2f} m\n",
@@ -87,7 +65,7 @@ void print_scan(const Scan& scan, const ScanFlags& flags) {
 }
 
 void take_scan(const ScanFlags& flags) {
-  const Pose pose = parse_pose(flags.pose);
+  const Pose pose = parse_pose(flags.pose, "--pose");
   refuse_same_file(flags.output, flags.map);
   refuse_same_file(flags.png, flags.map);
   if (!flags.png.empty()) refuse_same_file(flags.png, flags.output);

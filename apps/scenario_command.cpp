@@ -16,6 +16,7 @@
 #include "apps/terminal.hpp"
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/input_error.hpp"
+#include "pointflight/core/number_text.hpp"
 #include "pointflight/core/output_file.hpp"
 #include "pointflight/core/resources.hpp"
 #include "pointflight/sim/simulation.hpp"
@@ -39,13 +40,7 @@ Vector3d rounded(const Vector3d& v) {
 }
 
 std::string words_for(const Aabb& box) {
-  return fmt::format("({:.1f}, {:.1f}, {:.1f}) and ({:.1f}, {:.1f}, {:.1f})",
-                     box.min.x(),
-                     box.min.y(),
-                     box.min.z(),
-                     box.max.x(),
-                     box.max.y(),
-                     box.max.z());
+  return fmt::format("{} and {}", point_text(box.min, 1), point_text(box.max, 1));
 }
 
 struct NewFlags {

@@ -83,10 +83,6 @@ std::string command_line() {
   return line;
 }
 
-double no_minus(double value) {
-  return std::abs(value) < 0.005 ? 0.0 : value;
-}
-
 std::string short_count(double count) {
   if (count >= 1e9) return fmt::format("{:.2f} G", count / 1e9);
   if (count >= 1e6) return fmt::format("{:.2f} M", count / 1e6);

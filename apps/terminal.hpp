@@ -30,9 +30,6 @@ void log(std::string_view text);
 /// This process's command line, quoted where a shell would need it.
 std::string command_line();
 
-/// The number without the minus sign that a hundredth of it would lose: "-0.00" is 0.
-double no_minus(double value);
-
 /// "1.2 M", "34 k", "567".
 std::string short_count(double count);
 

@@ -15,4 +15,11 @@ std::string plain_text(double value) {
   return fmt::format("{:.9g}", value == 0.0 ? 0.0 : value);
 }
 
+std::string point_text(const Eigen::Vector3d& point, int decimals) {
+  return fmt::format("({}, {}, {})",
+                     fixed_text(point.x(), decimals),
+                     fixed_text(point.y(), decimals),
+                     fixed_text(point.z(), decimals));
+}
+
 }  // namespace pointflight

@@ -123,6 +123,10 @@ class Simulation {
   void require_vehicle(std::size_t number) const;
   void check_start(std::size_t number) const;
   void sense(std::vector<StepSamples>& samples);
+  void sense_one(std::size_t number,
+                 SimTime before,
+                 std::vector<PlacedBody>& bodies,
+                 StepSamples& samples);
   [[nodiscard]] bool react(std::vector<StepSamples>& samples);
   void deliver(std::vector<StepSamples>& samples, SampleSink& sink);
   void sample_obstacles(SimTime end, SampleSink& sink);

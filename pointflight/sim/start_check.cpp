@@ -19,17 +19,12 @@ namespace {
 constexpr double kBeside = 50.0;  // m outside of the map's bounds, and below
 constexpr double kAbove = 500.0;  // m
 
-std::string text_of(const Vector3d& p) {
-  return fmt::format(
-      "({}, {}, {})", fixed_text(p.x(), 2), fixed_text(p.y(), 2), fixed_text(p.z(), 2));
-}
-
 std::string free_place_text(const SurfelMap& map,
                             const VehicleAgent& agent,
                             const Vector3d& p,
                             const Executor& executor) {
   const auto place = nearest_free_place(map, p, bounding_radius(agent.hull()), executor);
-  return place ? "; the nearest free place found is " + text_of(*place) : std::string();
+  return place ? "; the nearest free place found is " + point_text(*place) : std::string();
 }
 
 /// How far the map is along the vertical, by rays side by side: a surface may have holes.
@@ -113,10 +108,10 @@ void check_start_is_free(const Scenario& scenario,
   if (is_lost(map, p)) {
     const Aabb& b = map.bounds_world();
     fail(fmt::format("{} of {} is outside of the map, which lies between {} and {}{}",
-                     text_of(p),
+                     point_text(p),
                      name,
-                     text_of(b.min),
-                     text_of(b.max),
+                     point_text(b.min),
+                     point_text(b.max),
                      free_place_text(map, agent, p, executor)));
   }
   const auto here = contact_with_map(map, agent.hull(), pose, 0.0);
@@ -167,12 +162,15 @@ std::vector<std::string> start_warnings(const Simulation& simulation, const Exec
                     : std::string("starts landed, but there is no ground below");
     }
     if (what.empty()) continue;
+    // the search takes as long as a warning is worth for a few, not for hundreds alike
+    const std::string place =
+        warnings.size() < 3 ? free_place_text(map, agent, p, executor) : std::string();
     warnings.push_back(fmt::format("{}: warning: {} of {} {}{}",
                                    scenario.place(scenario.vehicle_key(i, "start")),
-                                   text_of(p),
+                                   point_text(p),
                                    agent.setup().name,
                                    what,
-                                   free_place_text(map, agent, p, executor)));
+                                   place));
   }
   return warnings;
 }

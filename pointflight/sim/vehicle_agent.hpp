@@ -57,7 +57,6 @@ struct VehicleStatus {
   ProximityState proximity;             ///< What its hull is near to or touches.
   bool landed = false;                  ///< The ground carries it.
   bool crashed = false;                 ///< Rotors off for good.
-  bool at_rest = false;                 ///< A wreck on the ground.
   bool commanded = false;               ///< A program has told it something.
   std::vector<VehicleEvent> events;     ///< Not yet delivered.
   std::size_t next_command = 0;         ///< Of the scenario's.
