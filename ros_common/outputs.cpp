@@ -92,7 +92,7 @@ constexpr OutputType kTypes[] = {
     {OutputKind::kTrajectory, "trajectory", Per::kVehicle, type_of<msg::Marker>, "the flown line"},
     {OutputKind::kCovariance, "covariance", Per::kVehicle, type_of<msg::Marker>, "of a pose: none"},
     {OutputKind::kSensorModel, "sensor_model", Per::kVehicle, type_of<msg::Marker>, "the LiDAR"},
-    {OutputKind::kLabel, "label", Per::kVehicle, type_of<msg::Marker>, "the vehicle's number"},
+    {OutputKind::kLabel, "label", Per::kVehicle, type_of<msg::Marker>, "the vehicle's name"},
     {OutputKind::kVehicleCloud,
      "vehicle_cloud",
      Per::kVehicle,
