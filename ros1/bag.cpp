@@ -12,7 +12,8 @@
 namespace pointflight {
 namespace {
 
-constexpr std::uint32_t kChunkSize = 1u << 20;  // bytes; what a kill can cost
+// bytes: what a kill can cost, as in MCAP; rosbag keeps 2 KB in memory for each chunk until the end
+constexpr std::uint32_t kChunkSize = 4u << 20;
 
 class BagWriter : public Outlet {
  public:
