@@ -49,7 +49,7 @@ apt-get -qq install -y --no-install-recommends python3 >/dev/null  # runs the bl
 POINTFLIGHT_INSTALLED=/usr/local tools/run_docs.py build/release \
   docs/sensors.md docs/vehicles.md docs/maps.md docs/planner.md
 cmake --build build/release --target uninstall >/dev/null
-! command -v pointflight
+test ! -e /usr/local/bin/pointflight
 END
 echo "== the first day" >&2
 # mounts of its own, which go with it
