@@ -12,8 +12,11 @@
 namespace pointflight {
 namespace {
 
-// bytes: what a kill can cost, as in MCAP; rosbag keeps 2 KB in memory for each chunk until the end
-constexpr std::uint32_t kChunkSize = 4u << 20;
+// bytes: what a kill can cost; more in long recordings, as rosbag keeps 2 KB in memory for each
+// chunk
+constexpr std::uint32_t kChunkSize = 1u << 20;
+constexpr std::uint32_t kLongChunkSize = 4u << 20;
+constexpr std::uint64_t kLong = 256u << 20;  // bytes of the file
 
 class BagWriter : public Outlet {
  public:
@@ -65,6 +68,7 @@ class BagWriter : public Outlet {
     try {
       bag_->write(
           topics_[i]->name, stamp, RawMessage{topics_[i].get(), bytes, nullptr}, headers_[i]);
+      if (bag_->getSize() > kLong) bag_->setChunkThreshold(kLongChunkSize);
     } catch (const rosbag::BagException& error) {
       give_up();
       throw std::runtime_error(active_ + ": writing failed: " + error.what() +

