@@ -8,6 +8,7 @@
 #include <ifaddrs.h>
 #include <net/if.h>
 #include <signal.h>
+#include <sys/file.h>
 #include <sys/resource.h>
 #include <sys/time.h>
 #include <sys/wait.h>
@@ -55,9 +56,21 @@ class Peer {
   }
   ~Peer() { dds_delete(participant_); }
 
-  /// One for each process of the tests, so that runs do not meet.
+  /// One for each process of the tests on this machine, so that runs do not meet: held by a lock.
   static std::uint32_t domain() {
-    static const std::uint32_t domain = 20 + static_cast<std::uint32_t>(getpid()) % 80;
+    static const std::uint32_t domain = [] {
+      constexpr std::uint32_t kFirst = 20;
+      constexpr std::uint32_t kCount = 80;
+      const auto start = static_cast<std::uint32_t>(getpid());
+      for (std::uint32_t i = 0; i < kCount; ++i) {
+        const std::uint32_t number = kFirst + (start + i) % kCount;
+        const std::string path = "/tmp/pointflight_domain_" + std::to_string(number);
+        const int file = open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
+        if (file >= 0 && flock(file, LOCK_EX | LOCK_NB) == 0) return number;  // to our end
+        if (file >= 0) close(file);
+      }
+      return kFirst + start % kCount;
+    }();
     return domain;
   }
 
