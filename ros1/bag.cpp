@@ -68,7 +68,10 @@ class BagWriter : public Outlet {
     try {
       bag_->write(
           topics_[i]->name, stamp, RawMessage{topics_[i].get(), bytes, nullptr}, headers_[i]);
-      if (bag_->getSize() > kLong) bag_->setChunkThreshold(kLongChunkSize);
+      if (!is_long_ && bag_->getSize() > kLong) {
+        is_long_ = true;
+        bag_->setChunkThreshold(kLongChunkSize);  // ends the chunk: once
+      }
     } catch (const rosbag::BagException& error) {
       give_up();
       throw std::runtime_error(active_ + ": writing failed: " + error.what() +
@@ -97,6 +100,7 @@ class BagWriter : public Outlet {
 
   std::string path_, active_;
   std::unique_ptr<rosbag::Bag> bag_ = std::make_unique<rosbag::Bag>();
+  bool is_long_ = false;  ///< The file is.
   std::vector<std::unique_ptr<Topic>> topics_;
   std::vector<boost::shared_ptr<ros::M_string>> headers_;
 };
