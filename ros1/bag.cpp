@@ -12,8 +12,8 @@
 namespace pointflight {
 namespace {
 
-// bytes: what a kill can cost; more in long recordings, as rosbag keeps 2 KB in memory for each
-// chunk
+// bytes: what a kill can cost; more in long recordings, because rosbag keeps an index of each chunk
+// in memory until the end
 constexpr std::uint32_t kChunkSize = 1u << 20;
 constexpr std::uint32_t kLongChunkSize = 4u << 20;
 constexpr std::uint64_t kLong = 256u << 20;  // bytes of the file

@@ -162,7 +162,7 @@ std::vector<std::string> start_warnings(const Simulation& simulation, const Exec
                     : std::string("starts landed, but there is no ground below");
     }
     if (what.empty()) continue;
-    // the search takes as long as a warning is worth for a few, not for hundreds alike
+    // the search is slow: the first few show where to look, a swarm of hundreds would wait
     const std::string place =
         warnings.size() < 3 ? free_place_text(map, agent, p, executor) : std::string();
     warnings.push_back(fmt::format("{}: warning: {} of {} {}{}",
