@@ -57,7 +57,13 @@ class CollisionLog : public SampleSink {
  public:
   explicit CollisionLog(const Simulation& simulation) : simulation_(simulation) {}
 
-  void on_collision(const CollisionEvent& event) override {
+  void on_sample(const Sample& sample) override {
+    if (const auto* event = std::get_if<CollisionEvent>(&sample)) say(*event);
+    if (const auto* event = std::get_if<VehicleEvent>(&sample)) say(*event);
+  }
+
+ private:
+  void say(const CollisionEvent& event) {
     constexpr int kSaid = 20;
     if (!event.entered || said_ > kSaid) return;
     log(said_++ == kSaid ? std::string("more collisions: see events.csv")
@@ -69,7 +75,7 @@ class CollisionLog : public SampleSink {
                                        point_text(event.place_world)));
   }
 
-  void on_vehicle_event(const VehicleEvent& event) override {
+  void say(const VehicleEvent& event) {
     if (events_ > kEventsSaid) return;
     log(events_++ == kEventsSaid ? std::string("more on board: see events.csv")
                                  : fmt::format("warning: {} at {:.3f} s: {}",
@@ -78,7 +84,6 @@ class CollisionLog : public SampleSink {
                                                event.words));
   }
 
- private:
   static constexpr int kEventsSaid = 20;
   const Simulation& simulation_;
   int said_ = 0;
@@ -356,7 +361,7 @@ class RunFiles {
   std::optional<FlightRecorder> recorder_;
   RunPicture picture_;
   SampleSplitter sinks_;
-  SampleSink nothing_;
+  SampleSplitter nothing_;
   bool ended_ = false;
 };
 

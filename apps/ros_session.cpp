@@ -68,9 +68,11 @@ std::string text_of(const Scenario& scenario) {
 /// Counts scans, for lockstep.
 class RosSession::ScanCount : public SampleSink {
  public:
-  void on_scan(const Scan& scan, const PoseAt& /*pose_at*/) override {
+  void on_sample(const Sample& sample) override {
+    const auto* scanned = std::get_if<ScanSample>(&sample);
+    if (scanned == nullptr) return;
     ++scans;
-    if (const auto late = lateness ? lateness(scan.end) : std::nullopt) {
+    if (const auto late = lateness ? lateness(scanned->scan->end) : std::nullopt) {
       const double bin = std::clamp(*late / kBin, 0.0, static_cast<double>(delays_.size() - 1));
       ++delays_[static_cast<std::size_t>(bin)];
       ++delayed;

@@ -38,30 +38,33 @@ void RunPicture::add_obstacle(std::uint32_t label, const Vector3d& p, double rad
   trace.track.add(p);
 }
 
-void RunPicture::on_state(const StateSample& sample) {
-  add_path_point(sample.vehicle, sample.state.body.p_world);
+void RunPicture::on_sample(const Sample& sample) {
+  std::visit(
+      Overloaded{[&](const StateSample& s) { add_path_point(s.vehicle, s.state.body.p_world); },
+                 [&](const ScanSample& s) { add_scan(s); },
+                 [&](const CollisionEvent& s) {
+                   if (s.entered) collisions.add(s.place_world);
+                 },
+                 [&](const ObstacleSample& s) {
+                   const auto* solid = std::get_if<Solid>(&s.shape);
+                   const Vector3d half = solid != nullptr ? half_extent(*solid) : Vector3d::Zero();
+                   add_obstacle(s.label, s.T_world_body.translation, std::max(half.x(), half.y()));
+                 },
+                 [](const auto&) {}},
+      sample);
 }
 
-void RunPicture::on_scan(const Scan& scan, const PoseAt& pose_at) {
+void RunPicture::add_scan(const ScanSample& sample) {
   constexpr std::size_t kMovingStride = 4;  // there are few
+  const Scan& scan = *sample.scan;
   for (std::size_t i = 0; i < scan.points.size(); ++i) {
     const ScanPoint& point = scan.points[i];
     const bool moving = point.label != kMapLabel;
     const std::size_t stride = moving ? kMovingStride : kSeenStride;
     if (i % stride != scan.index % stride) continue;
     (moving ? seen_moving : seen)
-        .add(pose_at(scan.seen_at(point)) * point.position_sensor.cast<double>());
+        .add(sample.T_world_sensor.at(scan.seen_at(point)) * point.position_sensor.cast<double>());
   }
-}
-
-void RunPicture::on_collision(const CollisionEvent& event) {
-  if (event.entered) collisions.add(event.place_world);
-}
-
-void RunPicture::on_obstacle(const ObstacleSample& sample) {
-  add_obstacle(sample.label,
-               sample.T_world_body.translation,
-               std::max(sample.half_extent.x(), sample.half_extent.y()));
 }
 
 void RunFigures::add_closest(std::optional<double> distance) {

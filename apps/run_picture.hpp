@@ -58,10 +58,7 @@ class Track {
 /// memory does not grow with the run's length.
 class RunPicture : public SampleSink {
  public:
-  void on_state(const StateSample& sample) override;
-  void on_scan(const Scan& scan, const PoseAt& pose_at) override;
-  void on_collision(const CollisionEvent& event) override;
-  void on_obstacle(const ObstacleSample& sample) override;
+  void on_sample(const Sample& sample) override;
 
   void add_path_point(std::size_t vehicle, const Vector3d& p_world);
   void add_obstacle(std::uint32_t label, const Vector3d& p_world, double radius);
@@ -85,6 +82,7 @@ class RunPicture : public SampleSink {
   std::string title, subtitle;
 
  private:
+  void add_scan(const ScanSample& sample);
   std::unordered_map<std::uint32_t, std::size_t> trace_of_;  ///< By label.
 };
 

@@ -80,8 +80,7 @@ void take_scan(const ScanFlags& flags) {
   request.index = flags.index;
   request.noise = !flags.no_noise;
   request.seed = flags.seed;
-  const Scan scan = lidar.take(
-      request, [&](SimTime) { return pose; }, *renderer, executor);
+  const Scan scan = lidar.take(request, PoseTrack(pose), *renderer, executor);
   if (scan.points.empty()) {
     log("no beam met anything: is the pose inside the map? (pointflight map info shows its "
         "extent)");

@@ -68,8 +68,7 @@ void scan(benchmark::State& state, const char* lidar_name, const char* renderer_
   for (auto _ : state) {
     ScanRequest request;
     request.index = index++;
-    const Scan result = lidar.take(
-        request, [&](SimTime) { return pose; }, *renderer, executor);
+    const Scan result = lidar.take(request, PoseTrack(pose), *renderer, executor);
     beams += result.beams;
   }
   state.SetItemsProcessed(static_cast<std::int64_t>(beams));

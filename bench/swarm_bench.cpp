@@ -25,7 +25,9 @@ struct Flags {
 };
 
 /// Takes everything and keeps nothing.
-class Nothing : public SampleSink {};
+class Nothing : public SampleSink {
+  void on_sample(const Sample& /*sample*/) override {}
+};
 
 /// Vehicles at free places that fly 8 m and back, and obstacles.
 Scenario scenario_for(const Flags& flags, const SurfelMap& map, int vehicles) {

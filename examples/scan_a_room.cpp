@@ -27,8 +27,7 @@ int main() try {
   const auto renderer = make_renderer("beam", Scene{map});
   const Lidar lidar(load_lidar("mid360"), 0);
   const Pose pose{Quaterniond::Identity(), {2, 3, 1.5}};
-  const Scan scan = lidar.take(
-      ScanRequest{}, [&](SimTime) { return pose; }, *renderer, executor);
+  const Scan scan = lidar.take(ScanRequest{}, PoseTrack(pose), *renderer, executor);
   std::printf("%zu of %zu beams returned\n", scan.points.size(), scan.beams);
   return scan.points.size() > scan.beams * 9 / 10 ? 0 : 1;
 } catch (const std::exception& error) {

@@ -8,8 +8,10 @@ using namespace pointflight;
 
 class NearestReturn : public SampleSink {
  public:
-  void on_scan(const Scan& scan, const PoseAt& /*pose_at*/) override {
-    for (const ScanPoint& point : scan.points) nearest = std::min(nearest, point.range);
+  void on_sample(const Sample& sample) override {
+    const auto* scanned = std::get_if<ScanSample>(&sample);
+    if (scanned == nullptr) return;
+    for (const ScanPoint& point : scanned->scan->points) nearest = std::min(nearest, point.range);
   }
   float nearest = 1e9f;
 };

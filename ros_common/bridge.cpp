@@ -169,10 +169,10 @@ void RosBridge::send_static_transforms(Stream& stream) {
     const auto lidars = lidar_names(agent);
     for (std::size_t l = 0; l < lidars.size(); ++l) {
       names.lidar = lidars[l];
-      const MountedLidar& mounted = agent.lidars()[l];
+      const MountedLidar& mounted = *agent.lidars()[l];
       const std::string frame = sensor_frame_of(profile_, names, v, l);
-      message.transforms.push_back(transform_of(mounted.T_body_sensor, header, frame));
-      if (!is_camera(mounted.lidar->settings())) continue;
+      message.transforms.push_back(transform_of(mounted.T_body_sensor(), header, frame));
+      if (!is_camera(mounted.lidar().settings())) continue;
       msg::Header sensor = header;
       sensor.frame_id = frame;
       const Pose turned{optical(Quaterniond::Identity()), Vector3d::Zero()};

@@ -40,11 +40,7 @@ class RosBridge : public SampleSink {
   /// For a run that waits for an answer: the last scans once more for readers that have come since
   /// they were sent.
   void resend_scans();
-  void on_odometry(const OdometrySample& sample) override;
-  void on_imu(std::uint32_t vehicle, const ImuSample& sample) override;
-  void on_scan(const Scan& scan, const PoseAt& pose_at) override;
-  void on_collision(const CollisionEvent& event) override;
-  void on_obstacle(const ObstacleSample& sample) override;
+  void on_sample(const Sample& sample) override;
 
   /// After a reset the run starts again at zero, but stamps go on.
   void shift_epoch(Duration by);
@@ -81,7 +77,12 @@ class RosBridge : public SampleSink {
   void send_path(Stream& stream, const OdometrySample& sample);
   void send_markers(Stream& stream, const OdometrySample& sample);
   void send_obstacles();
-  void send_scan(Stream& stream, const Scan& scan, const PoseAt& pose_at);
+  void on_odometry(const OdometrySample& sample);
+  void on_imu(const ImuSample& sample);
+  void on_scan(const ScanSample& sample);
+  void on_collision(const CollisionEvent& event);
+  void on_obstacle(const ObstacleSample& sample);
+  void send_scan(Stream& stream, const ScanSample& sample);
 
   const Simulation& simulation_;
   RosProfile profile_;

@@ -32,6 +32,16 @@ void RosBridge::send_transform(Stream& stream, const OdometrySample& sample) {
        sample.delivered);
 }
 
+void RosBridge::on_sample(const Sample& sample) {
+  std::visit(Overloaded{[&](const OdometrySample& s) { on_odometry(s); },
+                        [&](const ImuSample& s) { on_imu(s); },
+                        [&](const ScanSample& s) { on_scan(s); },
+                        [&](const CollisionEvent& s) { on_collision(s); },
+                        [&](const ObstacleSample& s) { on_obstacle(s); },
+                        [](const auto&) {}},
+             sample);
+}
+
 void RosBridge::on_odometry(const OdometrySample& sample) {
   last_states_[sample.vehicle] = sample;
   for (const auto& s : streams_) {
@@ -78,7 +88,7 @@ void RosBridge::on_odometry(const OdometrySample& sample) {
       case OutputKind::kRotorSpeeds: {
         if (!is_due(stream, sample.delivered)) break;
         msg::Float32MultiArray speeds;
-        for (const double w : simulation_.status(sample.vehicle).rotor_commands) {
+        for (const double w : sample.rotor_commands) {
           speeds.data.push_back(static_cast<float>(w * kRpm));
         }
         send(stream, std::move(speeds), sample.delivered);
@@ -146,11 +156,11 @@ void RosBridge::send_markers(Stream& stream, const OdometrySample& sample) {
        sample.delivered);
 }
 
-void RosBridge::on_imu(std::uint32_t vehicle, const ImuSample& sample) {
+void RosBridge::on_imu(const ImuSample& sample) {
   for (const auto& stream : streams_) {
-    if (stream->type->kind != OutputKind::kImu || stream->vehicle != vehicle) continue;
+    if (stream->type->kind != OutputKind::kImu || stream->vehicle != sample.vehicle) continue;
     if (!is_due(*stream, sample.time)) continue;
-    const ImuSettings& settings = simulation_.vehicle(vehicle).settings().imu;
+    const ImuSettings& settings = simulation_.vehicle(sample.vehicle).settings().imu;
     const ImuCustoms customs{profile_.imu_unit == "g", profile_.imu_gravity == "down"};
     send(*stream,
          imu_of(sample, settings, header_of(sample.time, epoch_, stream->settings.frame), customs),
@@ -158,12 +168,13 @@ void RosBridge::on_imu(std::uint32_t vehicle, const ImuSample& sample) {
   }
 }
 
-void RosBridge::on_scan(const Scan& scan, const PoseAt& pose_at) {
+void RosBridge::on_scan(const ScanSample& sample) {
+  const Scan& scan = *sample.scan;
   for (const auto& stream : streams_) {
     const bool of_lidar = stream->type->per == OutputType::Per::kLidar;
     if (of_lidar && stream->vehicle == scan.vehicle && stream->lidar == scan.sensor &&
         is_due(*stream, scan.end)) {
-      send_scan(*stream, scan, pose_at);
+      send_scan(*stream, sample);
     }
     if (stream->type->kind == OutputKind::kScanTime && stream->vehicle == scan.vehicle &&
         scan_times_.size() >= kScanTimes && is_due(*stream, scan.end)) {
@@ -176,9 +187,10 @@ void RosBridge::on_scan(const Scan& scan, const PoseAt& pose_at) {
   }
 }
 
-void RosBridge::send_scan(Stream& stream, const Scan& scan, const PoseAt& pose_at) {
+void RosBridge::send_scan(Stream& stream, const ScanSample& sample) {
+  const Scan& scan = *sample.scan;
   const LidarSettings& lidar =
-      simulation_.vehicle(scan.vehicle).lidars()[scan.sensor].lidar->settings();
+      simulation_.vehicle(scan.vehicle).lidars()[scan.sensor]->lidar().settings();
   const RosOutput& s = stream.settings;
   const float plain = simulation_.map().has_intensity() ? 0.0f : kPlainIntensity;
   switch (stream.type->kind) {
@@ -190,7 +202,7 @@ void RosBridge::send_scan(Stream& stream, const Scan& scan, const PoseAt& pose_a
       }
       break;
     case OutputKind::kCloudWorld: {
-      const auto points = world_points(scan, pose_at);
+      const auto points = world_points(scan, sample.T_world_sensor);
       send(
           stream, cloud_of(scan, point_layout(s.layout), s.frame, epoch_, points, plain), scan.end);
       break;
@@ -209,7 +221,7 @@ void RosBridge::send_scan(Stream& stream, const Scan& scan, const PoseAt& pose_a
     }
     case OutputKind::kSensorPose: {
       const SimTime time = cloud_time(scan, false);
-      Pose pose = pose_at(time);
+      Pose pose = sample.T_world_sensor.at(time);
       pose.rotation = optical(pose.rotation);
       send(stream, msg::PoseStamped{header_of(time, epoch_, s.frame), pose_of(pose)}, scan.end);
       break;
@@ -217,8 +229,8 @@ void RosBridge::send_scan(Stream& stream, const Scan& scan, const PoseAt& pose_a
     case OutputKind::kTfScan: {
       const SimTime time = cloud_time(scan, false);
       send(stream,
-           msg::TFMessage{
-               {transform_of(pose_at(time), header_of(time, epoch_, s.frame), s.child_frame)}},
+           msg::TFMessage{{transform_of(
+               sample.T_world_sensor.at(time), header_of(time, epoch_, s.frame), s.child_frame)}},
            scan.end);
       break;
     }
@@ -258,21 +270,21 @@ void RosBridge::send_obstacles() {
     if (!is_due(*stream, time)) continue;
     msg::MarkerArray markers;
     std::vector<Vector3f> points;
-    for (const Body& body : simulation_.obstacles(time, time)) {
-      if (time < body.from || time >= body.until) continue;
-      const Pose pose = body.T_world_body(time);
+    for (const ObstacleSample& obstacle : obstacles_) {
+      const Pose& pose = obstacle.T_world_body;
       if (kind == OutputKind::kMovingCloud) {
-        append_surface(body.shape, pose, kSurfaceSpacing, points);
+        append_surface(obstacle.shape, pose, kSurfaceSpacing, points);
         continue;
       }
-      const auto* solid = std::get_if<Solid>(&body.shape);
-      const Solid shown = solid != nullptr ? *solid : Solid{Ball{bounding_radius(body.shape)}};
-      markers.markers.push_back(marker_of(shown,
-                                          pose,
-                                          header_of(time, epoch_, stream->settings.frame),
-                                          "obstacles",
-                                          static_cast<std::int32_t>(body.label - kFirstObstacle),
-                                          kObstacleColor));
+      const auto* solid = std::get_if<Solid>(&obstacle.shape);
+      const Solid shown = solid != nullptr ? *solid : Solid{Ball{bounding_radius(obstacle.shape)}};
+      markers.markers.push_back(
+          marker_of(shown,
+                    pose,
+                    header_of(time, epoch_, stream->settings.frame),
+                    "obstacles",
+                    static_cast<std::int32_t>(obstacle.label - kFirstObstacle),
+                    kObstacleColor));
     }
     if (kind == OutputKind::kMovingCloud) {
       send_cloud(*stream, points, time);

@@ -44,7 +44,7 @@ msg::Marker vehicle_marker(OutputKind kind,
       break;
     case OutputKind::kSensorModel:
       marker.type = msg::Marker::kCylinder;
-      if (!agent.lidars().empty()) marker.pose = pose_of(pose * agent.lidars()[0].T_body_sensor);
+      if (!agent.lidars().empty()) marker.pose = pose_of(pose * agent.lidars()[0]->T_body_sensor());
       marker.scale = {0.08, 0.08, 0.06};
       break;
     case OutputKind::kLabel:

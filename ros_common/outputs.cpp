@@ -183,7 +183,7 @@ std::size_t chosen_lidar(const VehicleAgent& vehicle, const OutputType& type) {
   const bool wants_camera = type.kind == OutputKind::kDepth || type.kind == OutputKind::kCameraInfo;
   const auto& lidars = vehicle.lidars();
   for (std::size_t l = 0; l < lidars.size(); ++l) {
-    if (is_camera(lidars[l].lidar->settings()) == wants_camera) return l;
+    if (is_camera(lidars[l]->lidar().settings()) == wants_camera) return l;
   }
   return 0;
 }
@@ -267,7 +267,7 @@ class StreamMaker {
     const std::size_t chosen = chosen_lidar(agent, type);
     for (std::size_t l = 0; l < lidars.size(); ++l) {
       if (!each && l != chosen) continue;
-      const bool camera = is_camera(agent.lidars()[l].lidar->settings());
+      const bool camera = is_camera(agent.lidars()[l]->lidar().settings());
       // a LiDAR has a depth picture only where one is asked for by name
       if (type.kind == OutputKind::kCameraInfo && !camera) continue;
       if (type.kind == OutputKind::kDepth && each && !camera) continue;
@@ -333,8 +333,8 @@ class StreamMaker {
         return profile_.sensor_frame;
       case OutputKind::kDepth:
       case OutputKind::kCameraInfo: {
-        const auto& mounted = simulation_.vehicle(vehicle).lidars()[lidar];
-        const bool camera = is_camera(mounted.lidar->settings());
+        const MountedLidar& mounted = *simulation_.vehicle(vehicle).lidars()[lidar];
+        const bool camera = is_camera(mounted.lidar().settings());
         return profile_.sensor_frame + (camera ? kOpticalSuffix : "");
       }
       default:
@@ -374,7 +374,7 @@ double large_rate(const Simulation& simulation, const RosProfile& profile) {
     const double bytes = !cloud                       ? kPixel
                          : s.layout == "livox_custom" ? kCustomPoint
                                                       : point_layout(s.layout).step;
-    const Lidar& lidar = *simulation.vehicle(stream.vehicle).lidars()[stream.lidar].lidar;
+    const Lidar& lidar = simulation.vehicle(stream.vehicle).lidars()[stream.lidar]->lidar();
     const double scans = lidar.settings().rate;
     rate += (s.rate > 0.0 ? std::min(scans, s.rate) : scans) * bytes *
             static_cast<double>(lidar.beams(0, executor).size());

@@ -61,7 +61,7 @@ void put_nearest(msg::Image& image, std::size_t pixel, float value, float empty)
 
 }  // namespace
 
-std::vector<Vector3f> world_points(const Scan& scan, const PoseAt& pose_at) {
+std::vector<Vector3f> world_points(const Scan& scan, const PoseTrack& T_world_sensor) {
   std::vector<Vector3f> points;
   points.reserve(scan.points.size());
   // several points leave at one time: their pose is worked out once
@@ -70,7 +70,7 @@ std::vector<Vector3f> world_points(const Scan& scan, const PoseAt& pose_at) {
   for (const ScanPoint& point : scan.points) {
     if (scan.seen_at(point) != known) {
       known = scan.seen_at(point);
-      pose = pose_at(known);
+      pose = T_world_sensor.at(known);
     }
     points.emplace_back((pose * point.position_sensor.cast<double>()).cast<float>());
   }

@@ -11,9 +11,8 @@
 
 namespace pointflight {
 
-/// Points of a scan in the world, each by the sensor's pose at its own time (`pose_at`:
-/// T_world_sensor).
-std::vector<Vector3f> world_points(const Scan& scan, const PoseAt& pose_at);
+/// Points of a scan in the world, each by the sensor's pose at its own time.
+std::vector<Vector3f> world_points(const Scan& scan, const PoseTrack& T_world_sensor);
 
 /// Depth picture of a scan, encoding 32FC1. Pinhole cameras: depth along the optical axis, m, 0
 /// where nothing returned (REP 118 has NaN, planners expect 0). Other sensors: a picture over

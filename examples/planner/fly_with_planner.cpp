@@ -39,39 +39,33 @@ class Eyes : public SampleSink {
  public:
   explicit Eyes(FlightRecorder* recorder) : recorder_(recorder) {}
 
-  void on_scan(const Scan& scan, const PoseAt& pose_at) override {
-    if (recorder_ != nullptr) recorder_->on_scan(scan, pose_at);
-    for (const ScanPoint& point : scan.points) {
-      const Pose T_world_sensor = pose_at(scan.seen_at(point));
-      seen.push_back(
-          {T_world_sensor.translation, T_world_sensor * point.position_sensor.cast<double>()});
-    }
-  }
-  void on_state(const StateSample& sample) override {
-    if (recorder_ != nullptr) recorder_->on_state(sample);
-  }
-  void on_imu(std::uint32_t vehicle, const ImuSample& sample) override {
-    if (recorder_ != nullptr) recorder_->on_imu(vehicle, sample);
-  }
-  void on_obstacle(const ObstacleSample& sample) override {
-    if (recorder_ != nullptr) recorder_->on_obstacle(sample);
-  }
-  void on_collision(const CollisionEvent& event) override {
-    if (recorder_ != nullptr) recorder_->on_collision(event);
-    if (event.entered) {
-      std::fprintf(stderr,
-                   "  collision at %.2f s with %s at (%.2f, %.2f, %.2f)\n",
-                   to_seconds(event.time),
-                   event.partner == kMapLabel ? "the map" : "an obstacle",
-                   event.place_world.x(),
-                   event.place_world.y(),
-                   event.place_world.z());
-    }
+  void on_sample(const Sample& sample) override {
+    if (recorder_ != nullptr) recorder_->on_sample(sample);
+    if (const auto* scanned = std::get_if<ScanSample>(&sample)) look_at(*scanned);
+    if (const auto* event = std::get_if<CollisionEvent>(&sample)) say(*event);
   }
 
   std::vector<planner::SeenPoint> seen;
 
  private:
+  void look_at(const ScanSample& sample) {
+    for (const ScanPoint& point : sample.scan->points) {
+      const Pose T_world_sensor = sample.T_world_sensor.at(sample.scan->seen_at(point));
+      seen.push_back(
+          {T_world_sensor.translation, T_world_sensor * point.position_sensor.cast<double>()});
+    }
+  }
+  static void say(const CollisionEvent& event) {
+    if (!event.entered) return;
+    std::fprintf(stderr,
+                 "  collision at %.2f s with %s at (%.2f, %.2f, %.2f)\n",
+                 to_seconds(event.time),
+                 event.partner == kMapLabel ? "the map" : "an obstacle",
+                 event.place_world.x(),
+                 event.place_world.y(),
+                 event.place_world.z());
+  }
+
   FlightRecorder* recorder_;
 };
 

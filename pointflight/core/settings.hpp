@@ -12,7 +12,25 @@
 #include <string_view>
 #include <vector>
 
+#include "pointflight/core/registry.hpp"
+
 namespace pointflight {
+
+/// A value that files call by a name: a row of a closed table.
+template <class Value>
+struct Named {
+  Value value;            ///< In the program.
+  std::string_view name;  ///< In files.
+};
+
+/// What files call a value; empty where the table does not have it.
+template <class Value, std::size_t N>
+constexpr std::string_view name_in(const Named<Value> (&table)[N], Value value) {
+  for (const Named<Value>& row : table) {
+    if (row.value == value) return row.name;
+  }
+  return {};
+}
 
 /// One key of a settings file, for the reader, the generated documentation and the written
 /// template.
@@ -47,6 +65,25 @@ class SettingsVisitor {
   virtual void choice(const Key& key,
                       std::string& value,
                       std::span<const std::string_view> choices) = 0;
+  /// The same with the values that the words stand for.
+  template <class Value, std::size_t N>
+  void choice(const Key& key, Value& value, const Named<Value> (&table)[N]) {
+    std::vector<std::string_view> names;
+    for (const Named<Value>& row : table) names.push_back(row.name);
+    std::string name(name_in(table, value));
+    choice(key, name, std::span<const std::string_view>(names));
+    for (const Named<Value>& row : table) {
+      if (row.name == name) value = row.value;
+    }
+  }
+  /// The same with rows of a table that programs may add to; null: none of them.
+  template <class Row>
+  void choice(const Key& key, const Row*& value, const Registry<Row>& rows) {
+    const std::vector<std::string_view> names = rows.names();
+    std::string name = value != nullptr ? value->name : std::string();
+    choice(key, name, std::span<const std::string_view>(names));
+    value = rows.find(name);
+  }
 
   /// Calls `describe_items(visitor, section)` one level down.
   template <class Describe>

@@ -73,7 +73,7 @@ std::shared_ptr<const Lidar::OrderedBeams> Lidar::ordered_beams(std::uint64_t sc
 }
 
 Scan Lidar::take(const ScanRequest& request,
-                 const PoseAt& pose_at,
+                 const PoseTrack& T_world_sensor,
                  const Renderer& renderer,
                  const Executor& executor) const {
   Scan scan;
@@ -86,7 +86,7 @@ Scan Lidar::take(const ScanRequest& request,
   scan.beams = beams.size();
 
   // world rays, each from the pose at its own time
-  const Pose middle = pose_at(request.start + period() / 2);
+  const Pose middle = T_world_sensor.at(request.start + period() / 2);
   const bool snapshot = request.snapshot || renderer.is_snapshot();
   scan.snapshot = snapshot;
   scan.middle = request.start + period() / 2;
@@ -102,7 +102,7 @@ Scan Lidar::take(const ScanRequest& request,
     for (std::size_t i = begin; i < end; ++i) {
       if (!snapshot && beams[i].time_offset != pose_time) {
         pose_time = beams[i].time_offset;
-        pose = pose_at(request.start + pose_time);
+        pose = T_world_sensor.at(request.start + pose_time);
       }
       rays[i].origin_world = pose * beams[i].origin_sensor.cast<double>();
       rays[i].direction_world =

@@ -35,10 +35,10 @@ class Lidar {
   /// The longest ray that it can see something at, m from the sensor.
   [[nodiscard]] double reach() const;
 
-  /// Takes one scan in arrears: `pose_at` (T_world_sensor) and the bodies must know all instants of
+  /// Takes one scan in arrears: the track of the sensor and the bodies must know all instants of
   /// the scan. The result does not depend on the executor's threads.
   [[nodiscard]] Scan take(const ScanRequest& request,
-                          const PoseAt& pose_at,
+                          const PoseTrack& T_world_sensor,
                           const Renderer& renderer,
                           const Executor& executor) const;
 

@@ -25,10 +25,13 @@ struct Body {
   Label label = kMapLabel;         ///< What scans call it.
   BodyShape shape;                 ///< In the body's own frame.
   float intensity = 0.0f;          ///< Of a solid's returns; surfels have their own.
-  PoseAt T_world_body;             ///< Known at least from `from` until `until`.
+  Motion motion;                   ///< Known at least from `from` until `until`.
   double speed_max = 0.0;          ///< Of its origin in that time, m/s.
   SimTime from = SimTime::min();   ///< It is there from here on...
   SimTime until = SimTime::max();  ///< ... to before here.
+
+  /// Where it is at an instant. Callable from several threads.
+  [[nodiscard]] Pose T_world_body(SimTime time) const { return pose_at(motion, time); }
 };
 
 /// The farthest point of the shape from its own origin, m.

@@ -46,7 +46,7 @@ void Renderer::check(const RayBatch& batch, std::span<const Hit> hits) {
                    "render: a finite pose and an image resolution above 0 are wanted");
   for (const Body& body : batch.bodies) {
     const auto* cloud = std::get_if<std::shared_ptr<const SurfelMap>>(&body.shape);
-    require_argument(body.T_world_body && (cloud == nullptr || *cloud != nullptr),
+    require_argument(cloud == nullptr || *cloud != nullptr,
                      "render: a body wants a shape and a pose as a function of time");
   }
   assert(std::all_of(batch.rays.begin(), batch.rays.end(), [](const Ray& ray) {

@@ -62,7 +62,7 @@ class Renderer {
 
   /// Writes `hits[i]` for `batch.rays[i]`; both have the same length. Rays are finite, which debug
   /// builds assert; throws std::invalid_argument where sizes do not fit, the pose is not finite or
-  /// a body lacks its shape or its pose.
+  /// a body lacks its shape.
   virtual void render(const RayBatch& batch,
                       std::span<Hit> hits,
                       const Executor& executor) const = 0;

@@ -122,6 +122,7 @@ struct FlightRecorder::VehicleFiles {
     scans.commit();
     if (imu) imu->commit();
     if (odometry) odometry->commit();
+    for (auto& [number, file] : sensors) file.commit();
   }
 
   std::string folder;
@@ -130,7 +131,25 @@ struct FlightRecorder::VehicleFiles {
   OutputFile scans;
   std::optional<OutputFile> imu;
   std::optional<OutputFile> odometry;
+  std::map<std::uint32_t, OutputFile> sensors;  ///< By `Measurement::sensor`.
 };
+
+/// Files of sensors that a program has added: "barometer.csv", "barometer_1.csv", ...
+void FlightRecorder::add_sensor_files(const VehicleAgent& vehicle, VehicleFiles& files) {
+  std::map<std::string, int> alike;
+  for (std::size_t i = 0; i < vehicle.sensors().size(); ++i) {
+    const SensorKind* kind = vehicle.sensors()[i].kind;
+    if (kind == nullptr) continue;
+    const int before = alike[kind->name]++;
+    const std::string name =
+        before == 0 ? kind->name + ".csv" : fmt::format("{}_{}.csv", kind->name, before);
+    OutputFile file(at(files.folder, name.c_str()));
+    std::string header = "time,delivered";
+    for (const SensorColumn& column : kind->columns) header += "," + column.name;
+    file.write(header + "\n");
+    files.sensors.emplace(static_cast<std::uint32_t>(i), std::move(file));
+  }
+}
 
 std::string label_name(const Simulation& simulation, Label label) {
   if (label == kMapLabel) return "map";
@@ -169,6 +188,7 @@ FlightRecorder::FlightRecorder(const std::string& folder,
     if (files->odometry) {
       files->odometry->write(fmt::format("time,delivered,{}\n", kStateColumns));
     }
+    add_sensor_files(simulation.vehicle(v), *files);
     vehicles_.push_back(std::move(files));
   }
 }
@@ -179,7 +199,11 @@ std::string FlightRecorder::path_for(const std::string& name) const {
   return (fs::path(folder_.staging()) / name).string();
 }
 
-void FlightRecorder::on_state(const StateSample& sample) {
+void FlightRecorder::on_sample(const Sample& sample) {
+  std::visit([this](const auto& s) { write(s); }, sample);
+}
+
+void FlightRecorder::write(const StateSample& sample) {
   VehicleFiles& files = *vehicles_[sample.vehicle];
   const RigidBodyState& b = sample.state.body;
   const Quaterniond& q = b.q_world_body;
@@ -201,26 +225,34 @@ void FlightRecorder::on_state(const StateSample& sample) {
                               q.w()));
 }
 
-void FlightRecorder::on_odometry(const OdometrySample& sample) {
+void FlightRecorder::write(const OdometrySample& sample) {
   VehicleFiles& files = *vehicles_[sample.vehicle];
   if (!files.odometry) return;
   files.odometry->write(fmt::format(
       "{},{},{}\n", seconds(sample.time), seconds(sample.delivered), row_of(sample.state)));
 }
 
-void FlightRecorder::on_imu(std::uint32_t vehicle, const ImuSample& sample) {
-  auto& imu = vehicles_[vehicle]->imu;
+void FlightRecorder::write(const ImuSample& sample) {
+  auto& imu = vehicles_[sample.vehicle]->imu;
   if (!imu) return;
   imu->write(fmt::format("{},{},{}\n", seconds(sample.time), csv(sample.gyro), csv(sample.accel)));
 }
 
-void FlightRecorder::on_scan(const Scan& scan, const PoseAt& pose_at) {
+/// One row; its file begins with the kind's columns.
+void FlightRecorder::write(const Measurement& sample) {
+  std::string row = fmt::format("{},{}", seconds(sample.time), seconds(sample.delivered));
+  for (const double value : sample.values) row += fmt::format(",{}", value);
+  vehicles_[sample.vehicle]->sensors.at(sample.sensor).write(row + "\n");
+}
+
+void FlightRecorder::write(const ScanSample& sample) {
   if (!write_scans_) return;
+  const Scan& scan = *sample.scan;
   VehicleFiles& files = *vehicles_[scan.vehicle];
   const std::string name = fmt::format("scans/{}_{:06}.pcd", scan.sensor, scan.index);
   write_scan_pcd(at(files.folder, name.c_str()), scan);
   // T_world_sensor in the middle of the scan
-  const Pose pose = pose_at(scan.start + (scan.end - scan.start) / 2);
+  const Pose pose = sample.T_world_sensor.at(scan.start + (scan.end - scan.start) / 2);
   const Quaterniond& q = pose.rotation;
   files.scans.write(fmt::format("{},{},{},{},{},{},{},{},{},{},{},{}\n",
                                 name,
@@ -237,7 +269,7 @@ void FlightRecorder::on_scan(const Scan& scan, const PoseAt& pose_at) {
                                 q.z()));
 }
 
-void FlightRecorder::on_collision(const CollisionEvent& event) {
+void FlightRecorder::write(const CollisionEvent& event) {
   std::string partner = "map";
   if (event.partner >= kFirstObstacle) {
     partner = fmt::format("obstacle {}", event.partner - kFirstObstacle);
@@ -254,7 +286,7 @@ void FlightRecorder::on_collision(const CollisionEvent& event) {
                             event.penetration));
 }
 
-void FlightRecorder::on_vehicle_event(const VehicleEvent& event) {
+void FlightRecorder::write(const VehicleEvent& event) {
   // no partner, no place, no depth
   events_.write(fmt::format("{},{},{},,{},,,,\n",
                             seconds(event.time),
@@ -263,9 +295,12 @@ void FlightRecorder::on_vehicle_event(const VehicleEvent& event) {
                             csv(event.vehicle_world)));
 }
 
-void FlightRecorder::on_obstacle(const ObstacleSample& sample) {
+void FlightRecorder::write(const ObstacleSample& sample) {
   if (!obstacles_) return;
   const Pose& pose = sample.T_world_body;
+  const auto* solid = std::get_if<Solid>(&sample.shape);
+  const Vector3d half_extent =
+      solid != nullptr ? pointflight::half_extent(*solid) : Vector3d::Zero();
   obstacles_->write(fmt::format("{},{},{},{},{},{},{},{}\n",
                                 seconds(sample.time),
                                 sample.label,
@@ -274,7 +309,7 @@ void FlightRecorder::on_obstacle(const ObstacleSample& sample) {
                                 pose.rotation.x(),
                                 pose.rotation.y(),
                                 pose.rotation.z(),
-                                csv(sample.half_extent)));
+                                csv(half_extent)));
 }
 
 void FlightRecorder::finish(const Simulation& simulation) {

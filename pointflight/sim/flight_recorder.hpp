@@ -12,11 +12,11 @@
 namespace pointflight {
 
 /// Writes a run into a folder. For each vehicle, in the folder itself where there is only one and
-/// in one of its name else: trajectory.csv, trajectory.tum, imu.csv, odometry.csv, scans.csv and
-/// `scans/<lidar>_<number>.pcd`. For all: scenario.yaml with what it needs (scenario_copy.hpp),
-/// events.csv, obstacles.csv and at last summary.json. Files appear when `finish` is called, all
-/// together; without it none do, and an earlier run stays (run_folder.hpp). Throws InputError
-/// (disk full, not writable).
+/// in one of its name else: trajectory.csv, trajectory.tum, imu.csv, odometry.csv, `<kind>.csv` of
+/// own sensors, scans.csv and `scans/<lidar>_<number>.pcd`. For all: scenario.yaml with what it
+/// needs (scenario_copy.hpp), events.csv, obstacles.csv and at last summary.json. Files appear when
+/// `finish` is called, all together; without it none do, and an earlier run stays (run_folder.hpp).
+/// Throws InputError (disk full, not writable).
 class FlightRecorder : public SampleSink {
  public:
   /// Makes the folders; they must be writable.
@@ -25,13 +25,7 @@ class FlightRecorder : public SampleSink {
                  Existing existing = Existing::kRefuse);
   ~FlightRecorder() override;
 
-  void on_state(const StateSample& sample) override;
-  void on_odometry(const OdometrySample& sample) override;
-  void on_imu(std::uint32_t vehicle, const ImuSample& sample) override;
-  void on_scan(const Scan& scan, const PoseAt& pose_at) override;
-  void on_collision(const CollisionEvent& event) override;
-  void on_vehicle_event(const VehicleEvent& event) override;
-  void on_obstacle(const ObstacleSample& sample) override;
+  void on_sample(const Sample& sample) override;
 
   /// Where to write a file that shall be part of the run, before `finish`.
   [[nodiscard]] std::string path_for(const std::string& name) const;
@@ -41,6 +35,15 @@ class FlightRecorder : public SampleSink {
 
  private:
   struct VehicleFiles;
+  static void add_sensor_files(const VehicleAgent& vehicle, VehicleFiles& files);
+  void write(const StateSample& sample);
+  void write(const OdometrySample& sample);
+  void write(const ImuSample& sample);
+  void write(const Measurement& sample);
+  void write(const ScanSample& sample);
+  void write(const CollisionEvent& event);
+  void write(const VehicleEvent& event);
+  void write(const ObstacleSample& sample);
 
   RunFolder folder_;
   bool write_scans_;

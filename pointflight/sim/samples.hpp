@@ -1,8 +1,12 @@
+// What a run says about itself: samples that stand alone, so that they can be kept, queued, stored
+// and sent.
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "pointflight/lidar/lidar.hpp"
@@ -13,7 +17,7 @@
 
 namespace pointflight {
 
-/// Truth at an instant.
+/// Truth at an instant, at output.trajectory_rate, the state at time zero first.
 struct StateSample {
   std::uint32_t vehicle = 0;       ///< Number in the fleet, from 0.
   SimTime time;                    ///< Of the state: a multiple of 1 / output.trajectory_rate.
@@ -22,15 +26,31 @@ struct StateSample {
   std::optional<Contact> nearest;  ///< Nothing within `Simulation::kClearanceReach`.
 };
 
-/// What an odometry source on board reports: the truth, possibly late.
+/// What an odometry source on board reports at output.odometry_rate: the truth, possibly late.
 struct OdometrySample {
   std::uint32_t vehicle = 0;  ///< Number in the fleet, from 0.
   SimTime time;               ///< Of the state.
   SimTime delivered;          ///< When it arrives; later than `time` where a fault delays it.
   RigidBodyState state;       ///< The true one at `time`.
+  std::vector<double> rotor_commands;  ///< When it is delivered, rad/s.
 };
 
-/// A vehicle's hull met something, or left it again.
+/// One scan of a LiDAR, delivered when all its beams are known.
+struct ScanSample {
+  std::shared_ptr<const Scan> scan;  ///< Never null; names vehicle and sensor.
+  PoseTrack T_world_sensor;          ///< Where the sensor was from its start to its end.
+};
+
+/// What a sensor of a kind that a program has added measured (`SensorKind`).
+struct Measurement {
+  std::uint32_t vehicle = 0;   ///< Number in the fleet, from 0.
+  std::uint32_t sensor = 0;    ///< Number in `VehicleAgent::sensors`.
+  SimTime time;                ///< When it was measured.
+  SimTime delivered;           ///< When it arrives; `time` or later.
+  std::vector<double> values;  ///< As the kind's columns say.
+};
+
+/// A vehicle's hull met something, or left it again; said in the step in which it did.
 struct CollisionEvent {
   std::uint32_t vehicle = 0;  ///< Number in the fleet, from 0.
   Label partner = kMapLabel;  ///< What it met: the map, another vehicle or an obstacle.
@@ -41,7 +61,7 @@ struct CollisionEvent {
   double penetration = 0.0;                   ///< At the end of the step, m.
 };
 
-/// Something that happened on board a vehicle.
+/// Something that happened on board a vehicle: batteries, demands beyond limits.
 struct VehicleEvent {
   std::uint32_t vehicle = 0;  ///< Number in the fleet, from 0.
   SimTime time;               ///< Of the step that it was noticed in.
@@ -50,62 +70,63 @@ struct VehicleEvent {
   Vector3d vehicle_world = Vector3d::Zero();  ///< The body's origin, m.
 };
 
-/// Where obstacles are, for records.
+/// Where an obstacle is, at output.obstacle_rate, for each that is there.
 struct ObstacleSample {
   SimTime time;  ///< A multiple of 1 / output.obstacle_rate.
   /// `kFirstObstacle` + its number; what replaces an obstacle has the same.
   Label label = kMapLabel;
   Pose T_world_body;  ///< Of its own frame; a cloud's origin need not be its middle.
-  Vector3d half_extent = Vector3d::Zero();  ///< Of its box, m; zero for points.
+  BodyShape shape;    ///< In its own frame.
 };
 
-/// Where the samples of a run go. Called from one thread; states, odometry and IMU in the order
-/// (time, kind, vehicle), scans when all their beams are known.
+/// Anything that a run says.
+using Sample = std::variant<StateSample,
+                            OdometrySample,
+                            ImuSample,
+                            Measurement,
+                            ScanSample,
+                            CollisionEvent,
+                            VehicleEvent,
+                            ObstacleSample>;
+
+/// Calls the one of several functions that takes what a variant holds; for `std::visit`.
+template <class... Functions>
+struct Overloaded : Functions... {
+  using Functions::operator()...;
+};
+template <class... Functions>
+Overloaded(Functions...) -> Overloaded<Functions...>;
+
+/// Where the samples of a run go. Called from one thread, by time: within a step first what
+/// happened, then truth and measurements as they arrive, then obstacles, then scans that have
+/// ended. Those who want one kind only ask for it: `if (auto* scan =
+/// std::get_if<ScanSample>(&sample))`.
 class SampleSink {
  public:
   virtual ~SampleSink() = default;
-  /// Truth, at output.trajectory_rate, the state at time zero first.
-  virtual void on_state(const StateSample& /*sample*/) {}
-  /// What is delivered now, at output.odometry_rate; `sample.time` lies before where it is late.
-  virtual void on_odometry(const OdometrySample& /*sample*/) {}
-  /// One sample of the vehicle's IMU, at the rate of the vehicle file.
-  virtual void on_imu(std::uint32_t /*vehicle*/, const ImuSample& /*sample*/) {}
-  /// `pose_at` gives T_world_sensor during the scan.
-  virtual void on_scan(const Scan& /*scan*/, const PoseAt& /*pose_at*/) {}
-  /// A hull entered or left something; called in the step in which it did.
-  virtual void on_collision(const CollisionEvent& /*event*/) {}
-  /// Batteries and demands beyond limits.
-  virtual void on_vehicle_event(const VehicleEvent& /*event*/) {}
-  /// Each obstacle that is there, at output.obstacle_rate.
-  virtual void on_obstacle(const ObstacleSample& /*sample*/) {}
+  /// Copies of a sample share its points and tracks.
+  virtual void on_sample(const Sample& sample) = 0;
 };
 
-/// Passes samples on to several sinks, in the order in which they were added.
+/// Calls a function for each sample.
+template <class Function>
+class SampleFunction : public SampleSink {
+ public:
+  /// `function(const Sample&)`
+  explicit SampleFunction(Function function) : function_(std::move(function)) {}
+  void on_sample(const Sample& sample) override { function_(sample); }
+
+ private:
+  Function function_;
+};
+
+/// Passes samples on to several sinks, in the order in which they were added; to nobody at first.
 class SampleSplitter : public SampleSink {
  public:
   /// The sink must outlive the splitter.
   void add(SampleSink& sink) { sinks_.push_back(&sink); }
-
-  void on_state(const StateSample& sample) override {
-    for (SampleSink* sink : sinks_) sink->on_state(sample);
-  }
-  void on_odometry(const OdometrySample& sample) override {
-    for (SampleSink* sink : sinks_) sink->on_odometry(sample);
-  }
-  void on_imu(std::uint32_t vehicle, const ImuSample& sample) override {
-    for (SampleSink* sink : sinks_) sink->on_imu(vehicle, sample);
-  }
-  void on_scan(const Scan& scan, const PoseAt& pose_at) override {
-    for (SampleSink* sink : sinks_) sink->on_scan(scan, pose_at);
-  }
-  void on_collision(const CollisionEvent& event) override {
-    for (SampleSink* sink : sinks_) sink->on_collision(event);
-  }
-  void on_vehicle_event(const VehicleEvent& event) override {
-    for (SampleSink* sink : sinks_) sink->on_vehicle_event(event);
-  }
-  void on_obstacle(const ObstacleSample& sample) override {
-    for (SampleSink* sink : sinks_) sink->on_obstacle(sample);
+  void on_sample(const Sample& sample) override {
+    for (SampleSink* sink : sinks_) sink->on_sample(sample);
   }
 
  private:

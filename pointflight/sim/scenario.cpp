@@ -86,6 +86,12 @@ void describe_equipment(SettingsVisitor& v, VehicleSetup& s) {
   v.list({"lidars", "", "what it carries"}, s.lidars, [](SettingsVisitor& w, LidarMount& mount) {
     describe_lidar(w, mount);
   });
+  v.only_if(
+      !sensor_kinds().rows().empty(), "kinds that a program has added", [&](SettingsVisitor& w) {
+        w.list({"sensors", "", "what else it measures with"},
+               s.sensors,
+               [](SettingsVisitor& x, SensorSetup& sensor) { describe(x, sensor); });
+      });
   v.section({"mission", "", "where it flies; without waypoints it hovers"},
             [&](SettingsVisitor& w) { describe_mission(w, s.mission); });
   v.list({"commands", "", "what it is told, in the order of time"},
@@ -109,7 +115,7 @@ void describe_output(SettingsVisitor& v, OutputSetup& s) {
 
 Scenario read(SettingsReader& reader, const std::string& path) {
   Scenario scenario;
-  for (const char* key : {"vehicle", "lidars", "mission", "commands", "faults"}) {
+  for (const char* key : {"vehicle", "lidars", "sensors", "mission", "commands", "faults"}) {
     scenario.is_short = scenario.is_short || reader.has(key);
   }
   describe(reader, scenario);

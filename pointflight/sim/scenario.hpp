@@ -13,6 +13,7 @@
 #include "pointflight/sim/command_script.hpp"
 #include "pointflight/sim/faults.hpp"
 #include "pointflight/sim/ros_setup.hpp"
+#include "pointflight/sim/sensor.hpp"
 #include "pointflight/vehicle/mission.hpp"
 #include "pointflight/world/obstacles.hpp"
 #include "pointflight/world/wind.hpp"
@@ -56,6 +57,7 @@ struct VehicleSetup {
   std::string on_low_battery = "land";  ///< At its reserve; or "fall", "report".
   LimitSetup limits;                    ///< Tightened or widened for this vehicle.
   std::vector<LidarMount> lidars = {LidarMount{}};  ///< One is mounted where the file says nothing.
+  std::vector<SensorSetup> sensors;                 ///< Besides LiDARs, odometry and IMU.
   MissionSettings mission;                          ///< Without waypoints it hovers at its start.
   std::vector<CommandSettings> commands;            ///< By time; the mission comes first, at 0 s.
   std::vector<FaultSettings> faults;                ///< What fails on board, and when.

@@ -132,10 +132,20 @@ class Simulation {
   void sample_obstacles(SimTime end, SampleSink& sink);
   void take_due_scans(SampleSink& sink);
   void finish_run();
-  [[nodiscard]] std::vector<Body> bodies_for_scan(std::size_t number,
-                                                  const MountedLidar& mounted,
-                                                  SimTime from,
-                                                  SimTime until) const;
+  /// A measurement whose interval has ended.
+  struct DueInterval {
+    std::size_t vehicle;
+    std::size_t sensor_number;
+    const IntervalSensor* sensor;
+    std::int64_t index;
+    SimTime start, end;
+  };
+  [[nodiscard]] std::vector<DueInterval> due_intervals();
+  [[nodiscard]] std::vector<Body> bodies_for(std::size_t number,
+                                             const IntervalSensor& sensor,
+                                             std::span<const PoseTrack> tracks,
+                                             SimTime from,
+                                             SimTime until) const;
   [[nodiscard]] bool arrived() const;
   [[nodiscard]] bool has_left_map() const;
   [[nodiscard]] bool is_idle() const;

@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <tuple>
 
-#include "pointflight/core/random.hpp"
 #include "pointflight/sim/simulation_setup.hpp"
 
 namespace pointflight {
@@ -12,38 +11,20 @@ constexpr double kBeamOrigin = 1.0;  // m: beams start no farther from their sen
 
 }  // namespace
 
-/// All vehicles' samples in the order (time, kind, vehicle).
+/// All vehicles' samples in the order (time, rank, vehicle).
 void Simulation::deliver(std::vector<StepSamples>& samples, SampleSink& sink) {
-  struct Due {
-    SimTime time;
-    int kind;
-    std::size_t vehicle;
-    std::size_t index;
-  };
-  std::vector<Due> due;
-  for (std::size_t v = 0; v < samples.size(); ++v) {
-    const StepSamples& s = samples[v];
-    for (std::size_t i = 0; i < s.collisions.size(); ++i) {
-      due.push_back({s.collisions[i].time, 0, v, i});
-    }
-    for (std::size_t i = 0; i < s.events.size(); ++i) due.push_back({s.events[i].time, 1, v, i});
-    for (std::size_t i = 0; i < s.states.size(); ++i) due.push_back({s.states[i].time, 2, v, i});
-    for (std::size_t i = 0; i < s.odometry.size(); ++i) {
-      due.push_back({s.odometry[i].delivered, 3, v, i});
-    }
-    for (std::size_t i = 0; i < s.imu.size(); ++i) due.push_back({s.imu[i].time, 4, v, i});
+  std::vector<StepSamples::Item*> due;
+  for (StepSamples& s : samples) {
+    for (CollisionEvent& event : s.collisions) s.items.push_back({event.time, 0, event});
   }
-  std::stable_sort(due.begin(), due.end(), [](const Due& a, const Due& b) {
-    return std::tie(a.time, a.kind, a.vehicle) < std::tie(b.time, b.kind, b.vehicle);
+  // vehicles in their order, which sorting keeps
+  for (StepSamples& s : samples) {
+    for (StepSamples::Item& item : s.items) due.push_back(&item);
+  }
+  std::stable_sort(due.begin(), due.end(), [](const auto* a, const auto* b) {
+    return std::tie(a->time, a->rank) < std::tie(b->time, b->rank);
   });
-  for (const Due& d : due) {
-    const StepSamples& s = samples[d.vehicle];
-    if (d.kind == 0) sink.on_collision(s.collisions[d.index]);
-    if (d.kind == 1) sink.on_vehicle_event(s.events[d.index]);
-    if (d.kind == 2) sink.on_state(s.states[d.index]);
-    if (d.kind == 3) sink.on_odometry(s.odometry[d.index]);
-    if (d.kind == 4) sink.on_imu(static_cast<std::uint32_t>(d.vehicle), s.imu[d.index]);
-  }
+  for (const StepSamples::Item* item : due) sink.on_sample(item->sample);
 }
 
 void Simulation::sample_obstacles(SimTime end, SampleSink& sink) {
@@ -57,101 +38,91 @@ void Simulation::sample_obstacles(SimTime end, SampleSink& sink) {
       sample.time = time;
       sample.label = body.label;
       sample.T_world_body = body.T_world_body(time);
-      if (const auto* solid = std::get_if<Solid>(&body.shape)) {
-        sample.half_extent = half_extent(*solid);
-      }
-      sink.on_obstacle(sample);
+      sample.shape = body.shape;
+      sink.on_sample(sample);
     }
   }
 }
 
-/// What a scan of a vehicle's lidar can meet: everybody else, and the obstacles that are near
-/// enough.
-std::vector<Body> Simulation::bodies_for_scan(std::size_t number,
-                                              const MountedLidar& mounted,
-                                              SimTime from,
-                                              SimTime until) const {
-  const StateHistory& own = status(number).history;
+/// What a sensor of a vehicle can meet: everybody else, and the obstacles that are near enough.
+/// `tracks` of all vehicles.
+std::vector<Body> Simulation::bodies_for(std::size_t number,
+                                         const IntervalSensor& sensor,
+                                         std::span<const PoseTrack> tracks,
+                                         SimTime from,
+                                         SimTime until) const {
+  const PoseTrack& own = tracks[number];
   const SimTime middle = from + (until - from) / 2;
   const double moved = own.speed_max(from, until) * to_seconds(until - middle);
-  const double reach =
-      mounted.lidar->reach() + mounted.T_body_sensor.translation.norm() + moved + kBeamOrigin;
-  std::vector<Body> bodies = setup_->obstacles.near(own.at(middle).translation, reach, from, until);
+  std::vector<Body> bodies = setup_->obstacles.near(
+      own.at(middle).translation, sensor.reach() + moved + kBeamOrigin, from, until);
   for (std::size_t i = 0; i < vehicle_count(); ++i) {
     if (i == number) continue;
     Body body;
     body.label = vehicle(i).label();
     body.shape = vehicle(i).shape();
     body.intensity = static_cast<float>(vehicle(i).settings().intensity);
-    body.speed_max = status(i).history.speed_max(from, until);
-    body.T_world_body = [&history = status(i).history](SimTime t) { return history.at(t); };
+    body.speed_max = tracks[i].speed_max(from, until);
+    body.motion = tracks[i];
     bodies.push_back(std::move(body));
   }
   return bodies;
 }
 
-/// Scans that have ended: rendered in arrears, those that end together at the same time.
+/// What has ended and is to be measured; those that end first, at the same instant.
+std::vector<Simulation::DueInterval> Simulation::due_intervals() {
+  std::vector<DueInterval> due;
+  SimTime first_end = SimTime::max();
+  SimTime oldest_needed = state_.time;
+  for (std::size_t v = 0; v < vehicle_count(); ++v) {
+    const auto sensors = vehicle(v).sensors();
+    for (std::size_t i = 0; i < sensors.size(); ++i) {
+      const IntervalSensor* sensor = sensors[i].interval;
+      if (sensor == nullptr) continue;
+      const std::int64_t number = status(v).sensors[i].next;
+      const SimTime end = sensor->schedule().at(number + 1);
+      oldest_needed = std::min(oldest_needed, sensor->schedule().at(number));
+      if (end > state_.time || end > first_end) continue;
+      if (end < first_end) due.clear();
+      first_end = end;
+      due.push_back({v, i, sensor, number, sensor->schedule().at(number), end});
+    }
+  }
+  if (due.empty()) {
+    for (VehicleStatus& status : state_.vehicles) status.history.forget_before(oldest_needed);
+  }
+  return due;
+}
+
+/// Scans that have ended: taken in arrears, those that end together at the same time.
 void Simulation::take_due_scans(SampleSink& sink) {
-  struct Due {
-    std::size_t vehicle, lidar;
-  };
-  for (;;) {
-    std::vector<Due> due;
-    SimTime first_end = SimTime::max();
-    SimTime oldest_needed = state_.time;
-    for (std::size_t v = 0; v < vehicle_count(); ++v) {
-      for (std::size_t l = 0; l < vehicle(v).lidars().size(); ++l) {
-        const Schedule& schedule = vehicle(v).lidars()[l].schedule;
-        const std::int64_t number = status(v).next_scan[l];
-        const SimTime end = schedule.at(number + 1);
-        oldest_needed = std::min(oldest_needed, schedule.at(number));
-        if (end > state_.time || end > first_end) continue;
-        if (end < first_end) due.clear();
-        first_end = end;
-        due.push_back({v, l});
-      }
+  for (auto due = due_intervals(); !due.empty(); due = due_intervals()) {
+    const SimTime end = due.front().end;
+    SimTime start = end;
+    for (const DueInterval& d : due) start = std::min(start, d.start);
+    std::vector<PoseTrack> tracks;
+    tracks.reserve(vehicle_count());
+    for (const VehicleStatus& status : state_.vehicles) {
+      tracks.push_back(status.history.track(start, end));
     }
-    if (due.empty()) {
-      for (VehicleStatus& status : state_.vehicles) status.history.forget_before(oldest_needed);
-      return;
-    }
-    std::vector<std::optional<Scan>> scans(due.size());
+    std::vector<std::optional<Sample>> samples(due.size());
     executor_->parallel_for(due.size(), 1, [&](std::size_t k, std::size_t) {
-      const auto [v, l] = due[k];
-      const VehicleAgent& agent = vehicle(v);
-      const MountedLidar& mounted = agent.lidars()[l];
-      const std::int64_t number = status(v).next_scan[l];
-      const SimTime start = mounted.schedule.at(number);
-      if (agent.faults().is_dead(l, start)) return;
-      const double lost = agent.faults().dropped_share(l, start);
-      const RandomStream chance(agent.seed(),
-                                StreamId::kDroppedScans,
-                                agent.number() << 8 | static_cast<std::uint32_t>(l));
-      if (lost > 0.0 && chance.uniform(static_cast<std::uint64_t>(number)) < lost) return;
-      const std::vector<Body> bodies = bodies_for_scan(v, mounted, start, first_end);
-      const ScanRequest request{static_cast<std::uint64_t>(number),
-                                start,
-                                mounted.snapshot,
-                                mounted.noise,
-                                agent.seed(),
-                                bodies};
-      const StateHistory& history = status(v).history;
-      const PoseAt pose_at = [&](SimTime t) { return history.at(t) * mounted.T_body_sensor; };
-      scans[k] = mounted.lidar->take(request, pose_at, *mounted.renderer, *executor_);
-      scans[k]->vehicle = agent.number();
-      scans[k]->sensor = static_cast<std::uint32_t>(l);
+      const DueInterval& d = due[k];
+      if (d.sensor->loses(d.index)) return;
+      const std::vector<Body> bodies = bodies_for(d.vehicle, *d.sensor, tracks, d.start, end);
+      samples[k] =
+          d.sensor->measure({d.index, d.start, end, tracks[d.vehicle], bodies, *executor_});
     });
     for (std::size_t k = 0; k < due.size(); ++k) {
-      const auto [v, l] = due[k];
-      VehicleStatus& status = state_.vehicles[v];
-      ++status.next_scan[l];
-      if (!scans[k]) continue;
-      ++status.summary.scans;
-      status.summary.beams += scans[k]->beams;
-      status.summary.points += scans[k]->points.size();
-      const MountedLidar& mounted = vehicle(v).lidars()[l];
-      const StateHistory& history = status.history;
-      sink.on_scan(*scans[k], [&](SimTime t) { return history.at(t) * mounted.T_body_sensor; });
+      VehicleStatus& status = state_.vehicles[due[k].vehicle];
+      ++status.sensors[due[k].sensor_number].next;
+      if (!samples[k]) continue;
+      if (const auto* sample = std::get_if<ScanSample>(&*samples[k])) {
+        ++status.summary.scans;
+        status.summary.beams += sample->scan->beams;
+        status.summary.points += sample->scan->points.size();
+      }
+      sink.on_sample(*samples[k]);
     }
   }
 }

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cassert>
 
-#include "pointflight/geometry/rotation.hpp"
-
 namespace pointflight {
 
 void StateHistory::record(SimTime time, const Pose& T_world_body) {
@@ -16,30 +14,16 @@ void StateHistory::forget_before(SimTime time) {
   while (records_.size() > 2 && records_[1].time <= time) records_.pop_front();
 }
 
-Pose StateHistory::at(SimTime time) const {
+PoseTrack StateHistory::track(SimTime from, SimTime until) const {
   assert(!records_.empty());
-  if (time <= records_.front().time) return records_.front().pose;
-  if (time >= records_.back().time) return records_.back().pose;
-  const auto after =
-      std::upper_bound(records_.begin(), records_.end(), time, [](SimTime t, const Record& r) {
-        return t < r.time;
-      });
-  const Record& a = *(after - 1);
-  const Record& b = *after;
-  const double share = to_seconds(time - a.time) / to_seconds(b.time - a.time);
-  return interpolate(a.pose, b.pose, share);
-}
-
-double StateHistory::speed_max(SimTime from, SimTime until) const {
-  double most = 0.0;
-  for (std::size_t i = 1; i < records_.size(); ++i) {
-    const Record& a = records_[i - 1];
-    const Record& b = records_[i];
-    if (b.time < from || a.time > until) continue;
-    const double moved = (b.pose.translation - a.pose.translation).norm();
-    most = std::max(most, moved / to_seconds(b.time - a.time));
-  }
-  return most;
+  // with one record before and one after, whose speeds matter too
+  const auto earlier = [](const TimedPose& record, SimTime time) { return record.time < time; };
+  const auto later = [](SimTime time, const TimedPose& record) { return time < record.time; };
+  auto first = std::lower_bound(records_.begin(), records_.end(), from, earlier);
+  if (first != records_.begin()) --first;
+  auto last = std::upper_bound(first, records_.end(), until, later);
+  if (last != records_.end()) ++last;
+  return PoseTrack({first, last});
 }
 
 }  // namespace pointflight

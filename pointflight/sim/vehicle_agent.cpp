@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 #include <utility>
 
 #include "pointflight/core/constants.hpp"
@@ -20,6 +21,11 @@ constexpr double kTouchdown = 0.01;          // m above what carries a vehicle t
 constexpr double kTouchdownSpeed = 3.0;      // m/s
 constexpr double kGroundEffectReach = 10.0;  // propeller radii
 constexpr std::size_t kLidarsMax = 256;      // their numbers have 8 bits in random streams
+
+// order of a vehicle's samples at one instant, collisions first
+constexpr std::size_t kEventRank = 1;
+constexpr std::size_t kStateRank = 2;
+constexpr std::size_t kSensorRank = 3;  // of the first; the others follow
 
 /// The vehicle's file with what the scenario changes of it.
 VehicleSettings settings_of(const Scenario& scenario,
@@ -62,7 +68,6 @@ VehicleAgent::VehicleAgent(const Scenario& scenario,
       seed_(static_cast<std::uint64_t>(setup.seed >= 0 ? setup.seed : scenario.seed)),
       dynamics_(settings_of(scenario, number, setup)),
       autopilot_(dynamics_.settings(), from_seconds(setup.command_timeout)),
-      imu_(dynamics_.settings().imu, seed_, number_),
       battery_(dynamics_.settings()),
       wind_(scenario.air.wind, seed_),
       faults_(setup.faults),
@@ -70,45 +75,70 @@ VehicleAgent::VehicleAgent(const Scenario& scenario,
       shape_(hull_),
       mission_(
           std::make_shared<Mission>(setup.start, setup.start_yaw_deg * kDegree, setup.mission)),
-      state_schedule_(scenario.output.trajectory_rate),
-      imu_schedule_(dynamics_.settings().imu.rate),
-      odometry_schedule_(scenario.output.odometry_rate) {
-  if (setup_.lidars.size() > kLidarsMax) {
-    throw InputError(fmt::format("{}: {} lidars on one vehicle; {} at most",
-                                 scenario.place(scenario.vehicle_key(number, "lidars")),
-                                 setup_.lidars.size(),
-                                 kLidarsMax));
-  }
-  for (std::size_t i = 0; i < setup_.lidars.size(); ++i) {
-    const LidarMount& mount = setup_.lidars[i];
-    const Vector3d rpy = mount.rotation_rpy_deg * kDegree;
-    const std::string key = scenario.vehicle_key(number, fmt::format("lidars[{}].model", i));
-    auto lidar = scenario.at(key, [&] {
-      const auto entity = number_ << 8 | static_cast<std::uint32_t>(i);
-      return std::make_unique<Lidar>(load_lidar(mount.model, scenario.folder()), entity);
-    });
-    const double rate = lidar->settings().rate;
-    lidars_.push_back({std::move(lidar),
-                       renderer(mount.renderer),
-                       {quaternion_from_rpy(rpy.x(), rpy.y(), rpy.z()), mount.position},
-                       Schedule(rate),
-                       mount.snapshot,
-                       mount.noise});
-  }
+      state_schedule_(scenario.output.trajectory_rate) {
+  mount_sensors(scenario, renderer);
   if (scenario.air.ground_effect && settings().rotor.radius > 0.0) {
     ground_sensor_ = renderer("beam");
   }
+  check_faults(scenario);
+  read_commands(scenario);
+}
+
+void VehicleAgent::mount_sensors(const Scenario& scenario, const RendererByName& renderer) {
+  if (setup_.lidars.size() > kLidarsMax) {
+    throw InputError(fmt::format("{}: {} lidars on one vehicle; {} at most",
+                                 scenario.place(scenario.vehicle_key(number_, "lidars")),
+                                 setup_.lidars.size(),
+                                 kLidarsMax));
+  }
+  const auto site = [&](std::size_t sensor) {
+    return SensorSite{number_, static_cast<std::uint32_t>(sensor), seed_};
+  };
+  mount(nullptr, std::make_unique<OdometrySource>(scenario.output.odometry_rate, faults_));
+  mount(nullptr, std::make_unique<OnboardImu>(settings().imu, site(sensors_.size()), faults_));
+  for (std::size_t i = 0; i < setup_.sensors.size(); ++i) {
+    const SensorSetup& sensor = setup_.sensors[i];
+    const std::string key = scenario.vehicle_key(number_, fmt::format("sensors[{}]", i));
+    mount(sensor.kind, scenario.at(key, [&] {
+      return sensor.kind->make(site(sensors_.size()), sensor.settings);
+    }));
+  }
+  for (std::size_t i = 0; i < setup_.lidars.size(); ++i) {
+    const LidarMount& entry = setup_.lidars[i];
+    const std::string key = scenario.vehicle_key(number_, fmt::format("lidars[{}].model", i));
+    auto lidar = scenario.at(key, [&] {
+      return std::make_unique<MountedLidar>(entry,
+                                            load_lidar(entry.model, scenario.folder()),
+                                            site(i),
+                                            renderer(entry.renderer),
+                                            faults_);
+    });
+    lidars_.push_back(lidar.get());
+    mount(nullptr, std::move(lidar));
+  }
+}
+
+void VehicleAgent::mount(const SensorKind* kind, std::unique_ptr<const Sensor> sensor) {
+  const auto* instant = dynamic_cast<const InstantSensor*>(sensor.get());
+  const auto* interval = dynamic_cast<const IntervalSensor*>(sensor.get());
+  if ((instant == nullptr) == (interval == nullptr)) {
+    throw std::invalid_argument("a sensor is an InstantSensor or an IntervalSensor");
+  }
+  sensors_.push_back({kind, std::move(sensor), instant, interval});
+}
+
+void VehicleAgent::check_faults(const Scenario& scenario) const {
   const auto check_index = [&](std::size_t fault, const char* what, std::size_t count) {
     if (static_cast<std::size_t>(setup_.faults[fault].index) < count) return;
     throw InputError(fmt::format(
         "{}: {} {} of a vehicle with {}",
-        scenario.place(scenario.vehicle_key(number, fmt::format("faults[{}].index", fault))),
+        scenario.place(scenario.vehicle_key(number_, fmt::format("faults[{}].index", fault))),
         what,
         setup_.faults[fault].index,
         count));
   };
   for (std::size_t i = 0; i < setup_.faults.size(); ++i) {
-    const std::string name = scenario.vehicle_key(number, fmt::format("faults[{}].", i));
+    const std::string name = scenario.vehicle_key(number_, fmt::format("faults[{}].", i));
     check(setup_.faults[i], [&](const char* key, const std::string& what) {
       throw InputError(fmt::format("{}: {}{}: {}", scenario.place(name + key), name, key, what));
     });
@@ -116,7 +146,6 @@ VehicleAgent::VehicleAgent(const Scenario& scenario,
     if (kind == "rotor") check_index(i, "rotor", settings().rotors.size());
     if (kind == "lidar" || kind == "scan_drop") check_index(i, "lidar", lidars_.size());
   }
-  read_commands(scenario);
 }
 
 void VehicleAgent::read_commands(const Scenario& scenario) {
@@ -164,7 +193,10 @@ VehicleStatus VehicleAgent::start() const {
   status.autopilot = autopilot_.start(status.state.body, setup_.landed);
   status.rotor_commands.assign(status.state.rotors.size(),
                                setup_.landed ? 0.0 : settings().hover_speed());
-  status.next_scan.assign(lidars_.size(), 0);
+  for (const MountedSensor& sensor : sensors_) {
+    const InstantSensor* instant = sensor.instant;
+    status.sensors.push_back({0, instant != nullptr ? instant->memory_at_start() : std::any{}});
+  }
   return status;
 }
 
@@ -346,62 +378,65 @@ void VehicleAgent::crash(VehicleStatus& status) const {
   status.autopilot.armed = false;
 }
 
-ImuSample VehicleAgent::imu_sample(VehicleStatus& status,
-                                   SimTime time,
-                                   const VehicleState& state) const {
-  BodyAcceleration acceleration;
-  if (!status.landed) {
-    acceleration = dynamics_.acceleration(state, status.conditions);
-  }
-  ImuSample sample =
-      imu_.sample(status.next_imu, time, state.body, acceleration, status.imu_biases);
-  if (status.last_imu && faults_.any()) {
-    for (std::size_t axis = 0; axis < 6; ++axis) {
-      if (!faults_.is_stuck(axis, time)) continue;
-      const int i = static_cast<int>(axis % 3);
-      if (axis < 3) {
-        sample.gyro[i] = status.last_imu->gyro[i];
-      } else {
-        sample.accel[i] = status.last_imu->accel[i];
-      }
-    }
-  }
-  status.last_imu = sample;
-  return sample;
+BodyAcceleration VehicleAgent::acceleration(const VehicleStatus& status,
+                                            const VehicleState& state) const {
+  return status.landed ? BodyAcceleration{} : dynamics_.acceleration(state, status.conditions);
 }
 
 void VehicleAgent::sample(VehicleStatus& status,
                           SimTime now,
                           SimTime end,
                           StepSamples& samples) const {
-  samples.events = std::exchange(status.events, {});
+  for (VehicleEvent& event : status.events) {
+    samples.items.push_back({event.time, kEventRank, std::move(event)});
+  }
+  status.events.clear();
+  const auto arrive = [&](LateSample& late) {
+    sensors_[late.sensor].instant->arrive(late.sample, status);
+    samples.items.push_back(
+        {arrival_of(late.sample), kSensorRank + late.sensor, std::move(late.sample)});
+  };
+  const auto waits = [&](const LateSample& late) { return arrival_of(late.sample) >= end; };
+  const auto first_due = std::stable_partition(status.late.begin(), status.late.end(), waits);
+  std::for_each(first_due, status.late.end(), arrive);
+  status.late.erase(first_due, status.late.end());
   for (;;) {
-    const SimTime state_time = state_schedule_.at(status.next_state);
-    const SimTime odometry_time = odometry_schedule_.at(status.next_odometry);
-    const SimTime imu_time = imu_schedule_.at(status.next_imu);
-    const SimTime next = std::min({state_time, odometry_time, imu_time});
-    if (next >= end) break;
+    const SimTime next = next_instant(status);
+    if (next >= end) return;
     const VehicleState state = state_after(status, to_seconds(next - now));
-    if (state_time == next) {
-      samples.states.push_back(
-          {number_, next, state, status.autopilot.reference, status.proximity.nearest});
+    if (state_schedule_.at(status.next_state) == next) {
+      samples.items.push_back(
+          {next,
+           kStateRank,
+           StateSample{
+               number_, next, state, status.autopilot.reference, status.proximity.nearest}});
       ++status.next_state;
       ++status.summary.states;
     }
-    if (odometry_time == next) {
-      status.late.push_back({number_, next, next + faults_.odometry_delay(next), state.body});
-      ++status.next_odometry;
-    }
-    if (imu_time == next) {
-      samples.imu.push_back(imu_sample(status, next, state));
-      ++status.next_imu;
-      ++status.summary.imu_samples;
+    for (std::size_t i = 0; i < sensors_.size(); ++i) {
+      const InstantSensor* instant = sensors_[i].instant;
+      SensorStatus& sensor = status.sensors[i];
+      if (instant == nullptr || instant->schedule().at(sensor.next) != next) continue;
+      const InstantInput input{sensor.next++, next, state, status, *this};
+      LateSample made{i, instant->measure(input, sensor.memory)};
+      if (std::holds_alternative<ImuSample>(made.sample)) ++status.summary.imu_samples;
+      if (waits(made)) {
+        status.late.push_back(std::move(made));
+      } else {
+        arrive(made);
+      }
     }
   }
-  const auto arrives = [&](const OdometrySample& o) { return o.delivered < end; };
-  const auto waits = std::stable_partition(status.late.begin(), status.late.end(), arrives);
-  samples.odometry.assign(status.late.begin(), waits);
-  status.late.erase(status.late.begin(), waits);
+}
+
+/// When the truth or a sensor is due.
+SimTime VehicleAgent::next_instant(const VehicleStatus& status) const {
+  SimTime next = state_schedule_.at(status.next_state);
+  for (std::size_t i = 0; i < sensors_.size(); ++i) {
+    if (sensors_[i].instant == nullptr) continue;
+    next = std::min(next, sensors_[i].sensor->schedule().at(status.sensors[i].next));
+  }
+  return next;
 }
 
 }  // namespace pointflight

@@ -1,12 +1,13 @@
 #pragma once
 
+#include <any>
 #include <cstdint>
-#include <deque>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "pointflight/sim/onboard_sensors.hpp"
 #include "pointflight/sim/proximity.hpp"
 #include "pointflight/sim/samples.hpp"
 #include "pointflight/sim/scenario.hpp"
@@ -43,51 +44,61 @@ struct VehicleSummary {
   Label closest_label = kMapLabel;  ///< What it came closest to.
 };
 
+/// All of a sensor that changes.
+struct SensorStatus {
+  std::int64_t next = 0;  ///< Index in its schedule.
+  std::any memory;        ///< `InstantSensor::memory_at_start`, as it has become.
+};
+
+/// A measurement on its way.
+struct LateSample {
+  std::size_t sensor = 0;  ///< Its number on the vehicle.
+  Sample sample;           ///< Not yet `InstantSensor::arrive`d.
+};
+
 /// All of a vehicle that changes: a value, so that a run can be saved and branched.
 struct VehicleStatus {
-  VehicleState state;                   ///< Body and rotors at the present time.
-  AutopilotState autopilot;             ///< What it was told, and its memory.
-  Imu::Biases imu_biases;               ///< As they have walked up to the last sample.
-  std::optional<ImuSample> last_imu;    ///< What a stuck axis repeats.
-  GustState gusts;                      ///< Unchanged in calm air.
-  BatteryState battery;                 ///< Unchanged without a battery.
-  FlightConditions conditions;          ///< Of the step under way: wind, ground, battery, faults.
-  std::vector<double> rotor_commands;   ///< rad/s, held over the step under way.
-  StateHistory history;                 ///< Poses that scans in arrears still need.
-  ProximityState proximity;             ///< What its hull is near to or touches.
-  bool landed = false;                  ///< The ground carries it.
-  bool crashed = false;                 ///< Rotors off for good.
-  bool commanded = false;               ///< A program has told it something.
-  std::vector<VehicleEvent> events;     ///< Not yet delivered.
-  std::size_t next_command = 0;         ///< Of the scenario's.
-  bool scripted = false;                ///< What it does is the scenario's last command.
-  std::int64_t next_state = 0;          ///< Index in the schedule of output.trajectory_rate.
-  std::int64_t next_imu = 0;            ///< Index in the schedule of the IMU's rate.
-  std::int64_t next_odometry = 0;       ///< Index in the schedule of output.odometry_rate.
-  std::vector<OdometrySample> late;     ///< Measured, not yet delivered.
-  std::vector<std::int64_t> next_scan;  ///< Of each lidar.
-  double squared_error_sum = 0.0;       ///< Of the tracking error, m^2.
-  std::uint64_t steps = 0;              ///< That it was summed over.
-  VehicleSummary summary;               ///< What happened so far.
+  VehicleState state;                  ///< Body and rotors at the present time.
+  AutopilotState autopilot;            ///< What it was told, and its memory.
+  GustState gusts;                     ///< Unchanged in calm air.
+  BatteryState battery;                ///< Unchanged without a battery.
+  FlightConditions conditions;         ///< Of the step under way: wind, ground, battery, faults.
+  std::vector<double> rotor_commands;  ///< rad/s, held over the step under way.
+  StateHistory history;                ///< Poses that scans in arrears still need.
+  ProximityState proximity;            ///< What its hull is near to or touches.
+  bool landed = false;                 ///< The ground carries it.
+  bool crashed = false;                ///< Rotors off for good.
+  bool commanded = false;              ///< A program has told it something.
+  std::vector<VehicleEvent> events;    ///< Not yet delivered.
+  std::size_t next_command = 0;        ///< Of the scenario's.
+  bool scripted = false;               ///< What it does is the scenario's last command.
+  std::int64_t next_state = 0;         ///< Index in the schedule of output.trajectory_rate.
+  std::vector<SensorStatus> sensors;   ///< As `VehicleAgent::sensors`.
+  std::vector<LateSample> late;        ///< Measured, not yet arrived.
+  double squared_error_sum = 0.0;      ///< Of the tracking error, m^2.
+  std::uint64_t steps = 0;             ///< That it was summed over.
+  VehicleSummary summary;              ///< What happened so far.
 };
 
-/// What one vehicle delivers within a step.
+/// What one vehicle says within a step.
 struct StepSamples {
-  std::vector<StateSample> states;         ///< In order of time, as all of these.
-  std::vector<ImuSample> imu;              ///< Of its IMU.
-  std::vector<OdometrySample> odometry;    ///< Delivered in this step, delayed ones among them.
+  /// A sample and its place among those of its instant: what happened first, then what happened on
+  /// board, the truth, sensors in their order.
+  struct Item {
+    SimTime time;  ///< When it arrives.
+    std::size_t rank = 0;
+    Sample sample;
+  };
   std::vector<CollisionEvent> collisions;  ///< Entered or left in this step.
-  std::vector<VehicleEvent> events;        ///< Noticed since the last step.
+  std::vector<Item> items;                 ///< All else.
 };
 
-/// A LiDAR on a vehicle.
-struct MountedLidar {
-  std::unique_ptr<Lidar> lidar;  ///< Pattern and noise; its number is vehicle << 8 | LiDAR.
-  std::shared_ptr<const Renderer> renderer;  ///< Shared by all that name the same one.
-  Pose T_body_sensor;                        ///< From the sensor's axes to the body's.
-  Schedule schedule;                         ///< Scan k covers [at(k), at(k + 1)).
-  bool snapshot;                             ///< All beams from one pose: LidarMount.
-  bool noise;                                ///< Range noise of the sensor file.
+/// A sensor on a vehicle; one of `instant` and `interval` is not null.
+struct MountedSensor {
+  const SensorKind* kind;                ///< Null for odometry, IMU and LiDARs.
+  std::unique_ptr<const Sensor> sensor;  ///< Never null.
+  const InstantSensor* instant;          ///< The same, where it measures at instants.
+  const IntervalSensor* interval;        ///< The same, where it takes time.
 };
 
 /// Gives renderers by name; vehicles share them.
@@ -147,7 +158,12 @@ class VehicleAgent {
   /// The hull, as LiDARs of others see it.
   [[nodiscard]] const BodyShape& shape() const { return shape_; }
   /// In the order of the scenario.
-  [[nodiscard]] const std::vector<MountedLidar>& lidars() const { return lidars_; }
+  [[nodiscard]] const std::vector<const MountedLidar*>& lidars() const { return lidars_; }
+  /// Odometry, IMU, the scenario's own sensors, LiDARs.
+  [[nodiscard]] std::span<const MountedSensor> sensors() const { return sensors_; }
+  /// What an accelerometer at its origin feels: nothing on the ground.
+  [[nodiscard]] BodyAcceleration acceleration(const VehicleStatus& status,
+                                              const VehicleState& state) const;
   /// Empty for most.
   [[nodiscard]] const Faults& faults() const { return faults_; }
   /// Of its sensors and gusts: its own, or the run's.
@@ -170,16 +186,16 @@ class VehicleAgent {
   void watch_battery(VehicleStatus& status, SimTime now) const;
   [[nodiscard]] bool touches_down(const VehicleStatus& status) const;
   [[nodiscard]] double ground_below(const VehicleStatus& status) const;
-  [[nodiscard]] ImuSample imu_sample(VehicleStatus& status,
-                                     SimTime time,
-                                     const VehicleState& state) const;
+  void mount_sensors(const Scenario& scenario, const RendererByName& renderer);
+  void mount(const SensorKind* kind, std::unique_ptr<const Sensor> sensor);
+  void check_faults(const Scenario& scenario) const;
+  [[nodiscard]] SimTime next_instant(const VehicleStatus& status) const;
 
   std::uint32_t number_;
   VehicleSetup setup_;
   std::uint64_t seed_;
   Multirotor dynamics_;
   Autopilot autopilot_;
-  Imu imu_;
   Battery battery_;
   Wind wind_;
   Faults faults_;
@@ -187,11 +203,10 @@ class VehicleAgent {
   BodyShape shape_;
   std::shared_ptr<const Mission> mission_;
   std::vector<TimedCommand> commands_;
-  std::vector<MountedLidar> lidars_;
+  std::vector<MountedSensor> sensors_;
+  std::vector<const MountedLidar*> lidars_;
   std::shared_ptr<const Renderer> ground_sensor_;  ///< Looks down for ground effect, or none.
   Schedule state_schedule_;
-  Schedule imu_schedule_;
-  Schedule odometry_schedule_;
   double busy_time_ = 0.0;
 };
 

@@ -38,6 +38,7 @@ ImuSample Imu::sample(std::int64_t index,
                          acceleration.alpha_body.cross(arm) + w.cross(w.cross(arm));
   const Quaterniond q_imu_body = q_body_imu_.conjugate();
   ImuSample sample;
+  sample.vehicle = vehicle_;
   sample.time = time;
   sample.q_world_imu = state.q_world_body * q_body_imu_;
   sample.gyro = q_imu_body * w + biases.gyro +

@@ -11,8 +11,9 @@ namespace pointflight {
 
 /// One sample of an IMU.
 struct ImuSample {
-  SimTime time;    ///< When it was measured; nothing delays it.
-  Vector3d gyro;   ///< rad/s, IMU axes.
+  std::uint32_t vehicle = 0;  ///< Number in the fleet, from 0.
+  SimTime time;               ///< When it was measured; nothing delays it.
+  Vector3d gyro;              ///< rad/s, IMU axes.
   Vector3d accel;  ///< Specific force, m/s^2, IMU axes: +9.81 on z when level and at rest.
   Quaterniond q_world_imu = Quaterniond::Identity();  ///< Truth: the attitude of its axes.
 };

@@ -15,10 +15,14 @@
 
 namespace pointflight {
 
-WaypointLoop::WaypointLoop(const std::vector<Vector3d>& waypoints, double speed) : speed_(speed) {
+RoundMotion loop_through(const std::vector<Vector3d>& waypoints, double speed) {
   if (waypoints.empty() || !(speed > 0.0)) {
     throw InputError("a loop needs waypoints and a speed above 0");
   }
+  std::vector<RoundMotion::Leg> legs;
+  RoundMotion motion;
+  motion.speed = speed;
+  motion.round = Duration{0};
   Quaterniond heading = Quaterniond::Identity();
   for (std::size_t i = 0; i < waypoints.size(); ++i) {
     const Vector3d way = waypoints[(i + 1) % waypoints.size()] - waypoints[i];
@@ -27,42 +31,31 @@ WaypointLoop::WaypointLoop(const std::vector<Vector3d>& waypoints, double speed)
     if (std::hypot(way.x(), way.y()) > 1e-9) {
       heading = quaternion_from_rpy(0.0, 0.0, math::atan2(way.y(), way.x()));
     }
-    legs_.push_back({round_, waypoints[i], way / length, heading});
-    round_ += from_seconds(length / speed);
+    legs.push_back({motion.round, waypoints[i], way / length, heading});
+    motion.round += from_seconds(length / speed);
   }
-  if (legs_.empty()) {
-    legs_.push_back({Duration{0}, waypoints.front(), Vector3d::Zero(), heading});
-    speed_ = 0.0;
-    round_ = Duration{1};
+  if (legs.empty()) {
+    legs.push_back({Duration{0}, waypoints.front(), Vector3d::Zero(), heading});
+    motion.speed = 0.0;
   }
-  round_ = std::max(round_, Duration{1});
+  motion.round = std::max(motion.round, Duration{1});
+  motion.legs = std::make_shared<const std::vector<RoundMotion::Leg>>(std::move(legs));
+  return motion;
 }
 
-Pose WaypointLoop::at(SimTime time) const {
-  const Duration since = time.time_since_epoch();
-  const Duration within = (since % round_ + round_) % round_;
-  const auto after = std::upper_bound(
-      legs_.begin(), legs_.end(), within, [](Duration t, const Leg& leg) { return t < leg.start; });
-  const Leg& leg = *(after - 1);
-  return {leg.heading, leg.from + to_seconds(within - leg.start) * speed_ * leg.direction};
-}
-
-std::unique_ptr<Keyframes> Keyframes::read(const std::string& path, bool repeat) {
+PoseTrack read_keyframes(const std::string& path, bool repeat) {
   const MappedFile file(path);
-  return parse(as_text(file.bytes()), path, repeat);
+  return parse_keyframes(as_text(file.bytes()), path, repeat);
 }
 
-std::unique_ptr<Keyframes> Keyframes::parse(std::string_view text,
-                                            const std::string& name,
-                                            bool repeat) {
+PoseTrack parse_keyframes(std::string_view text, const std::string& name, bool repeat) {
   const CsvTable table(text, name);
   const int time = table.require("time");
   const int place[3] = {table.require("x"), table.require("y"), table.require("z")};
   const int quaternion[4] = {
       table.find("qw"), table.find("qx"), table.find("qy"), table.find("qz")};
   const int rpy[3] = {table.find("roll_deg"), table.find("pitch_deg"), table.find("yaw_deg")};
-  auto keyframes = std::make_unique<Keyframes>();
-  keyframes->repeat_ = repeat;
+  std::vector<TimedPose> frames;
   for (std::size_t row = 0; row < table.rows(); ++row) {
     const auto number = [&](int column, double limit) {
       const double value = table.at(row, column);
@@ -72,7 +65,7 @@ std::unique_ptr<Keyframes> Keyframes::parse(std::string_view text,
       }
       return value;
     };
-    Frame frame;
+    TimedPose frame;
     frame.time = SimTime(from_seconds(number(time, 1e9)));
     for (int axis = 0; axis < 3; ++axis) frame.pose.translation[axis] = number(place[axis], 1e7);
     if (quaternion[0] >= 0 && quaternion[1] >= 0 && quaternion[2] >= 0 && quaternion[3] >= 0) {
@@ -91,24 +84,17 @@ std::unique_ptr<Keyframes> Keyframes::parse(std::string_view text,
       };
       frame.pose.rotation = quaternion_from_rpy(angle(rpy[0]), angle(rpy[1]), angle(rpy[2]));
     }
-    if (!keyframes->frames_.empty()) {
-      const Frame& before = keyframes->frames_.back();
-      if (frame.time <= before.time) {
-        throw InputError(
-            fmt::format("{}: time {} s does not come after {} s of the row before; sort "
-                        "the rows",
-                        table.place(row),
-                        to_seconds(frame.time),
-                        to_seconds(before.time)));
-      }
-      const double speed = (frame.pose.translation - before.pose.translation).norm() /
-                           to_seconds(frame.time - before.time);
-      keyframes->speed_max_ = std::max(keyframes->speed_max_, speed);
+    if (!frames.empty() && frame.time <= frames.back().time) {
+      throw InputError(
+          fmt::format("{}: time {} s does not come after {} s of the row before; sort the rows",
+                      table.place(row),
+                      to_seconds(frame.time),
+                      to_seconds(frames.back().time)));
     }
-    keyframes->frames_.push_back(frame);
+    frames.push_back(frame);
   }
-  const Vector3d& first = keyframes->frames_.front().pose.translation;
-  if (repeat && (keyframes->frames_.back().pose.translation - first).norm() > 1e-6) {
+  const Vector3d& first = frames.front().pose.translation;
+  if (repeat && (frames.back().pose.translation - first).norm() > 1e-6) {
     throw InputError(
         fmt::format("{}: repeats, but does not end where it starts: it would jump; add "
                     "a last row at ({}, {}, {})",
@@ -117,23 +103,7 @@ std::unique_ptr<Keyframes> Keyframes::parse(std::string_view text,
                     first.y(),
                     first.z()));
   }
-  return keyframes;
-}
-
-Pose Keyframes::at(SimTime time) const {
-  const SimTime first = frames_.front().time;
-  const SimTime last = frames_.back().time;
-  if (repeat_ && time > last && last > first) time = first + (time - first) % (last - first);
-  if (time <= first) return frames_.front().pose;
-  if (time >= last) return frames_.back().pose;
-  const auto after =
-      std::upper_bound(frames_.begin(), frames_.end(), time, [](SimTime t, const Frame& frame) {
-        return t < frame.time;
-      });
-  const Frame& a = *(after - 1);
-  const Frame& b = *after;
-  const double share = to_seconds(time - a.time) / to_seconds(b.time - a.time);
-  return interpolate(a.pose, b.pose, share);
+  return PoseTrack(std::move(frames), repeat);
 }
 
 }  // namespace pointflight

@@ -12,6 +12,7 @@
 #include "pointflight/core/resources.hpp"
 #include "pointflight/geometry/rotation.hpp"
 #include "pointflight/map/map_builder.hpp"
+#include "pointflight/world/obstacle_motion.hpp"
 #include "pointflight/world/random_flight.hpp"
 
 namespace pointflight {
@@ -26,24 +27,11 @@ constexpr std::size_t kMost = 50000;  // labels have 16 bits in a scan's file
 constexpr Duration kSlice = std::chrono::milliseconds(200);
 constexpr std::size_t kSlicesKept = 8;
 
-/// Stands still.
-class Still : public ObstacleMotion {
- public:
-  explicit Still(const Pose& pose) : pose_(pose) {}
-  [[nodiscard]] Pose at(SimTime /*time*/) const override { return pose_; }
-  [[nodiscard]] double speed_max() const override { return 0.0; }
-
- private:
-  Pose pose_;
-};
-
 /// One shape on one motion.
 class MovingObstacle : public Obstacle {
  public:
-  MovingObstacle(Body body, std::unique_ptr<ObstacleMotion> motion)
-      : body_(std::move(body)), motion_(std::move(motion)) {
-    body_.speed_max = motion_->speed_max();
-    body_.T_world_body = [this](SimTime t) { return motion_->at(t); };
+  explicit MovingObstacle(Body body) : body_(std::move(body)) {
+    body_.speed_max = speed_max(body_.motion);
   }
   void collect(SimTime /*from*/, SimTime /*until*/, std::vector<Body>& bodies) const override {
     bodies.push_back(body_);
@@ -51,7 +39,6 @@ class MovingObstacle : public Obstacle {
 
  private:
   Body body_;
-  std::unique_ptr<ObstacleMotion> motion_;
 };
 
 std::shared_ptr<const SurfelMap> load_cloud(const std::string& path,
@@ -70,11 +57,10 @@ BodyShape solid_of(const ObstacleSettings& s) {
   return Solid{Ball{s.radius}};
 }
 
-std::unique_ptr<ObstacleMotion> make_motion(const ObstacleSettings& s, const std::string& folder) {
-  if (s.motion == "loop") return std::make_unique<WaypointLoop>(s.waypoints, s.speed);
-  if (s.motion == "keyframes") return Keyframes::read(resolve_path(s.keyframes, folder), s.repeat);
-  return std::make_unique<Still>(
-      Pose{quaternion_from_rpy(0.0, 0.0, s.yaw_deg * kDegree), s.position});
+Motion motion_of(const ObstacleSettings& s, const std::string& folder) {
+  if (s.motion == "loop") return loop_through(s.waypoints, s.speed);
+  if (s.motion == "keyframes") return read_keyframes(resolve_path(s.keyframes, folder), s.repeat);
+  return PoseTrack(Pose{quaternion_from_rpy(0.0, 0.0, s.yaw_deg * kDegree), s.position});
 }
 
 /// What only makes sense together.
@@ -197,8 +183,8 @@ Obstacles::Obstacles(const std::vector<ObstacleSettings>& settings,
       body.label = kFirstObstacle + number;
       body.shape = cloud ? BodyShape{cloud} : solid_of(s);
       body.intensity = static_cast<float>(s.intensity);
-      obstacles_.push_back(
-          std::make_unique<MovingObstacle>(std::move(body), make_motion(s, world.folder)));
+      body.motion = motion_of(s, world.folder);
+      obstacles_.push_back(std::make_unique<MovingObstacle>(std::move(body)));
     }
   }
 }

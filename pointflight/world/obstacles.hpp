@@ -13,7 +13,6 @@
 #include "pointflight/core/settings.hpp"
 #include "pointflight/geometry/ball_tree.hpp"
 #include "pointflight/map/scene.hpp"
-#include "pointflight/world/obstacle_motion.hpp"
 
 namespace pointflight {
 
@@ -39,7 +38,7 @@ struct ObstacleSettings {
   Vector3d position = Vector3d::Zero();    ///< Where a still one stands.
   double yaw_deg = 0.0;                    ///< Of a still one, from world x towards y.
   std::vector<Vector3d> waypoints;         ///< Of a loop.
-  std::string keyframes;                   ///< CSV: `Keyframes`.
+  std::string keyframes;                   ///< CSV: `read_keyframes`.
   bool repeat = true;                      ///< Keyframes start again after the last.
 };
 

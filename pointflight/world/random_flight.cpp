@@ -27,15 +27,6 @@ double drawn(double low, double high, double share) {
   return high > low ? low + share * (high - low) : low;
 }
 
-/// A number in [low, high] that runs back and forth between the two.
-double folded(double x, double low, double high) {
-  const double width = high - low;
-  if (width <= 0.0) return low;
-  const double turns = (x - low) / (2.0 * width);
-  const double within = 2.0 * width * (turns - std::floor(turns));
-  return low + (within <= width ? within : 2.0 * width - within);
-}
-
 }  // namespace
 
 RandomFlight::RandomFlight(const ObstacleSettings& settings,
@@ -53,12 +44,6 @@ RandomFlight::RandomFlight(const ObstacleSettings& settings,
       label_(kFirstObstacle + number),
       place_(place) {
   lives_.push_back(life(0, SimTime{}, true));
-}
-
-Vector3d RandomFlight::folded(const Vector3d& p) const {
-  return {pointflight::folded(p.x(), bounds_.min.x(), bounds_.max.x()),
-          pointflight::folded(p.y(), bounds_.min.y(), bounds_.max.y()),
-          pointflight::folded(p.z(), bounds_.min.z(), bounds_.max.z())};
 }
 
 Vector3d RandomFlight::free_place(std::uint64_t n, double radius, bool strict) const {
@@ -160,18 +145,12 @@ void RandomFlight::collect(SimTime from, SimTime until, std::vector<Body>& bodie
     body.speed_max = life->velocity.norm();
     body.from = life->from;
     body.until = life->until;
-    const SimTime born = life->from == SimTime::min() ? SimTime{} : life->from;
-    const Vector3d start = life->start;
-    const Vector3d velocity = life->velocity;
-    if (settings_.at_border == "bounce") {
-      body.T_world_body = [this, born, start, velocity](SimTime t) {
-        return Pose{Quaterniond::Identity(), folded(start + to_seconds(t - born) * velocity)};
-      };
-    } else {
-      body.T_world_body = [born, start, velocity](SimTime t) {
-        return Pose{Quaterniond::Identity(), start + to_seconds(t - born) * velocity};
-      };
-    }
+    StraightMotion motion;
+    motion.from = life->from == SimTime::min() ? SimTime{} : life->from;
+    motion.start = life->start;
+    motion.velocity = life->velocity;
+    if (settings_.at_border == "bounce") motion.walls = bounds_;
+    body.motion = motion;
     bodies.push_back(std::move(body));
   }
 }

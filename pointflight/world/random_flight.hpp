@@ -35,7 +35,6 @@ class RandomFlight : public Obstacle {
   /// Life number n, which starts at `from`; `strict`: throws where no place is free.
   [[nodiscard]] Life life(std::uint64_t n, SimTime from, bool strict) const;
   [[nodiscard]] Vector3d free_place(std::uint64_t n, double radius, bool strict) const;
-  [[nodiscard]] Vector3d folded(const Vector3d& p) const;
 
   ObstacleSettings settings_;
   std::shared_ptr<const SurfelMap> cloud_;

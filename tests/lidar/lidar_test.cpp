@@ -27,10 +27,13 @@ TEST(Lidar, AScanTakenWhileFlyingUsesThePoseOfEachBeam) {
   const auto map = map_of(scene, 0.05);
   const auto renderer = make_renderer("beam", Scene{map});
   const Lidar lidar(exact_lidar("mid360"), 0);
-  const PoseAt moving = [](SimTime t) {
-    const double s = to_seconds(t);
-    return Pose{quaternion_from_rpy(0, 0, kPi * s), {5.0 * s, 0, 0}};
-  };
+  std::vector<TimedPose> poses;
+  for (int ms = 0; ms <= 100; ++ms) {
+    const double s = 1e-3 * ms;
+    poses.push_back({SimTime(std::chrono::milliseconds(ms)),
+                     {quaternion_from_rpy(0, 0, kPi * s), {5.0 * s, 0, 0}}});
+  }
+  const PoseTrack moving(poses);
   const Executor executor(2);
   ScanRequest request;
   const Scan scan = lidar.take(request, moving, *renderer, executor);
@@ -47,10 +50,10 @@ TEST(Lidar, AScanTakenWhileFlyingUsesThePoseOfEachBeam) {
   for (const ScanPoint& point : scan.points) {
     // each point at its own time lies on the box; all at one time, they do not
     const Vector3d p = point.position_sensor.cast<double>();
-    const double own = off_wall(moving(scan.start + point.time_offset) * p);
+    const double own = off_wall(moving.at(scan.start + point.time_offset) * p);
     worst = std::max(worst, own);
     mean_own += own / static_cast<double>(scan.points.size());
-    mean_snapshot += off_wall(moving(scan.start) * p) / static_cast<double>(scan.points.size());
+    mean_snapshot += off_wall(moving.at(scan.start) * p) / static_cast<double>(scan.points.size());
   }
   EXPECT_LT(worst, 0.06);
   EXPECT_LT(mean_own, 0.003);
@@ -59,7 +62,7 @@ TEST(Lidar, AScanTakenWhileFlyingUsesThePoseOfEachBeam) {
   request.snapshot = true;
   double mean_one_pose = 0.0;
   const Scan one_pose = lidar.take(request, moving, *renderer, executor);
-  const Pose middle = moving(one_pose.start + lidar.period() / 2);
+  const Pose middle = moving.at(one_pose.start + lidar.period() / 2);
   for (const ScanPoint& point : one_pose.points) {
     mean_one_pose += off_wall(middle * point.position_sensor.cast<double>()) /
                      static_cast<double>(one_pose.points.size());
@@ -76,7 +79,7 @@ double share_of_pixels(double depth, bool noise) {
   const Lidar camera(load_lidar("d455"), 0);
   ScanRequest request;
   request.noise = noise;
-  const PoseAt still = [](SimTime) { return Pose{}; };
+  const PoseTrack still;
   const Scan scan = camera.take(request, still, *renderer, Executor(2));
   double sum = 0.0;
   double squares = 0.0;
@@ -112,7 +115,7 @@ TEST(Lidar, RangeNoiseHasTheFilesDeviationAndNoBias) {
   settings.noise.range_sigma = 0.03;
   const Lidar noisy(settings, 0);
   const Lidar exact(exact_lidar("mid360"), 0);
-  const PoseAt still = [](SimTime) { return Pose{}; };
+  const PoseTrack still;
   const Executor executor(2);
   ScanRequest request;
   request.seed = 5;
@@ -142,7 +145,7 @@ TEST(Lidar, DropsReturnsNearerThanItsMinimum) {
   scene.add_rectangle({0.5, -3, -3}, {0, 6, 0}, {0, 0, 6});
   const auto renderer = make_renderer("beam", Scene{map_of(scene, 0.05)});
   const Executor executor(1);
-  const PoseAt still = [](SimTime) { return Pose{}; };
+  const PoseTrack still;
   const Lidar avia(exact_lidar("avia"), 0);  // from 1 m
   for (const ScanPoint& p : avia.take({}, still, *renderer, executor).points) {
     EXPECT_GE(p.range, 1.0f);

@@ -52,9 +52,6 @@ TEST(Arguments, OfRenderers) {
     refused([&](RayBatch& batch) { batch.T_world_sensor.rotation.w() = kInf; });
     refused([&](RayBatch& batch) { batch.image_resolution = 0.0; });
     std::vector<Body> bodies(1);
-    bodies[0].shape = Solid{Ball{1.0}};
-    refused([&](RayBatch& batch) { batch.bodies = bodies; });  // no pose
-    bodies[0].T_world_body = [](SimTime) { return Pose{}; };
     bodies[0].shape = std::shared_ptr<const SurfelMap>();
     refused([&](RayBatch& batch) { batch.bodies = bodies; });
   }

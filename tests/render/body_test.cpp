@@ -44,10 +44,13 @@ std::vector<Body> moving_bodies(std::uint32_t seed, int count) {
     const Vector3d velocity(draw(11, -9, 9), draw(12, -9, 9), draw(13, -9, 9));
     const Vector3d spin(draw(14, -9, 9), draw(15, -9, 9), 3.0);
     body.speed_max = velocity.norm();
-    body.T_world_body = [=](SimTime t) {
-      const double s = to_seconds(t);
-      return Pose{quaternion_from_rotation_vector(s * spin), start + s * velocity};
-    };
+    std::vector<TimedPose> poses;
+    for (int ms = 0; ms <= 100; ++ms) {
+      const double s = 1e-3 * ms;
+      poses.push_back({SimTime(std::chrono::milliseconds(ms)),
+                       {quaternion_from_rotation_vector(s * spin), start + s * velocity}});
+    }
+    body.motion = PoseTrack(std::move(poses));
     if (i % 5 == 0) body.until = SimTime(from_seconds(0.07));  // gone within the scan
     bodies.push_back(body);
   }
@@ -134,9 +137,12 @@ TEST(Bodies, OfPointsFollowTheSameRuleAsTheMap) {
   body.label = kFirstObstacle;
   body.shape = points;
   body.speed_max = 10.0;
-  body.T_world_body = [](SimTime t) {
-    return Pose{quaternion_from_rpy(0, 0, 20 * to_seconds(t)), {-3, 10 * to_seconds(t), 0.5}};
-  };
+  std::vector<TimedPose> poses;
+  for (int ms = 0; ms <= 100; ++ms) {
+    poses.push_back({SimTime(std::chrono::milliseconds(ms)),
+                     {quaternion_from_rpy(0, 0, 0.02 * ms), {-3, 0.01 * ms, 0.5}}});
+  }
+  body.motion = PoseTrack(std::move(poses));
   Body exact = body;
   exact.shape = Solid{Ball{0.5}};
   const BeamRenderer renderer({room()});
@@ -172,7 +178,7 @@ TEST(Bodies, AreDrawnAsPointsInThePapersImage) {
   std::vector<Body> frozen = bodies;
   for (Body& body : frozen) {
     const Pose pose = body.T_world_body(SimTime(from_seconds(0.05)));
-    body.T_world_body = [pose](SimTime) { return pose; };
+    body.motion = PoseTrack(pose);
     body.until = SimTime::max();
   }
   std::vector<Hit> exact(shots.rays.size());

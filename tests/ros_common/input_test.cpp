@@ -213,7 +213,7 @@ TEST(Commands, ABodyVelocityFollowsTheHeadingThatTurns) {
   scenario.duration = 8.0;
   const Executor executor(1);
   Simulation simulation(scenario, testing::hall(), executor);
-  SampleSink sink;
+  SampleSplitter sink;
   VelocityCommand ahead;
   ahead.v_world = {1, 0, 0};
   ahead.yaw_rate = kPi / 4;
@@ -235,7 +235,7 @@ TEST(Commands, AGoalKeepsTheHeightAndEndsAtItsHeading) {
   scenario.duration = 20.0;
   const Executor executor(1);
   Simulation simulation(scenario, testing::hall(), executor);
-  SampleSink sink;
+  SampleSplitter sink;
   WaypointCommand goal;
   goal.mission.waypoints = {{13, 7, 0}};
   goal.mission.final_yaw = -kPi / 2;

@@ -18,7 +18,10 @@ using namespace testing;
 /// Keeps what happens on board.
 class EventSink : public ByteSink {
  public:
-  void on_vehicle_event(const VehicleEvent& event) override { on_board.push_back(event); }
+  void on_sample(const Sample& sample) override {
+    if (const auto* event = std::get_if<VehicleEvent>(&sample)) on_board.push_back(*event);
+    ByteSink::on_sample(sample);
+  }
   std::vector<VehicleEvent> on_board;
 };
 

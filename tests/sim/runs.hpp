@@ -15,22 +15,37 @@ namespace pointflight::testing {
 /// Everything that a run delivers, as bytes.
 class ByteSink : public SampleSink {
  public:
-  void on_state(const StateSample& s) override {
+  void on_sample(const Sample& sample) override {
+    std::visit([this](const auto& s) { take(s); }, sample);
+  }
+
+  [[nodiscard]] std::uint64_t hash() const { return hash64(bytes_); }
+  std::map<Label, int> labels;
+  std::vector<CollisionEvent> events;
+  int scans = 0;
+
+ private:
+  void take(const VehicleEvent& /*event*/) {}
+  void take(const Measurement& m) {
+    for (const double value : m.values) add(value);
+  }
+  void take(const StateSample& s) {
     add(s.vehicle);
     add(s.time.time_since_epoch().count());
     add_body(s.state.body);
     for (const RotorState& rotor : s.state.rotors) add(rotor.speed);
     if (s.nearest) add(s.nearest->distance);
   }
-  void on_odometry(const OdometrySample& s) override {
+  void take(const OdometrySample& s) {
     add(s.delivered.time_since_epoch().count());
     add_body(s.state);
   }
-  void on_imu(std::uint32_t vehicle, const ImuSample& s) override {
-    add(vehicle);
+  void take(const ImuSample& s) {
+    add(s.vehicle);
     for (int i = 0; i < 3; ++i) add(s.gyro[i] + 10.0 * s.accel[i]);
   }
-  void on_scan(const Scan& scan, const PoseAt& /*pose_at*/) override {
+  void take(const ScanSample& sample) {
+    const Scan& scan = *sample.scan;
     add(scan.vehicle);
     add(scan.index);
     for (const ScanPoint& p : scan.points) {
@@ -40,19 +55,13 @@ class ByteSink : public SampleSink {
     }
     ++scans;
   }
-  void on_collision(const CollisionEvent& e) override {
+  void take(const CollisionEvent& e) {
     add(e.partner);
     add(e.time.time_since_epoch().count());
     events.push_back(e);
   }
-  void on_obstacle(const ObstacleSample& o) override { add(o.T_world_body.translation.x()); }
+  void take(const ObstacleSample& o) { add(o.T_world_body.translation.x()); }
 
-  [[nodiscard]] std::uint64_t hash() const { return hash64(bytes_); }
-  std::map<Label, int> labels;
-  std::vector<CollisionEvent> events;
-  int scans = 0;
-
- private:
   template <class T>
   void add(T value) {
     const auto* raw = reinterpret_cast<const std::byte*>(&value);

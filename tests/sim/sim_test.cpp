@@ -95,12 +95,22 @@ TEST(StateHistory, InterpolatesOnTheWayAndForgetsWhatIsOld) {
   history.record(SimTime(Duration(0)), {Quaterniond::Identity(), {0, 0, 0}});
   history.record(SimTime(Duration(1000)), {turned, {1, 0, 0}});
   history.record(SimTime(Duration(2000)), {turned, {1, 4, 0}});
-  EXPECT_TRUE(history.at(SimTime(Duration(250))).translation.isApprox(Vector3d(0.25, 0, 0)));
-  EXPECT_NEAR(yaw_of(history.at(SimTime(Duration(500))).rotation), 0.005, 1e-9);
-  EXPECT_EQ(history.at(SimTime(Duration(-5))).translation, Vector3d(0, 0, 0));
-  EXPECT_EQ(history.at(SimTime(Duration(9999))).translation, Vector3d(1, 4, 0));
+  const auto at = [&](std::int64_t ns) {
+    // a track of a part says the same as one of the whole
+    const SimTime time{Duration(ns)};
+    const Pose pose = history.track(SimTime::min(), SimTime::max()).at(time);
+    EXPECT_EQ(history.track(time, time).at(time).translation, pose.translation);
+    EXPECT_EQ(history.track(time, time).at(time).rotation.coeffs(), pose.rotation.coeffs());
+    return pose;
+  };
+  EXPECT_TRUE(at(250).translation.isApprox(Vector3d(0.25, 0, 0)));
+  EXPECT_NEAR(yaw_of(at(500).rotation), 0.005, 1e-9);
+  EXPECT_EQ(at(-5).translation, Vector3d(0, 0, 0));
+  EXPECT_EQ(at(9999).translation, Vector3d(1, 4, 0));
+  const PoseTrack kept = history.track(SimTime::min(), SimTime::max());
   history.forget_before(SimTime(Duration(1500)));
-  EXPECT_TRUE(history.at(SimTime(Duration(1500))).translation.isApprox(Vector3d(1, 2, 0)));
+  EXPECT_TRUE(at(1500).translation.isApprox(Vector3d(1, 2, 0)));
+  EXPECT_TRUE(kept.at(SimTime(Duration(250))).translation.isApprox(Vector3d(0.25, 0, 0)));
 }
 
 TEST(Scenario, WhatIsWrittenReadsBackTheSame) {
@@ -124,23 +134,37 @@ TEST(Scenario, WhatIsWrittenReadsBackTheSame) {
 /// Everything that a run delivers, folded into one number.
 class HashSink : public SampleSink {
  public:
-  void on_state(const StateSample& s) override {
+  void on_sample(const Sample& sample) override {
+    std::visit(Overloaded{[this](const StateSample& s) { take(s); },
+                          [this](const ImuSample& s) { take(s); },
+                          [this](const ScanSample& s) { take(s); },
+                          [this](const CollisionEvent& s) { take(s); },
+                          [](const auto&) {}},
+               sample);
+  }
+  [[nodiscard]] std::uint64_t hash() const { return hash64(as_bytes(bytes_)); }
+  int collisions = 0;
+  CollisionEvent last;
+
+ private:
+  void take(const StateSample& s) {
     add(s.time.time_since_epoch().count());
     add(s.state.body.p_world.x());
     add(s.state.body.q_world_body.w());
     add(s.state.rotors[1].speed);
     if (s.nearest) add(s.nearest->distance);
   }
-  void on_imu(std::uint32_t vehicle, const ImuSample& s) override {
-    add(vehicle);
+  void take(const ImuSample& s) {
+    add(s.vehicle);
     for (int i = 0; i < 3; ++i) {
       add(s.gyro[i]);
       add(s.accel[i]);
     }
   }
-  void on_scan(const Scan& scan, const PoseAt& pose_at) override {
+  void take(const ScanSample& sample) {
+    const Scan& scan = *sample.scan;
     add(static_cast<double>(scan.points.size()));
-    add(pose_at(scan.start).translation.x());
+    add(sample.T_world_sensor.at(scan.start).translation.x());
     for (const ScanPoint& p : scan.points) {
       add(p.range);
       add(p.position_sensor.x());
@@ -148,15 +172,10 @@ class HashSink : public SampleSink {
       add(p.label);
     }
   }
-  void on_collision(const CollisionEvent& event) override {
+  void take(const CollisionEvent& event) {
     ++collisions;
     last = event;
   }
-  [[nodiscard]] std::uint64_t hash() const { return hash64(as_bytes(bytes_)); }
-  int collisions = 0;
-  CollisionEvent last;
-
- private:
   template <class T>
   void add(T value) {
     const auto* raw = reinterpret_cast<const std::byte*>(&value);
@@ -236,8 +255,10 @@ TEST(Simulation, AddingASensorMovesNoOtherDraw) {
   const auto map = hall();
   class FirstScan : public SampleSink {
    public:
-    void on_scan(const Scan& scan, const PoseAt&) override {
-      if (scan.sensor == 0 && points.empty()) points = scan.points;
+    void on_sample(const Sample& sample) override {
+      const auto* scanned = std::get_if<ScanSample>(&sample);
+      if (scanned == nullptr || scanned->scan->sensor != 0 || !points.empty()) return;
+      points = scanned->scan->points;
     }
     std::vector<ScanPoint> points;
   };

@@ -131,14 +131,14 @@ TEST(Swarm, StatesFromElsewhereTakeThePlaceOfLocalOnes) {
   auto source = std::make_shared<Recorded>();
   Simulation local(scenario, hall(), executor);
   struct OfFirst : ByteSink {
-    void on_scan(const Scan& scan, const PoseAt& pose_at) override {
-      if (scan.vehicle == 0) ByteSink::on_scan(scan, pose_at);
+    void on_sample(const Sample& sample) override {
+      const auto* state = std::get_if<StateSample>(&sample);
+      const auto* scanned = std::get_if<ScanSample>(&sample);
+      const bool of_first = (state != nullptr && state->vehicle == 0) ||
+                            (scanned != nullptr && scanned->scan->vehicle == 0) ||
+                            std::holds_alternative<CollisionEvent>(sample);
+      if (of_first) ByteSink::on_sample(sample);
     }
-    void on_state(const StateSample& s) override {
-      if (s.vehicle == 0) ByteSink::on_state(s);
-    }
-    void on_imu(std::uint32_t, const ImuSample&) override {}
-    void on_odometry(const OdometrySample&) override {}
   };
   OfFirst of_local;
   do {

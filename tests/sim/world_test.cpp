@@ -9,6 +9,7 @@
 
 #include "pointflight/core/constants.hpp"
 #include "pointflight/geometry/rotation.hpp"
+#include "pointflight/world/obstacle_motion.hpp"
 #include "tests/sim/runs.hpp"
 
 namespace pointflight {
@@ -250,20 +251,20 @@ TEST(Obstacles, StayInFlatBounds) {
 }
 
 TEST(Obstacles, KeyframesAndLoopsAreWhereTheirFilesSay) {
-  const auto keyframes = Keyframes::parse(
+  const PoseTrack keyframes = parse_keyframes(
       "time,yaw_deg,x,y,z\n# a door\n0,0,1,1,0\n2,90,1,1,0\n4,0,1,1,0\n", "door.csv", true);
-  EXPECT_NEAR(yaw_of(keyframes->at(SimTime(std::chrono::seconds(1))).rotation), kPi / 4, 1e-9);
-  EXPECT_NEAR(yaw_of(keyframes->at(SimTime(std::chrono::seconds(6))).rotation), kPi / 2, 1e-9);
-  EXPECT_EQ(keyframes->speed_max(), 0.0);
+  EXPECT_NEAR(yaw_of(keyframes.at(SimTime(std::chrono::seconds(1))).rotation), kPi / 4, 1e-9);
+  EXPECT_NEAR(yaw_of(keyframes.at(SimTime(std::chrono::seconds(6))).rotation), kPi / 2, 1e-9);
+  EXPECT_EQ(speed_max(keyframes), 0.0);
   const auto error = [](const char* text, bool repeat) {
-    return error_of([&] { Keyframes::parse(text, "k.csv", repeat); });
+    return error_of([&] { parse_keyframes(text, "k.csv", repeat); });
   };
   expect_contains(error("time,x,y,z\n1,0,0,0\n0.5,1,0,0\n", false),
                   "k.csv:3: time 0.5 s does not come after 1 s");
   expect_contains(error("time,x,y,z\n0,0,0,0\n1,5,0,0\n", true), "k.csv:3: repeats");
   expect_contains(error("time,x,y,z\n0,0,nan,0\n", false), "k.csv:2: ");
   expect_contains(error("time,x,y\n0,0,0\n", false), "'z");
-  const WaypointLoop loop({{0, 0, 1}, {4, 0, 1}, {4, 3, 1}}, 2.0);
+  const RoundMotion loop = loop_through({{0, 0, 1}, {4, 0, 1}, {4, 3, 1}}, 2.0);
   EXPECT_TRUE(loop.at(SimTime(std::chrono::seconds(1))).translation.isApprox(Vector3d(2, 0, 1)));
   EXPECT_TRUE(loop.at(SimTime(std::chrono::seconds(3))).translation.isApprox(Vector3d(4, 2, 1)));
   // 12 m round at 2 m/s
@@ -369,15 +370,17 @@ TEST(Faults, DoWhatTheySay) {
               {.kind = "imu", .from = 0.5, .until = 0.0, .axis = "accel_y"},
               {.kind = "odometry_delay", .from = 1.0, .until = 2.0, .value = 0.05}};
   struct Watch : SampleSink {
-    void on_scan(const Scan& scan, const PoseAt&) override { ++scans[scan.sensor]; }
-    void on_imu(std::uint32_t, const ImuSample& s) override {
-      if (to_seconds(s.time) > 0.5) stuck.insert(s.accel.y());
-      if (to_seconds(s.time) > 0.5) free.insert(s.accel.x());
-    }
-    void on_odometry(const OdometrySample& s) override {
-      late += s.delivered > s.time ? 1 : 0;
-      EXPECT_GE(s.delivered, last);
-      last = s.delivered;
+    void on_sample(const Sample& sample) override {
+      if (const auto* scanned = std::get_if<ScanSample>(&sample)) ++scans[scanned->scan->sensor];
+      if (const auto* imu = std::get_if<ImuSample>(&sample); imu && to_seconds(imu->time) > 0.5) {
+        stuck.insert(imu->accel.y());
+        free.insert(imu->accel.x());
+      }
+      if (const auto* odometry = std::get_if<OdometrySample>(&sample)) {
+        late += odometry->delivered > odometry->time ? 1 : 0;
+        EXPECT_GE(odometry->delivered, last);
+        last = odometry->delivered;
+      }
     }
     std::map<std::uint32_t, int> scans;
     std::set<double> stuck, free;

@@ -1,0 +1,90 @@
+#include "pointflight/sim/onboard_sensors.hpp"
+
+#include "pointflight/core/constants.hpp"
+#include "pointflight/core/random.hpp"
+#include "pointflight/geometry/rotation.hpp"
+#include "pointflight/sim/vehicle_agent.hpp"
+
+namespace pointflight {
+namespace {
+
+std::uint32_t entity_of(const SensorSite& site) {
+  return site.vehicle << 8 | site.sensor;
+}
+
+}  // namespace
+
+Sample OdometrySource::measure(const InstantInput& input, std::any& /*memory*/) const {
+  OdometrySample sample;
+  sample.vehicle = input.vehicle.number();
+  sample.time = input.time;
+  sample.delivered = input.time + faults_.odometry_delay(input.time);
+  sample.state = input.state.body;
+  return sample;
+}
+
+void OdometrySource::arrive(Sample& sample, const VehicleStatus& status) const {
+  std::get<OdometrySample>(sample).rotor_commands = status.rotor_commands;
+}
+
+Sample OnboardImu::measure(const InstantInput& input, std::any& memory) const {
+  auto& [biases, last] = *std::any_cast<Memory>(&memory);
+  const BodyAcceleration acceleration = input.vehicle.acceleration(input.status, input.state);
+  ImuSample sample = imu_.sample(input.index, input.time, input.state.body, acceleration, biases);
+  for (std::size_t axis = 0; axis < 6 && last && faults_.any(); ++axis) {
+    if (!faults_.is_stuck(axis, input.time)) continue;
+    const int i = static_cast<int>(axis % 3);
+    if (axis < 3) {
+      sample.gyro[i] = last->gyro[i];
+    } else {
+      sample.accel[i] = last->accel[i];
+    }
+  }
+  last = sample;
+  return sample;
+}
+
+MountedLidar::MountedLidar(const LidarMount& mount,
+                           const LidarSettings& settings,
+                           const SensorSite& site,
+                           std::shared_ptr<const Renderer> renderer,
+                           const Faults& faults)
+    : IntervalSensor(settings.rate),
+      site_(site),
+      lidar_(settings, entity_of(site)),
+      renderer_(std::move(renderer)),
+      snapshot_(mount.snapshot),
+      noise_(mount.noise),
+      faults_(faults) {
+  const Vector3d rpy = mount.rotation_rpy_deg * kDegree;
+  T_body_sensor_ = {quaternion_from_rpy(rpy.x(), rpy.y(), rpy.z()), mount.position};
+}
+
+double MountedLidar::reach() const {
+  return lidar_.reach() + T_body_sensor_.translation.norm();
+}
+
+bool MountedLidar::loses(std::int64_t index) const {
+  const SimTime start = schedule().at(index);
+  if (faults_.is_dead(site_.sensor, start)) return true;
+  const double lost = faults_.dropped_share(site_.sensor, start);
+  const RandomStream chance(site_.seed, StreamId::kDroppedScans, entity_of(site_));
+  return lost > 0.0 && chance.uniform(static_cast<std::uint64_t>(index)) < lost;
+}
+
+Sample MountedLidar::measure(const IntervalInput& input) const {
+  ScanRequest request;
+  request.index = static_cast<std::uint64_t>(input.index);
+  request.start = input.start;
+  request.snapshot = snapshot_;
+  request.noise = noise_;
+  request.seed = site_.seed;
+  request.bodies = input.bodies;
+  const PoseTrack track = input.T_world_body.with_mount(T_body_sensor_);
+  auto scan = std::make_shared<Scan>(lidar_.take(request, track, *renderer_, input.executor));
+  scan->vehicle = site_.vehicle;
+  scan->sensor = site_.sensor;
+  return ScanSample{std::move(scan), track};
+}
+
+}  // namespace pointflight

@@ -1,0 +1,74 @@
+// What every vehicle measures with: odometry, IMU, LiDARs.
+#pragma once
+
+#include <memory>
+#include <optional>
+
+#include "pointflight/lidar/lidar.hpp"
+#include "pointflight/sim/faults.hpp"
+#include "pointflight/sim/scenario.hpp"
+#include "pointflight/sim/sensor.hpp"
+
+namespace pointflight {
+
+/// Reports the truth, late where a fault delays it.
+class OdometrySource : public InstantSensor {
+ public:
+  /// The faults must outlive it.
+  OdometrySource(double rate, const Faults& faults) : InstantSensor(rate), faults_(faults) {}
+  [[nodiscard]] Sample measure(const InstantInput& input, std::any& memory) const override;
+  void arrive(Sample& sample, const VehicleStatus& status) const override;
+
+ private:
+  const Faults& faults_;
+};
+
+/// The IMU of the vehicle file; what is stuck repeats its last value.
+class OnboardImu : public InstantSensor {
+ public:
+  /// The faults must outlive it.
+  OnboardImu(const ImuSettings& settings, const SensorSite& site, const Faults& faults)
+      : InstantSensor(settings.rate), imu_(settings, site.seed, site.vehicle), faults_(faults) {}
+  [[nodiscard]] std::any memory_at_start() const override { return Memory{}; }
+  [[nodiscard]] Sample measure(const InstantInput& input, std::any& memory) const override;
+
+ private:
+  struct Memory {
+    Imu::Biases biases;             ///< As they have walked up to the last sample.
+    std::optional<ImuSample> last;  ///< What a stuck axis repeats.
+  };
+  Imu imu_;
+  const Faults& faults_;
+};
+
+/// A LiDAR on a vehicle. Measurement k covers [at(k), at(k + 1)) of its schedule.
+class MountedLidar : public IntervalSensor {
+ public:
+  /// `mount` of the scenario; `site.sensor`: its number among the vehicle's LiDARs. The faults must
+  /// outlive it.
+  MountedLidar(const LidarMount& mount,
+               const LidarSettings& settings,
+               const SensorSite& site,
+               std::shared_ptr<const Renderer> renderer,
+               const Faults& faults);
+
+  /// Pattern and noise; its number is vehicle << 8 | LiDAR.
+  [[nodiscard]] const Lidar& lidar() const { return lidar_; }
+  /// From the sensor's axes to the body's.
+  [[nodiscard]] const Pose& T_body_sensor() const { return T_body_sensor_; }
+
+  [[nodiscard]] double reach() const override;
+  [[nodiscard]] bool loses(std::int64_t index) const override;
+  [[nodiscard]] Sample measure(const IntervalInput& input) const override;
+
+ private:
+  SensorSite site_;
+  Lidar lidar_;
+  std::shared_ptr<const Renderer> renderer_;
+  Pose T_body_sensor_;
+  bool snapshot_;
+  bool noise_;
+  const Faults& faults_;
+};
+
+}  // namespace pointflight
