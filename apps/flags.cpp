@@ -11,6 +11,7 @@
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/geometry/rotation.hpp"
 #include "pointflight/io/byte_cursor.hpp"
+#include "pointflight/render/renderer.hpp"
 
 namespace pointflight::apps {
 
@@ -46,6 +47,11 @@ Pose parse_pose(const std::string& text, const std::string& flag) {
   const std::vector<double> n =
       parse_numbers(text, 6, flag + " (x,y,z,roll,pitch,yaw: metres, degrees)");
   return {quaternion_from_rpy(n[3] * kDegree, n[4] * kDegree, n[5] * kDegree), {n[0], n[1], n[2]}};
+}
+
+std::vector<std::string> renderer_names() {
+  const auto names = RendererKind::table().names();
+  return {names.begin(), names.end()};
 }
 
 void add_force_flag(CLI::App& app, bool& force) {

@@ -25,6 +25,9 @@ std::vector<double> parse_numbers(const std::string& text,
 /// "x,y,z,roll,pitch,yaw" in metres and degrees.
 Pose parse_pose(const std::string& text, const std::string& flag);
 
+/// What --renderer may be.
+std::vector<std::string> renderer_names();
+
 /// --force: outputs may replace what is there.
 void add_force_flag(CLI::App& app, bool& force);
 

@@ -33,7 +33,7 @@ void list_lidars(const LidarFlags& flags) {
     if (flags.json) {
       json.push_back({{"name", name},
                       {"title", s.title},
-                      {"pattern", s.pattern},
+                      {"pattern", to_string(s.pattern)},
                       {"rate", s.rate},
                       {"range_max", s.range_max},
                       {"path", s.path}});
@@ -41,7 +41,7 @@ void list_lidars(const LidarFlags& flags) {
     }
     fmt::print("{:<12}  {:<9} {:>5.1f} Hz  {:>5.1f} m  {}\n",
                name,
-               s.pattern,
+               to_string(s.pattern),
                s.rate,
                s.range_max,
                s.title);
@@ -66,7 +66,9 @@ nlohmann::ordered_json json_of(const ScanStatistics& scan) {
 }
 
 void print_statistics(const LidarSettings& s, const ScanStatistics& scan) {
-  const char* lines = s.pattern == "rings" ? "rings" : s.pattern == "grid" ? "rows" : "lines";
+  const char* lines = s.pattern == ScanPattern::kRings  ? "rings"
+                      : s.pattern == ScanPattern::kGrid ? "rows"
+                                                        : "lines";
   fmt::print("# scan: {} beams, {} {}, fired within {} ms; {:g} scans and {:.0f} beams a second\n",
              scan.beams,
              scan.rings,

@@ -69,12 +69,13 @@ void draw_step_responses(const VehicleSettings& vehicle,
   const auto stroke = [](double width, Color color) {
     return [=](Canvas& c, double x, double y) { c.line({{x, y}, {x + 24.0, y}}, width, color); };
   };
-  draw_legend(canvas,
-              {{fmt::format("flown ({})", vehicle.controller.kind), 24.0, stroke(2.0, kFlown)},
-               {"the loop's design by itself, without rotor lag", 24.0, stroke(1.5, kDesign)}},
-              kLeft,
-              50.0,
-              room);
+  draw_legend(
+      canvas,
+      {{fmt::format("flown ({})", vehicle.controller.kind->name), 24.0, stroke(2.0, kFlown)},
+       {"the loop's design by itself, without rotor lag", 24.0, stroke(1.5, kDesign)}},
+      kLeft,
+      50.0,
+      room);
   for (std::size_t i = 0; i < responses.size(); ++i) {
     const std::size_t row = i / 2;
     draw_panel(canvas,

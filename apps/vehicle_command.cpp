@@ -102,7 +102,7 @@ void print_vehicle(VehicleSettings& s, const std::vector<StepResponse>& response
                s.battery.capacity,
                *time / 60.0);
   }
-  fmt::print("# loops ({}), flown from hover:\n", s.controller.kind);
+  fmt::print("# loops ({}), flown from hover:\n", s.controller.kind->name);
   fmt::print("#   {:<15} {:>10} {:>8} {:>10} {:>8} {:>10} {:>9}\n",
              "step",
              "design",

@@ -56,7 +56,7 @@ Scenario scenario_for(const Flags& flags, const SurfelMap& map, int vehicles) {
   balls.radius_max = 0.6;
   balls.speed_max = 2.0;
   if (flags.obstacles > 0) s.obstacles = {balls};
-  s.air.wind.turbulence = "light";
+  s.air.wind.turbulence = Turbulence::kLight;
   return s;
 }
 

@@ -25,7 +25,7 @@ AngularPicture angular_picture(const LidarSettings& lidar) {
   double wide = 2.0 * kPi;
   double high = 0.5 * kPi;
   double low = -0.5 * kPi;
-  if (lidar.pattern == "grid") {
+  if (lidar.pattern == ScanPattern::kGrid) {
     wide = lidar.grid.fov_horizontal_deg * kDegree;
     high = 0.5 * lidar.grid.fov_vertical_deg * kDegree;
     low = -high;
@@ -78,7 +78,7 @@ std::vector<Vector3f> world_points(const Scan& scan, const PoseTrack& T_world_se
 }
 
 bool is_camera(const LidarSettings& lidar) {
-  return lidar.pattern == "grid" && lidar.grid.projection == "pinhole";
+  return lidar.pattern == ScanPattern::kGrid && lidar.grid.projection == GridProjection::kPinhole;
 }
 
 msg::Image depth_image_of(const Scan& scan, const LidarSettings& lidar) {

@@ -107,8 +107,8 @@ Scenario scenario_for(const Options& options, const SurfelMap& map, int seed, Ve
   balls.radius_max = 0.5;
   balls.speed = 0.3;
   balls.speed_max = 1.0;
-  balls.directions = "horizontal";
-  balls.at_border = "bounce";  // one that appears out of nothing is nobody's fault
+  balls.directions = FlightDirections::kHorizontal;
+  balls.at_border = AtBorder::kBounce;  // one that appears out of nothing is nobody's fault
   balls.bounds_min = {box.min.x(), box.min.y(), kLow};
   balls.bounds_max = {box.max.x(), box.max.y(), kHigh};
   if (options.obstacles > 0) s.obstacles = {balls};

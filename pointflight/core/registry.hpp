@@ -48,4 +48,34 @@ class Registry {
   std::deque<Row> rows_;
 };
 
+/// Throws InputError: "renderer 'foo' is unknown; one of: beam, paper".
+[[noreturn]] void throw_unknown(std::string_view what,
+                                std::string_view name,
+                                const std::vector<std::string_view>& names);
+
+/// A row of `Row::table()`, chosen by its name; the first one at first. `Row::kWhat` says what it
+/// is, for messages.
+template <class Row>
+class Choice {
+ public:
+  /// The first row.
+  Choice() : row_(&Row::table().rows().front()) {}
+  /// By name. Throws InputError that lists the names.
+  Choice(std::string_view name) : row_(Row::table().find(name)) {  // NOLINT: as good as its name
+    if (row_ == nullptr) throw_unknown(Row::kWhat, name, Row::table().names());
+  }
+  Choice(const char* name) : Choice(std::string_view(name)) {}         // NOLINT: the same
+  Choice(const std::string& name) : Choice(std::string_view(name)) {}  // NOLINT: the same
+
+  /// The row.
+  ///@{
+  const Row* operator->() const { return row_; }
+  const Row& operator*() const { return *row_; }
+  ///@}
+  friend bool operator==(const Choice&, const Choice&) = default;
+
+ private:
+  const Row* row_;
+};
+
 }  // namespace pointflight

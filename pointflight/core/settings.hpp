@@ -7,6 +7,7 @@
 #include <limits>
 #include <map>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -83,6 +84,22 @@ class SettingsVisitor {
     std::string name = value != nullptr ? value->name : std::string();
     choice(key, name, std::span<const std::string_view>(names));
     value = rows.find(name);
+  }
+  template <class Row>
+  void choice(const Key& key, Choice<Row>& value) {
+    const std::vector<std::string_view> names = Row::table().names();
+    std::string name = value->name;
+    choice(key, name, std::span<const std::string_view>(names));
+    value = name;
+  }
+  /// `none`: the word for none of them.
+  template <class Row>
+  void choice(const Key& key, std::optional<Choice<Row>>& value, std::string_view none) {
+    std::vector<std::string_view> names = {none};
+    for (const Row& row : Row::table().rows()) names.push_back(row.name);
+    std::string name(value ? (*value)->name : none);
+    choice(key, name, std::span<const std::string_view>(names));
+    value = name == none ? std::nullopt : std::optional<Choice<Row>>(name);
   }
 
   /// Calls `describe_items(visitor, section)` one level down.

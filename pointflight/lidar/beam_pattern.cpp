@@ -14,20 +14,20 @@ namespace pointflight {
 std::unique_ptr<BeamPattern> make_pattern(const LidarSettings& settings) {
   check_settings(settings, settings.path.empty() ? "lidar" : settings.path);
   struct Entry {
-    const char* name;
+    ScanPattern pattern;
     std::unique_ptr<BeamPattern> (*make)(const LidarSettings& settings);
   };
   constexpr Entry kPatterns[] = {
-      {"rotor", make_rotor_pattern},
-      {"prisms", make_prisms_pattern},
-      {"rings", make_rings_pattern},
-      {"grid", make_grid_pattern},
-      {"csv", make_csv_pattern},
+      {ScanPattern::kRotor, make_rotor_pattern},
+      {ScanPattern::kPrisms, make_prisms_pattern},
+      {ScanPattern::kRings, make_rings_pattern},
+      {ScanPattern::kGrid, make_grid_pattern},
+      {ScanPattern::kCsv, make_csv_pattern},
   };
   for (const Entry& entry : kPatterns) {
-    if (settings.pattern == entry.name) return entry.make(settings);
+    if (settings.pattern == entry.pattern) return entry.make(settings);
   }
-  throw InputError(fmt::format("{}: pattern '{}' is unknown", settings.path, settings.pattern));
+  throw InputError(fmt::format("{}: pattern: none is set", settings.path));
 }
 
 std::int64_t ShotTrain::first_at_or_after(SimTime time) const {

@@ -29,7 +29,8 @@ Lidar::Lidar(const LidarSettings& settings, std::uint32_t sensor)
     : settings_(settings),
       sensor_(sensor),
       pattern_(make_pattern(settings)),
-      measures_depth_(settings.pattern == "grid" && settings.grid.projection == "pinhole") {}
+      measures_depth_(settings.pattern == ScanPattern::kGrid &&
+                      settings.grid.projection == GridProjection::kPinhole) {}
 
 /// What a beam's range times this is what the sensor measures and its limits are of: depth along
 /// the axis for cameras, else the range itself.

@@ -12,9 +12,15 @@
 namespace pointflight {
 namespace {
 
-constexpr std::array<std::string_view, 5> kPatterns = {"rotor", "prisms", "rings", "grid", "csv"};
-constexpr std::array<std::string_view, 2> kConventions = {"velodyne", "ouster"};
-constexpr std::array<std::string_view, 2> kProjections = {"angular", "pinhole"};
+constexpr Named<ScanPattern> kPatterns[] = {{ScanPattern::kRotor, "rotor"},
+                                            {ScanPattern::kPrisms, "prisms"},
+                                            {ScanPattern::kRings, "rings"},
+                                            {ScanPattern::kGrid, "grid"},
+                                            {ScanPattern::kCsv, "csv"}};
+constexpr Named<RingConvention> kConventions[] = {{RingConvention::kVelodyne, "velodyne"},
+                                                  {RingConvention::kOuster, "ouster"}};
+constexpr Named<GridProjection> kProjections[] = {{GridProjection::kAngular, "angular"},
+                                                  {GridProjection::kPinhole, "pinhole"}};
 
 void describe_rotor(SettingsVisitor& v, RotorSettings& s) {
   v.value({"shot_rate", "Hz", "all lines fire together at this rate", 1, 1e7}, s.shot_rate);
@@ -70,13 +76,17 @@ void describe_rings(SettingsVisitor& v, RingsSettings& s) {
            s.convention,
            kConventions);
   describe_channels(v, s);
-  v.only_if(s.convention == "velodyne", "convention: velodyne", [&](SettingsVisitor& w) {
-    w.value({"cycle_us", "us", "between firings of one channel", 1, 1e6}, s.cycle_us);
-    w.value(
-        {"channel_interval_us", "us", "from channel to channel, without times in a table", 0, 1e5},
-        s.channel_interval_us);
-  });
-  v.only_if(s.convention == "ouster", "convention: ouster", [&](SettingsVisitor& w) {
+  v.only_if(
+      s.convention == RingConvention::kVelodyne, "convention: velodyne", [&](SettingsVisitor& w) {
+        w.value({"cycle_us", "us", "between firings of one channel", 1, 1e6}, s.cycle_us);
+        w.value({"channel_interval_us",
+                 "us",
+                 "from channel to channel, without times in a table",
+                 0,
+                 1e5},
+                s.channel_interval_us);
+      });
+  v.only_if(s.convention == RingConvention::kOuster, "convention: ouster", [&](SettingsVisitor& w) {
     w.value({"columns", "", "a turn", 1, 65536}, s.columns);
     w.value({"beam_origin_radius", "m", "of the beams' origin from the axis", 0, 1},
             s.beam_origin_radius);
@@ -88,16 +98,18 @@ void describe_grid(SettingsVisitor& v, GridSettings& s) {
   v.choice({"projection", "", "how rows and columns lie"}, s.projection, kProjections);
   v.value({"columns", "", "beams in a row", 1, 16384}, s.columns);
   v.value({"rows", "", "rows", 1, 16384}, s.rows);
-  v.only_if(s.projection == "angular", "projection: angular", [&](SettingsVisitor& w) {
-    w.value({"fov_horizontal_deg", "deg", "width", 0.001, 360}, s.fov_horizontal_deg);
-    w.value({"fov_vertical_deg", "deg", "height", 0.001, 180}, s.fov_vertical_deg);
-  });
-  v.only_if(s.projection == "pinhole", "projection: pinhole", [&](SettingsVisitor& w) {
-    w.value({"fx", "px", "focal length", 0, 1e6}, s.fx);
-    w.value({"fy", "px", "focal length", 0, 1e6}, s.fy);
-    w.value({"cx", "px", "principal point", -1e5, 1e5}, s.cx);
-    w.value({"cy", "px", "principal point", -1e5, 1e5}, s.cy);
-  });
+  v.only_if(
+      s.projection == GridProjection::kAngular, "projection: angular", [&](SettingsVisitor& w) {
+        w.value({"fov_horizontal_deg", "deg", "width", 0.001, 360}, s.fov_horizontal_deg);
+        w.value({"fov_vertical_deg", "deg", "height", 0.001, 180}, s.fov_vertical_deg);
+      });
+  v.only_if(
+      s.projection == GridProjection::kPinhole, "projection: pinhole", [&](SettingsVisitor& w) {
+        w.value({"fx", "px", "focal length", 0, 1e6}, s.fx);
+        w.value({"fy", "px", "focal length", 0, 1e6}, s.fy);
+        w.value({"cx", "px", "principal point", -1e5, 1e5}, s.cx);
+        w.value({"cy", "px", "principal point", -1e5, 1e5}, s.cy);
+      });
 }
 
 void describe_csv(SettingsVisitor& v, CsvSettings& s) {
@@ -160,18 +172,19 @@ void check_channels(const RingsSettings& s, const Fail& fail) {
 
 /// What a scan has at least; a table may have more channels than one.
 double beams_a_scan(const LidarSettings& s) {
-  if (s.pattern == "rotor") {
+  if (s.pattern == ScanPattern::kRotor) {
     return s.rotor.shot_rate / s.rate * static_cast<double>(s.rotor.line_angles_deg.size());
   }
-  if (s.pattern == "prisms") {
+  if (s.pattern == ScanPattern::kPrisms) {
     return s.prisms.shot_rate / s.rate * static_cast<double>(s.prisms.line_heights.size());
   }
-  if (s.pattern == "csv") return s.csv.points_per_second / s.rate;
-  if (s.pattern == "grid") return static_cast<double>(s.grid.columns * s.grid.rows);
+  if (s.pattern == ScanPattern::kCsv) return s.csv.points_per_second / s.rate;
+  if (s.pattern == ScanPattern::kGrid) return static_cast<double>(s.grid.columns * s.grid.rows);
   const double listed =
       static_cast<double>(s.rings.elevations_deg.size()) + static_cast<double>(s.rings.channels);
-  const double firings = s.rings.convention == "ouster" ? static_cast<double>(s.rings.columns)
-                                                        : 1e6 / s.rings.cycle_us / s.rate;
+  const double firings = s.rings.convention == RingConvention::kOuster
+                             ? static_cast<double>(s.rings.columns)
+                             : 1e6 / s.rings.cycle_us / s.rate;
   return firings * std::max(1.0, listed);
 }
 
@@ -189,21 +202,21 @@ LidarSettings read(SettingsReader& reader, const std::string& path) {
          fmt::format("{} m is not below range_max {} m", settings.range_min, settings.range_max));
   }
   const GridSettings& grid = settings.grid;
-  if (settings.pattern == "rotor" && settings.rotor.line_angles_deg.empty()) {
+  if (settings.pattern == ScanPattern::kRotor && settings.rotor.line_angles_deg.empty()) {
     fail("rotor.line_angles_deg", "no lines; at least one is needed");
-  } else if (settings.pattern == "prisms" && settings.prisms.line_heights.empty()) {
+  } else if (settings.pattern == ScanPattern::kPrisms && settings.prisms.line_heights.empty()) {
     fail("prisms.line_heights", "no lines; at least one is needed");
-  } else if (settings.pattern == "rings") {
+  } else if (settings.pattern == ScanPattern::kRings) {
     check_channels(settings.rings, fail);
-  } else if (settings.pattern == "csv" && settings.csv.file.empty()) {
+  } else if (settings.pattern == ScanPattern::kCsv && settings.csv.file.empty()) {
     fail("csv.file", "missing; name the CSV of directions");
-  } else if (settings.pattern == "grid") {
-    if (grid.projection == "pinhole" && (grid.fx <= 0.0 || grid.fy <= 0.0)) {
+  } else if (settings.pattern == ScanPattern::kGrid) {
+    if (grid.projection == GridProjection::kPinhole && (grid.fx <= 0.0 || grid.fy <= 0.0)) {
       fail("grid.projection", "pinhole needs fx and fy");
     }
   }
   if (const double beams = beams_a_scan(settings); beams > kMostBeams) {
-    fail(settings.pattern == "grid" ? "grid.columns" : "rate",
+    fail(settings.pattern == ScanPattern::kGrid ? "grid.columns" : "rate",
          fmt::format("{:.0f} beams a scan; {:.0f} at most", beams, kMostBeams));
   }
   return settings;
@@ -233,26 +246,30 @@ void describe(SettingsVisitor& v, LidarSettings& s) {
   Key pattern{"pattern", "", "scan principle; its figures stand in the section of this name"};
   pattern.required = true;
   v.choice(pattern, s.pattern, kPatterns);
-  v.only_if(s.pattern == "rotor", "pattern: rotor", [&](SettingsVisitor& u) {
+  v.only_if(s.pattern == ScanPattern::kRotor, "pattern: rotor", [&](SettingsVisitor& u) {
     u.section({"rotor", "", "prism, mirror and wedge on one shaft (Mid-360)"},
               [&](SettingsVisitor& w) { describe_rotor(w, s.rotor); });
   });
-  v.only_if(s.pattern == "prisms", "pattern: prisms", [&](SettingsVisitor& u) {
+  v.only_if(s.pattern == ScanPattern::kPrisms, "pattern: prisms", [&](SettingsVisitor& u) {
     u.section({"prisms", "", "refracting wedges on one axis (Avia, Mid-40, Mid-70)"},
               [&](SettingsVisitor& w) { describe_prisms(w, s.prisms); });
   });
-  v.only_if(s.pattern == "rings", "pattern: rings", [&](SettingsVisitor& u) {
+  v.only_if(s.pattern == ScanPattern::kRings, "pattern: rings", [&](SettingsVisitor& u) {
     u.section({"rings", "", "spinning channels (Velodyne, Ouster)"},
               [&](SettingsVisitor& w) { describe_rings(w, s.rings); });
   });
-  v.only_if(s.pattern == "grid", "pattern: grid", [&](SettingsVisitor& u) {
+  v.only_if(s.pattern == ScanPattern::kGrid, "pattern: grid", [&](SettingsVisitor& u) {
     u.section({"grid", "", "depth camera or dense angular grid"},
               [&](SettingsVisitor& w) { describe_grid(w, s.grid); });
   });
-  v.only_if(s.pattern == "csv", "pattern: csv", [&](SettingsVisitor& u) {
+  v.only_if(s.pattern == ScanPattern::kCsv, "pattern: csv", [&](SettingsVisitor& u) {
     u.section({"csv", "", "a table of directions of your own"},
               [&](SettingsVisitor& w) { describe_csv(w, s.csv); });
   });
+}
+
+std::string_view to_string(ScanPattern pattern) {
+  return name_in(kPatterns, pattern);
 }
 
 std::string lidar_reference() {

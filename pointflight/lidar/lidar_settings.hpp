@@ -10,6 +10,28 @@
 
 namespace pointflight {
 
+/// Scan principles: which section of a sensor file counts.
+enum class ScanPattern {
+  kUnset,   ///< None yet: files must name one.
+  kRotor,   ///< Livox Mid-360.
+  kPrisms,  ///< Livox Avia, Mid-40, Mid-70.
+  kRings,   ///< Spinning LiDARs.
+  kGrid,    ///< Depth cameras, angular grids.
+  kCsv,     ///< A table of directions.
+};
+
+/// How the channels of a spinning LiDAR fire and what its angles mean.
+enum class RingConvention {
+  kVelodyne,  ///< One after the other.
+  kOuster,    ///< All at once, in columns.
+};
+
+/// How the beams of a grid lie.
+enum class GridProjection {
+  kAngular,  ///< Evenly in azimuth and elevation.
+  kPinhole,  ///< As pixels; x right, y down.
+};
+
 /// Livox Mid-360: a rotating prism and mirror behind a slower wedge.
 struct RotorSettings {
   double shot_rate = 50000.0;        ///< Hz; all lines fire together.
@@ -52,7 +74,7 @@ struct RingsSettings {
   std::int64_t channels = 0;                ///< Instead of both: so many, from the lowest up.
   double elevation_min_deg = -15.0;         ///< Of evenly spaced channels: the lowest.
   double elevation_max_deg = 15.0;          ///< The highest.
-  std::string convention = "velodyne";      ///< Of the angles: "velodyne" or "ouster".
+  RingConvention convention = RingConvention::kVelodyne;
   double cycle_us = 55.296;          ///< velodyne: from one firing of all channels to the next.
   double channel_interval_us = 0.0;  ///< velodyne: between channels, where the table has no times.
   std::int64_t columns = 1024;       ///< ouster: a turn.
@@ -62,15 +84,15 @@ struct RingsSettings {
 
 /// Depth cameras and dense angular grids: all beams at the scan's start.
 struct GridSettings {
-  std::string projection = "angular";  ///< "angular" or "pinhole" (x right, y down).
-  std::int64_t columns = 385;          ///< Beams in a row.
-  std::int64_t rows = 350;             ///< Rows.
-  double fov_horizontal_deg = 77.0;    ///< angular: beams at the centres of the grid's cells.
-  double fov_vertical_deg = 70.0;      ///< angular: as above.
-  double fx = 0.0;                     ///< pinhole: pixels.
-  double fy = 0.0;                     ///< pinhole: focal length along the rows' axis, pixels.
-  double cx = 0.0;                     ///< pinhole: principal point, pixels.
-  double cy = 0.0;                     ///< pinhole: principal point, pixels.
+  GridProjection projection = GridProjection::kAngular;
+  std::int64_t columns = 385;        ///< Beams in a row.
+  std::int64_t rows = 350;           ///< Rows.
+  double fov_horizontal_deg = 77.0;  ///< angular: beams at the centres of the grid's cells.
+  double fov_vertical_deg = 70.0;    ///< angular: as above.
+  double fx = 0.0;                   ///< pinhole: pixels.
+  double fy = 0.0;                   ///< pinhole: focal length along the rows' axis, pixels.
+  double cx = 0.0;                   ///< pinhole: principal point, pixels.
+  double cy = 0.0;                   ///< pinhole: principal point, pixels.
 };
 
 /// A user's own table of directions, replayed in a loop.
@@ -108,13 +130,13 @@ struct LidarSettings {
   double image_resolution_deg = 0.2;  ///< theta_res of the `paper` renderer.
   RangeNoiseSettings noise;           ///< Of every return.
   OpticsSettings optics;              ///< For models to come.
-  std::string pattern;                ///< Which of the sections below counts: "rotor", ...
-  RotorSettings rotor;                ///< Where `pattern` says so.
-  PrismsSettings prisms;              ///< Where `pattern` says so.
-  RingsSettings rings;                ///< Where `pattern` says so.
-  GridSettings grid;                  ///< Where `pattern` says so.
-  CsvSettings csv;                    ///< Where `pattern` says so.
-  std::map<std::string, int> lines;   ///< Of each key in the file, for messages.
+  ScanPattern pattern = ScanPattern::kUnset;  ///< Which of the sections below counts.
+  RotorSettings rotor;                        ///< Where `pattern` says so.
+  PrismsSettings prisms;                      ///< Where `pattern` says so.
+  RingsSettings rings;                        ///< Where `pattern` says so.
+  GridSettings grid;                          ///< Where `pattern` says so.
+  CsvSettings csv;                            ///< Where `pattern` says so.
+  std::map<std::string, int> lines;           ///< Of each key in the file, for messages.
 
   /// "mid360.yaml:12" for a key, or the path where the key is not in the file.
   [[nodiscard]] std::string place(const std::string& key) const;
@@ -125,6 +147,9 @@ struct LidarSettings {
     return at_key(place(key), key, action);
   }
 };
+
+/// As files have it: "rotor", ...
+std::string_view to_string(ScanPattern pattern);
 
 /// The one list of keys of a sensor file.
 void describe(SettingsVisitor& visitor, LidarSettings& settings);

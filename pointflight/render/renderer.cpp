@@ -1,38 +1,31 @@
 #include "pointflight/render/renderer.hpp"
 
-#include <fmt/format.h>
-#include <fmt/ranges.h>
-
 #include <algorithm>
 #include <cassert>
 #include <cmath>
 #include <variant>
 
 #include "pointflight/core/argument.hpp"
-#include "pointflight/core/input_error.hpp"
 #include "pointflight/render/beam_renderer.hpp"
 #include "pointflight/render/paper_renderer.hpp"
 
 namespace pointflight {
-namespace {
 
-struct Entry {
-  const char* name;
-  std::unique_ptr<Renderer> (*make)(const Scene& scene);
-};
-
-constexpr Entry kRenderers[] = {
-    {"beam",
-     [](const Scene& scene) -> std::unique_ptr<Renderer> {
-       return std::make_unique<BeamRenderer>(scene);
-     }},
-    {"paper",
-     [](const Scene& scene) -> std::unique_ptr<Renderer> {
-       return std::make_unique<PaperRenderer>(scene, PaperOptions{});
-     }},
-};
-
-}  // namespace
+Registry<RendererKind>& RendererKind::table() {
+  static Registry<RendererKind> table = {
+      {.name = "beam",
+       .help = "each ray by itself, through surfels",
+       .make = [](const Scene& scene) { return std::make_unique<BeamRenderer>(scene); },
+       .one_pose = false},
+      {.name = "paper",
+       .help = "the MARSIM paper's image of points",
+       .make =
+           [](const Scene& scene) {
+             return std::make_unique<PaperRenderer>(scene, PaperOptions{});
+           },
+       .one_pose = true}};
+  return table;
+}
 
 void Renderer::check(const RayBatch& batch, std::span<const Hit> hits) {
   require_argument(hits.size() == batch.rays.size(), "render: as many hits as rays are wanted");
@@ -65,18 +58,8 @@ Hit Renderer::trace(const Ray& ray) const {
   return hit;
 }
 
-std::vector<std::string> renderer_names() {
-  std::vector<std::string> names;
-  for (const Entry& entry : kRenderers) names.emplace_back(entry.name);
-  return names;
-}
-
 std::unique_ptr<Renderer> make_renderer(const std::string& name, const Scene& scene) {
-  for (const Entry& entry : kRenderers) {
-    if (name == entry.name) return entry.make(scene);  // which refuses a scene without a map
-  }
-  throw InputError(
-      fmt::format("renderer '{}' is unknown; one of: {}", name, fmt::join(renderer_names(), ", ")));
+  return Choice<RendererKind>(name)->make(scene);  // which refuses a scene without a map
 }
 
 }  // namespace pointflight

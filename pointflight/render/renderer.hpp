@@ -1,12 +1,14 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "pointflight/core/parallel.hpp"
+#include "pointflight/core/registry.hpp"
 #include "pointflight/geometry/types.hpp"
 #include "pointflight/map/scene.hpp"
 #include "pointflight/map/surfel_map.hpp"
@@ -54,8 +56,9 @@ struct Hit {
 
 /// Turns rays into hits. Results do not depend on the executor's threads.
 ///
-/// To add one: derive, write its file in render/, add one line to the table in renderer.cpp and a
-/// test that compares it with `beam` on the scenes of tests/render.
+/// To add one: derive, write its file in render/, add one row to the table in renderer.cpp and a
+/// test that compares it with `beam` on the scenes of tests/render. Programs add rows of their own:
+/// `RendererKind::table().add(...)`.
 class Renderer {
  public:
   virtual ~Renderer() = default;
@@ -78,11 +81,21 @@ class Renderer {
   static void check(const RayBatch& batch, std::span<const Hit> hits);
 };
 
+/// A row of the table of renderers.
+struct RendererKind {
+  static constexpr const char* kWhat = "renderer";  ///< In messages.
+  /// "beam", the first, and "paper"; programs may add their own before scenarios are read.
+  static Registry<RendererKind>& table();
+
+  std::string name;  ///< In scenarios and flags.
+  std::string help;  ///< Half a sentence.
+  /// Of a scene. May throw InputError.
+  std::function<std::unique_ptr<Renderer>(const Scene& scene)> make;
+  bool one_pose = false;  ///< All rays of a scan leave from one pose: `Renderer::is_snapshot`.
+};
+
 /// Makes a renderer by name ("beam", "paper") for a scene. Throws InputError that lists the names,
 /// and std::invalid_argument where the scene has no map.
 std::unique_ptr<Renderer> make_renderer(const std::string& name, const Scene& scene);
-
-/// Names of the renderers.
-std::vector<std::string> renderer_names();
 
 }  // namespace pointflight

@@ -14,20 +14,20 @@
 namespace pointflight {
 namespace {
 
-constexpr std::array<std::string_view, 14> kKinds = {"rotor_speeds",
-                                                     "body_rates",
-                                                     "attitude",
-                                                     "acceleration",
-                                                     "velocity",
-                                                     "position",
-                                                     "polynomial",
-                                                     "b_spline",
-                                                     "waypoint",
-                                                     "take_off",
-                                                     "land",
-                                                     "hover",
-                                                     "arm",
-                                                     "disarm"};
+constexpr Named<CommandKind> kKinds[] = {{CommandKind::kRotorSpeeds, "rotor_speeds"},
+                                         {CommandKind::kBodyRates, "body_rates"},
+                                         {CommandKind::kAttitude, "attitude"},
+                                         {CommandKind::kAcceleration, "acceleration"},
+                                         {CommandKind::kVelocity, "velocity"},
+                                         {CommandKind::kPosition, "position"},
+                                         {CommandKind::kPolynomial, "polynomial"},
+                                         {CommandKind::kBSpline, "b_spline"},
+                                         {CommandKind::kWaypoint, "waypoint"},
+                                         {CommandKind::kTakeOff, "take_off"},
+                                         {CommandKind::kLand, "land"},
+                                         {CommandKind::kHover, "hover"},
+                                         {CommandKind::kArm, "arm"},
+                                         {CommandKind::kDisarm, "disarm"}};
 constexpr double kFar = kFarthest;
 
 }  // namespace
@@ -36,12 +36,15 @@ void describe(SettingsVisitor& v, CommandSettings& s) {
   v.value({"time", "s", "when it is given", 0, 1e6}, s.time);
   v.choice({"kind", "", "what is commanded"}, s.kind, kKinds);
   // the keys of each kind
-  const auto for_kinds = [&](std::initializer_list<std::string_view> kinds, const auto& keys) {
+  const auto for_kinds = [&](std::initializer_list<CommandKind> kinds, const auto& keys) {
     const bool holds = std::find(kinds.begin(), kinds.end(), s.kind) != kinds.end();
-    v.only_if(holds, fmt::format("kind: {}", fmt::join(kinds, ", ")), keys);
+    std::vector<std::string_view> names;
+    for (const CommandKind kind : kinds) names.push_back(name_in(kKinds, kind));
+    v.only_if(holds, fmt::format("kind: {}", fmt::join(names, ", ")), keys);
   };
-  const bool has_vector = s.kind == "acceleration" || s.kind == "velocity" ||
-                          s.kind == "position" || s.kind == "waypoint";
+  const bool has_vector = s.kind == CommandKind::kAcceleration ||
+                          s.kind == CommandKind::kVelocity || s.kind == CommandKind::kPosition ||
+                          s.kind == CommandKind::kWaypoint;
   v.only_if(
       has_vector,
       "kind: acceleration, velocity, position, waypoint; body_rates has rates_deg",
@@ -50,35 +53,36 @@ void describe(SettingsVisitor& v, CommandSettings& s) {
             {"vector", "", "acceleration m/s^2, velocity m/s, position or waypoint m", -kFar, kFar},
             s.vector);
       });
-  for_kinds({"body_rates"}, [&](SettingsVisitor& w) {
+  for_kinds({CommandKind::kBodyRates}, [&](SettingsVisitor& w) {
     w.value({"rates_deg", "deg/s", "about the body's axes", -36000, 36000}, s.rates_deg);
   });
-  for_kinds({"position"}, [&](SettingsVisitor& w) {
+  for_kinds({CommandKind::kPosition}, [&](SettingsVisitor& w) {
     w.value({"feed_forward", "m/s", "velocity of the command", -100, 100}, s.feed_forward);
   });
-  for_kinds({"attitude"}, [&](SettingsVisitor& w) {
+  for_kinds({CommandKind::kAttitude}, [&](SettingsVisitor& w) {
     w.value({"rpy_deg", "deg", "the attitude", -360, 360}, s.rpy_deg);
   });
-  for_kinds({"acceleration", "velocity", "position"}, [&](SettingsVisitor& w) {
-    w.value({"yaw_deg", "deg", "heading", -360, 360}, s.yaw_deg);
-    w.value({"yaw_rate_deg", "deg/s", "feed-forward", -720, 720}, s.yaw_rate_deg);
-  });
-  for_kinds({"body_rates", "attitude"}, [&](SettingsVisitor& w) {
+  for_kinds({CommandKind::kAcceleration, CommandKind::kVelocity, CommandKind::kPosition},
+            [&](SettingsVisitor& w) {
+              w.value({"yaw_deg", "deg", "heading", -360, 360}, s.yaw_deg);
+              w.value({"yaw_rate_deg", "deg/s", "feed-forward", -720, 720}, s.yaw_rate_deg);
+            });
+  for_kinds({CommandKind::kBodyRates, CommandKind::kAttitude}, [&](SettingsVisitor& w) {
     w.value({"thrust", "N", "0: the weight", 0, 1e5}, s.thrust);
   });
-  for_kinds({"rotor_speeds"}, [&](SettingsVisitor& w) {
+  for_kinds({CommandKind::kRotorSpeeds}, [&](SettingsVisitor& w) {
     w.value({"rotors", "rad/s", "of each", 0, 1e5}, s.rotors);
   });
-  for_kinds({"take_off"}, [&](SettingsVisitor& w) {
+  for_kinds({CommandKind::kTakeOff}, [&](SettingsVisitor& w) {
     w.value({"height", "m", "to rise by", 0.01, 1e4}, s.height);
   });
-  for_kinds({"take_off", "land"}, [&](SettingsVisitor& w) {
+  for_kinds({CommandKind::kTakeOff, CommandKind::kLand}, [&](SettingsVisitor& w) {
     w.value({"speed", "m/s", "up or down", 0.01, 20}, s.speed);
   });
-  for_kinds({"polynomial", "b_spline"}, [&](SettingsVisitor& w) {
+  for_kinds({CommandKind::kPolynomial, CommandKind::kBSpline}, [&](SettingsVisitor& w) {
     w.value({"file", "", "CSV of a polynomial or of a B-spline's control points"}, s.file);
   });
-  for_kinds({"b_spline"}, [&](SettingsVisitor& w) {
+  for_kinds({CommandKind::kBSpline}, [&](SettingsVisitor& w) {
     w.value({"degree", "", "of the B-spline", 1, 7}, s.degree);
     w.value({"interval", "s", "between the B-spline's knots", 0.001, 1000}, s.interval);
   });
@@ -91,16 +95,16 @@ Command command_of(const CommandSettings& s,
   const double yaw = s.yaw_deg * kDegree;
   const double yaw_rate = s.yaw_rate_deg * kDegree;
   const double thrust = s.thrust > 0.0 ? s.thrust : vehicle.mass * kGravity;
-  if (s.kind == "rotor_speeds") return RotorSpeedCommand{s.rotors};
-  if (s.kind == "body_rates") return BodyRateCommand{s.rates_deg * kDegree, thrust};
-  if (s.kind == "attitude") {
+  if (s.kind == CommandKind::kRotorSpeeds) return RotorSpeedCommand{s.rotors};
+  if (s.kind == CommandKind::kBodyRates) return BodyRateCommand{s.rates_deg * kDegree, thrust};
+  if (s.kind == CommandKind::kAttitude) {
     const Vector3d rpy = s.rpy_deg * kDegree;
     return AttitudeCommand{
         quaternion_from_rpy(rpy.x(), rpy.y(), rpy.z()), thrust, Vector3d::Zero()};
   }
-  if (s.kind == "acceleration") return AccelerationCommand{s.vector, yaw, yaw_rate};
-  if (s.kind == "velocity") return VelocityCommand{s.vector, yaw, yaw_rate};
-  if (s.kind == "position") {
+  if (s.kind == CommandKind::kAcceleration) return AccelerationCommand{s.vector, yaw, yaw_rate};
+  if (s.kind == CommandKind::kVelocity) return VelocityCommand{s.vector, yaw, yaw_rate};
+  if (s.kind == CommandKind::kPosition) {
     PositionCommand command;
     command.p_world = s.vector;
     command.v_world = s.feed_forward;
@@ -108,23 +112,23 @@ Command command_of(const CommandSettings& s,
     command.yaw_rate = yaw_rate;
     return command;
   }
-  if (s.kind == "polynomial") {
+  if (s.kind == CommandKind::kPolynomial) {
     return TrajectoryCommand{PolynomialTrajectory::read(resolve_path(s.file, folder))};
   }
-  if (s.kind == "b_spline") {
+  if (s.kind == CommandKind::kBSpline) {
     return TrajectoryCommand{BSplineTrajectory::read(
         resolve_path(s.file, folder), static_cast<int>(s.degree), s.interval)};
   }
-  if (s.kind == "waypoint") {
+  if (s.kind == CommandKind::kWaypoint) {
     MissionSettings mission;
     mission.motion = motion;
     mission.waypoints = {s.vector};
     return WaypointCommand{mission};
   }
-  if (s.kind == "take_off") return TakeOffCommand{s.height, s.speed};
-  if (s.kind == "land") return LandCommand{s.speed};
-  if (s.kind == "arm") return ArmCommand{};
-  if (s.kind == "disarm") return DisarmCommand{};
+  if (s.kind == CommandKind::kTakeOff) return TakeOffCommand{s.height, s.speed};
+  if (s.kind == CommandKind::kLand) return LandCommand{s.speed};
+  if (s.kind == CommandKind::kArm) return ArmCommand{};
+  if (s.kind == CommandKind::kDisarm) return DisarmCommand{};
   return HoverCommand{};
 }
 

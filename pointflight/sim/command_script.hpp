@@ -13,11 +13,29 @@ namespace pointflight {
 /// Coordinates of a scenario are no larger, m: those of a UTM zone fit.
 inline constexpr double kFarthest = 1e7;
 
+/// What a line of a scenario commands: `name_of`, and two kinds of trajectories.
+enum class CommandKind {
+  kRotorSpeeds,   ///< `rotors`
+  kBodyRates,     ///< `rates_deg`, `thrust`
+  kAttitude,      ///< `rpy_deg`, `thrust`
+  kAcceleration,  ///< `vector`, heading
+  kVelocity,      ///< `vector`, heading
+  kPosition,      ///< `vector`, `feed_forward`, heading
+  kPolynomial,    ///< A trajectory of `file`.
+  kBSpline,       ///< A trajectory of the control points in `file`.
+  kWaypoint,      ///< `vector`
+  kTakeOff,       ///< `height`, `speed`
+  kLand,          ///< `speed`
+  kHover,         ///< Stays where it is.
+  kArm,           ///< Rotors may turn.
+  kDisarm,        ///< Rotors off.
+};
+
 /// One line of a scenario's `commands`: what a vehicle is told, and when. Levels that must be
 /// repeated are, until the next one.
 struct CommandSettings {
-  double time = 0.0;           ///< s
-  std::string kind = "hover";  ///< `name_of`, with "polynomial" and "b_spline" for trajectories
+  double time = 0.0;  ///< s
+  CommandKind kind = CommandKind::kHover;
   Vector3d vector = Vector3d::Zero();        ///< Acceleration, velocity or position.
   Vector3d rates_deg = Vector3d::Zero();     ///< Of body rates, deg/s.
   Vector3d feed_forward = Vector3d::Zero();  ///< Velocity of a position command, m/s.

@@ -10,16 +10,38 @@
 
 namespace pointflight {
 
+/// What can go wrong.
+enum class FaultKind {
+  kRotor,          ///< It has a share of its speed left.
+  kLidar,          ///< It gives nothing.
+  kImu,            ///< An axis repeats its last value.
+  kOdometryDelay,  ///< Odometry arrives late.
+  kScanDrop,       ///< A share of the scans is lost.
+};
+
+/// An axis of an IMU, in this order.
+enum class ImuAxis {
+  kGyroX,
+  kGyroY,
+  kGyroZ,
+  kAccelX,
+  kAccelY,
+  kAccelZ,
+};
+
 /// One thing that goes wrong on a vehicle for a time.
 struct FaultSettings {
-  std::string kind = "rotor";   ///< or "lidar", "imu", "odometry_delay", "scan_drop"
-  double from = 0.0;            ///< s
-  double until = 0.0;           ///< s; 0: for good
-  std::int64_t index = 0;       ///< Rotor or lidar.
-  std::string axis = "gyro_x";  ///< Of an IMU that is stuck.
+  FaultKind kind = FaultKind::kRotor;
+  double from = 0.0;               ///< s
+  double until = 0.0;              ///< s; 0: for good
+  std::int64_t index = 0;          ///< Rotor or lidar.
+  ImuAxis axis = ImuAxis::kGyroX;  ///< Of an IMU that is stuck.
   /// rotor: share of its commanded speed that is left; odometry_delay: s; scan_drop: share lost.
   double value = 0.0;
 };
+
+/// As files have it: "rotor", ...
+std::string_view to_string(FaultKind kind);
 
 /// The keys of one entry of `faults`.
 void describe(SettingsVisitor& visitor, FaultSettings& settings);

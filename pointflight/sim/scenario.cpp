@@ -11,11 +11,14 @@
 namespace pointflight {
 namespace {
 
-constexpr std::array<std::string_view, 2> kRenderers = {"beam", "paper"};
-constexpr std::array<std::string_view, 3> kReactions = {"report", "stop", "crash"};
-constexpr std::array<std::string_view, 3> kLowBattery = {"land", "fall", "report"};
-constexpr std::array<std::string_view, 3> kControllers = {"vehicle", "cascade", "geometric"};
-constexpr std::array<std::string_view, 2> kYawModes = {"along_path", "fixed"};
+constexpr Named<CollisionReaction> kReactions[] = {{CollisionReaction::kReport, "report"},
+                                                   {CollisionReaction::kStop, "stop"},
+                                                   {CollisionReaction::kCrash, "crash"}};
+constexpr Named<LowBatteryReaction> kLowBattery[] = {{LowBatteryReaction::kLand, "land"},
+                                                     {LowBatteryReaction::kFall, "fall"},
+                                                     {LowBatteryReaction::kReport, "report"}};
+constexpr Named<YawMode> kYawModes[] = {{YawMode::kAlongPath, "along_path"},
+                                        {YawMode::kFixed, "fixed"}};
 constexpr double kFar = kFarthest;
 
 Key required(Key key) {
@@ -28,8 +31,8 @@ void describe_lidar(SettingsVisitor& v, LidarMount& s) {
   v.value({"position", "m", "in the body frame", -10, 10}, s.position);
   v.value({"rotation_rpy_deg", "deg", "roll, pitch, yaw of its axes in the body", -360, 360},
           s.rotation_rpy_deg);
-  v.choice({"renderer", "", "how points are made"}, s.renderer, kRenderers);
-  v.only_if(s.renderer != "paper", "renderer: beam", [&](SettingsVisitor& w) {
+  v.choice({"renderer", "", "how points are made"}, s.renderer);
+  v.only_if(!s.renderer->one_pose, "renderer: beam", [&](SettingsVisitor& w) {
     w.value({"snapshot", "", "all beams of a scan from one pose, as the paper's always"},
             s.snapshot);
   });
@@ -68,7 +71,7 @@ void describe_airframe(SettingsVisitor& v, VehicleSetup& s) {
   v.choice({"on_collision", "", "go on, end the run, or fall with rotors off"},
            s.on_collision,
            kReactions);
-  v.choice({"controller", "", "vehicle: the one of its file"}, s.controller, kControllers);
+  v.choice({"controller", "", "vehicle: the one of its file"}, s.controller, "vehicle");
   v.value({"command_timeout", "s", "hover without a command for so long; 0: never", 0, 3600},
           s.command_timeout);
   v.value({"battery", "", "fly on the vehicle's battery"}, s.battery);
@@ -170,7 +173,8 @@ std::vector<VehicleSetup> Scenario::fleet() const {
       one.start += offset;
       for (Vector3d& waypoint : one.mission.waypoints) waypoint += offset;
       for (CommandSettings& command : one.commands) {
-        if (command.kind == "position" || command.kind == "waypoint") command.vector += offset;
+        if (command.kind == CommandKind::kPosition || command.kind == CommandKind::kWaypoint)
+          command.vector += offset;
       }
       if (one.name.empty()) {
         one.name = fmt::format("drone{}", fleet.size() - 1);

@@ -25,7 +25,7 @@ struct LidarMount {
   std::string model = "mid360";                  ///< Name or path of a sensor file.
   Vector3d position = Vector3d(0.0, 0.0, 0.1);   ///< m, body frame.
   Vector3d rotation_rpy_deg = Vector3d::Zero();  ///< Of the sensor's axes in the body.
-  std::string renderer = "beam";                 ///< "beam" or "paper": `renderer_names`.
+  Choice<RendererKind> renderer{};               ///< "beam", "paper" or an own one.
   bool snapshot = false;                         ///< One pose a scan, as in the paper.
   bool noise = true;                             ///< Range noise of the sensor file.
 };
@@ -39,6 +39,20 @@ struct LimitSetup {
   double body_rate_max = 0.0;           ///< rad/s
 };
 
+/// What a vehicle does that met something.
+enum class CollisionReaction {
+  kReport,  ///< Flies on; it is said.
+  kStop,    ///< Ends the run.
+  kCrash,   ///< Falls, rotors off.
+};
+
+/// What a vehicle does at its battery's reserve.
+enum class LowBatteryReaction {
+  kLand,    ///< Lands and takes no more commands.
+  kFall,    ///< Its rotors stop.
+  kReport,  ///< Flies on until it is empty.
+};
+
 /// One vehicle, or several alike.
 struct VehicleSetup {
   std::string name;                   ///< Of its files and topics; empty: "drone<number>".
@@ -48,14 +62,14 @@ struct VehicleSetup {
   bool landed = false;                ///< Starts with rotors off, carried by the ground.
   std::int64_t copies = 1;            ///< So many alike, each with its own number.
   Vector3d copy_offset =
-      Vector3d(0.0, 2.0, 0.0);          ///< Of start and waypoints, from copy to copy, m.
-  std::int64_t seed = -1;               ///< Of its sensors and gusts; -1: the run's.
-  std::string on_collision = "report";  ///< or "stop", "crash"
-  std::string controller = "vehicle";   ///< As its file says; or "cascade", ...
-  double command_timeout = 0.5;         ///< s; 0: commands hold for ever.
-  bool battery = false;                 ///< Fly on the vehicle's battery.
-  std::string on_low_battery = "land";  ///< At its reserve; or "fall", "report".
-  LimitSetup limits;                    ///< Tightened or widened for this vehicle.
+      Vector3d(0.0, 2.0, 0.0);  ///< Of start and waypoints, from copy to copy, m.
+  std::int64_t seed = -1;       ///< Of its sensors and gusts; -1: the run's.
+  CollisionReaction on_collision = CollisionReaction::kReport;
+  std::optional<Choice<ControllerKind>> controller;               ///< Instead of its file's.
+  double command_timeout = 0.5;                                   ///< s; 0: commands hold for ever.
+  bool battery = false;                                           ///< Fly on the vehicle's battery.
+  LowBatteryReaction on_low_battery = LowBatteryReaction::kLand;  ///< At its reserve.
+  LimitSetup limits;                                ///< Tightened or widened for this vehicle.
   std::vector<LidarMount> lidars = {LidarMount{}};  ///< One is mounted where the file says nothing.
   std::vector<SensorSetup> sensors;                 ///< Besides LiDARs, odometry and IMU.
   MissionSettings mission;                          ///< Without waypoints it hovers at its start.

@@ -61,10 +61,10 @@ Simulation::Simulation(const Scenario& scenario,
   setup->step = from_seconds(scenario.physics_step);
   setup->obstacle_schedule = Schedule(scenario.output.obstacle_rate);
 
-  std::map<std::string, std::shared_ptr<const Renderer>> renderers;
-  const RendererByName renderer = [&](const std::string& name) {
-    auto& made = renderers[name];
-    if (!made) made = make_renderer(name, Scene{setup->map});
+  std::map<const RendererKind*, std::shared_ptr<const Renderer>> renderers;
+  const RendererByKind renderer = [&](const Choice<RendererKind>& kind) {
+    auto& made = renderers[&*kind];
+    if (!made) made = kind->make(Scene{setup->map});
     return made;
   };
   const auto fleet = scenario.fleet();
@@ -271,8 +271,8 @@ bool Simulation::react(std::vector<StepSamples>& samples) {
     for (const CollisionEvent& event : samples[i].collisions) {
       if (!event.entered) continue;
       ++status.summary.collisions;
-      if (agent.setup().on_collision == "stop") stops = true;
-      if (agent.setup().on_collision == "crash") agent.crash(status);
+      if (agent.setup().on_collision == CollisionReaction::kStop) stops = true;
+      if (agent.setup().on_collision == CollisionReaction::kCrash) agent.crash(status);
     }
   }
   return stops;

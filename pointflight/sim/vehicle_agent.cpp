@@ -34,7 +34,7 @@ VehicleSettings settings_of(const Scenario& scenario,
   VehicleSettings s = scenario.at(scenario.vehicle_key(number, "model"),
                                   [&] { return load_vehicle(setup.model, scenario.folder()); });
   ControllerSettings& c = s.controller;
-  if (setup.controller != "vehicle") c.kind = setup.controller;
+  if (setup.controller) c.kind = *setup.controller;
   const auto override_with = [](double value, double& setting) {
     if (value > 0.0) setting = value;
   };
@@ -43,7 +43,7 @@ VehicleSettings settings_of(const Scenario& scenario,
   override_with(setup.limits.climb_acceleration_max, c.climb_acceleration_max);
   override_with(setup.limits.tilt_max_deg, c.tilt_max_deg);
   override_with(setup.limits.body_rate_max, c.body_rate_max);
-  if (c.kind != "geometric" && c.tilt_max_deg > 85.0) {
+  if (c.tilt_max_deg > c.kind->tilt_max_deg) {
     throw InputError(
         fmt::format("{}: a tilt of {} degrees; above 85 only `controller: geometric` flies",
                     scenario.place(scenario.vehicle_key(number, "limits.tilt_max_deg")),
@@ -62,7 +62,7 @@ VehicleSettings settings_of(const Scenario& scenario,
 VehicleAgent::VehicleAgent(const Scenario& scenario,
                            std::size_t number,
                            const VehicleSetup& setup,
-                           const RendererByName& renderer)
+                           const RendererByKind& renderer)
     : number_(static_cast<std::uint32_t>(number)),
       setup_(setup),
       seed_(static_cast<std::uint64_t>(setup.seed >= 0 ? setup.seed : scenario.seed)),
@@ -84,7 +84,7 @@ VehicleAgent::VehicleAgent(const Scenario& scenario,
   read_commands(scenario);
 }
 
-void VehicleAgent::mount_sensors(const Scenario& scenario, const RendererByName& renderer) {
+void VehicleAgent::mount_sensors(const Scenario& scenario, const RendererByKind& renderer) {
   if (setup_.lidars.size() > kLidarsMax) {
     throw InputError(fmt::format("{}: {} lidars on one vehicle; {} at most",
                                  scenario.place(scenario.vehicle_key(number_, "lidars")),
@@ -142,9 +142,10 @@ void VehicleAgent::check_faults(const Scenario& scenario) const {
     check(setup_.faults[i], [&](const char* key, const std::string& what) {
       throw InputError(fmt::format("{}: {}{}: {}", scenario.place(name + key), name, key, what));
     });
-    const std::string& kind = setup_.faults[i].kind;
-    if (kind == "rotor") check_index(i, "rotor", settings().rotors.size());
-    if (kind == "lidar" || kind == "scan_drop") check_index(i, "lidar", lidars_.size());
+    const FaultKind kind = setup_.faults[i].kind;
+    if (kind == FaultKind::kRotor) check_index(i, "rotor", settings().rotors.size());
+    if (kind == FaultKind::kLidar || kind == FaultKind::kScanDrop)
+      check_index(i, "lidar", lidars_.size());
   }
 }
 
@@ -158,7 +159,7 @@ void VehicleAgent::read_commands(const Scenario& scenario) {
     const auto key = [&](const char* name) {
       return scenario.vehicle_key(number_, fmt::format("commands[{}].{}", i, name));
     };
-    if (s.kind == "body_rates" && !s.vector.isZero(0.0)) {
+    if (s.kind == CommandKind::kBodyRates && !s.vector.isZero(0.0)) {
       throw InputError(fmt::format("{}: {}: body rates are given as rates_deg: [x, y, z], in deg/s",
                                    scenario.place(key("vector")),
                                    key("vector")));
@@ -272,7 +273,7 @@ std::optional<std::string> VehicleAgent::command(VehicleStatus& status,
                                                  const Command& command,
                                                  SimTime now) const {
   AutopilotState& pilot = status.autopilot;
-  if (status.summary.battery_low && setup_.on_low_battery == "land") {
+  if (status.summary.battery_low && setup_.on_low_battery == LowBatteryReaction::kLand) {
     return pilot.reject("the battery is low: it lands");
   }
   const auto before = pilot.trajectory;
@@ -313,7 +314,7 @@ void VehicleAgent::watch_limits(VehicleStatus& status, Duration step) const {
 void VehicleAgent::watch_battery(VehicleStatus& status, SimTime now) const {
   VehicleSummary& summary = status.summary;
   const double charge = battery_.charge(status.battery);
-  const std::string& action = setup_.on_low_battery;
+  const LowBatteryReaction action = setup_.on_low_battery;
   if (!summary.battery_low && charge <= settings().battery.reserve) {
     summary.battery_low = now;
     note(status,
@@ -322,15 +323,15 @@ void VehicleAgent::watch_battery(VehicleStatus& status, SimTime now) const {
          fmt::format("the battery is down to {:.0f} % after {:.2f} Ah: {}",
                      100.0 * charge,
                      status.battery.used,
-                     action == "land"   ? "it lands"
-                     : action == "fall" ? "its rotors stop"
-                                        : "it flies on"));
-    if (action == "land") {
+                     action == LowBatteryReaction::kLand   ? "it lands"
+                     : action == LowBatteryReaction::kFall ? "its rotors stop"
+                                                           : "it flies on"));
+    if (action == LowBatteryReaction::kLand) {
       autopilot_.give(status.autopilot, LandCommand{}, now, status.state.body);
       status.scripted = false;
     }
   }
-  const bool stops = charge <= 0.0 || (summary.battery_low && action == "fall");
+  const bool stops = charge <= 0.0 || (summary.battery_low && action == LowBatteryReaction::kFall);
   if (summary.battery_empty || !stops) return;
   summary.battery_empty = now;
   note(status, now, "battery_empty", "the battery gives nothing more: its rotors are off");

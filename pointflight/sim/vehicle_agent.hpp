@@ -101,8 +101,9 @@ struct MountedSensor {
   const IntervalSensor* interval;        ///< The same, where it takes time.
 };
 
-/// Gives renderers by name; vehicles share them.
-using RendererByName = std::function<std::shared_ptr<const Renderer>(const std::string& name)>;
+/// Gives renderers; vehicles share them.
+using RendererByKind =
+    std::function<std::shared_ptr<const Renderer>(const Choice<RendererKind>& kind)>;
 
 /// One vehicle of a run: everything that does not change, and how its status advances.
 class VehicleAgent {
@@ -111,7 +112,7 @@ class VehicleAgent {
   VehicleAgent(const Scenario& scenario,
                std::size_t number,
                const VehicleSetup& setup,
-               const RendererByName& renderer);
+               const RendererByKind& renderer);
 
   /// Hovering at its start, rotors at hover speed; or landed, rotors still.
   [[nodiscard]] VehicleStatus start() const;
@@ -186,7 +187,7 @@ class VehicleAgent {
   void watch_battery(VehicleStatus& status, SimTime now) const;
   [[nodiscard]] bool touches_down(const VehicleStatus& status) const;
   [[nodiscard]] double ground_below(const VehicleStatus& status) const;
-  void mount_sensors(const Scenario& scenario, const RendererByName& renderer);
+  void mount_sensors(const Scenario& scenario, const RendererByKind& renderer);
   void mount(const SensorKind* kind, std::unique_ptr<const Sensor> sensor);
   void check_faults(const Scenario& scenario) const;
   [[nodiscard]] SimTime next_instant(const VehicleStatus& status) const;

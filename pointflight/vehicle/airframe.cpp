@@ -12,10 +12,14 @@
 namespace pointflight {
 namespace {
 
-constexpr std::array<std::string_view, 3> kShapes = {"sphere", "box", "capsule"};
-constexpr std::array<std::string_view, 2> kControllers = {"cascade", "geometric"};
-constexpr std::array<std::string_view, 6> kLevels = {
-    "rotor_speeds", "body_rates", "attitude", "acceleration", "velocity", "position"};
+constexpr Named<HullShape> kShapes[] = {
+    {HullShape::kSphere, "sphere"}, {HullShape::kBox, "box"}, {HullShape::kCapsule, "capsule"}};
+constexpr Named<CommandLevel> kLevels[] = {{CommandLevel::kRotorSpeeds, "rotor_speeds"},
+                                           {CommandLevel::kBodyRates, "body_rates"},
+                                           {CommandLevel::kAttitude, "attitude"},
+                                           {CommandLevel::kAcceleration, "acceleration"},
+                                           {CommandLevel::kVelocity, "velocity"},
+                                           {CommandLevel::kPosition, "position"}};
 
 Key required(Key key) {
   key.required = true;
@@ -55,13 +59,13 @@ void describe_loop(SettingsVisitor& v, LoopDesign& loop) {
 void describe_attitude_loop(SettingsVisitor& v, LoopDesign& loop, const ControllerSettings& c) {
   v.value({"natural_frequency", "rad/s", "of the closed loop", 0.01, 1000}, loop.natural_frequency);
   v.value({"damping", "", "of the closed loop", 0.1, 10}, loop.damping);
-  v.only_if(c.kind == "cascade", "controller.kind: cascade", [&](SettingsVisitor& w) {
+  v.only_if(c.kind->integrates_attitude, "controller.kind: cascade", [&](SettingsVisitor& w) {
     w.value({"integral", "", "integral gain in units of natural_frequency^3", 0, 1}, loop.integral);
   });
 }
 
 void describe_controller(SettingsVisitor& v, ControllerSettings& c) {
-  v.choice({"kind", "", "cascaded PID, or geometric on SE(3)"}, c.kind, kControllers);
+  v.choice({"kind", "", "cascaded PID, or geometric on SE(3)"}, c.kind);
   v.section({"horizontal", "", "position loop, x and y"},
             [&](SettingsVisitor& w) { describe_loop(w, c.horizontal); });
   v.section({"vertical", "", "position loop, z"},
@@ -119,10 +123,10 @@ VehicleSettings read(SettingsReader& reader, const std::string& path) {
   if (settings.rotors.size() < 4) {
     fail("rotors", fmt::format("{} rotors; at least 4 are needed", settings.rotors.size()));
   }
-  if (settings.shape == "capsule" && settings.height < 2.0 * settings.radius) {
+  if (settings.shape == HullShape::kCapsule && settings.height < 2.0 * settings.radius) {
     fail("height", "less than twice the radius: that is a sphere");
   }
-  if (settings.controller.kind != "geometric" && settings.controller.tilt_max_deg > 85.0) {
+  if (settings.controller.tilt_max_deg > settings.controller.kind->tilt_max_deg) {
     fail("controller.tilt_max_deg", "above 85; only the geometric controller flies so");
   }
   if (settings.battery.cells > 0.0 && settings.battery.capacity <= 0.0) {
@@ -154,13 +158,13 @@ void describe(SettingsVisitor& v, VehicleSettings& s) {
   v.value(required({"inertia_diagonal", "kg m^2", "about the body axes", 1e-9, 1e4}),
           s.inertia_diagonal);
   v.choice({"shape", "", "of the hull, which must stay free"}, s.shape, kShapes);
-  v.only_if(s.shape != "box", "shape: sphere or capsule", [&](SettingsVisitor& w) {
+  v.only_if(s.shape != HullShape::kBox, "shape: sphere or capsule", [&](SettingsVisitor& w) {
     w.value({"radius", "m", "of the sphere or capsule", 0.001, 100}, s.radius);
   });
-  v.only_if(s.shape == "box", "shape: box", [&](SettingsVisitor& w) {
+  v.only_if(s.shape == HullShape::kBox, "shape: box", [&](SettingsVisitor& w) {
     w.value({"size", "m", "of the box", 0.001, 100}, s.size);
   });
-  v.only_if(s.shape == "capsule", "shape: capsule", [&](SettingsVisitor& w) {
+  v.only_if(s.shape == HullShape::kCapsule, "shape: capsule", [&](SettingsVisitor& w) {
     w.value({"height", "m", "along z, caps included", 0.001, 100}, s.height);
   });
   v.value({"intensity", "", "of LiDAR returns from it", 0, 1e6}, s.intensity);
@@ -185,6 +189,10 @@ void describe(SettingsVisitor& v, VehicleSettings& s) {
             [&](SettingsVisitor& w) { describe_battery(w, s.battery); });
 }
 
+std::string_view to_string(CommandLevel level) {
+  return name_in(kLevels, level);
+}
+
 std::string vehicle_reference() {
   VehicleSettings defaults;
   defaults.rotors.resize(1);  // so that their keys are listed
@@ -194,8 +202,8 @@ std::string vehicle_reference() {
 }
 
 Solid VehicleSettings::hull() const {
-  if (shape == "box") return Cuboid{0.5 * size};
-  if (shape == "capsule") return Capsule{radius, 0.5 * height - radius};
+  if (shape == HullShape::kBox) return Cuboid{0.5 * size};
+  if (shape == HullShape::kCapsule) return Capsule{radius, 0.5 * height - radius};
   return Ball{radius};
 }
 

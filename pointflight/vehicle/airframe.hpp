@@ -7,6 +7,7 @@
 #include "pointflight/core/settings.hpp"
 #include "pointflight/geometry/solid.hpp"
 #include "pointflight/geometry/types.hpp"
+#include "pointflight/vehicle/controller_kind.hpp"
 
 namespace pointflight {
 
@@ -40,7 +41,7 @@ struct LoopDesign {
 
 /// How a vehicle is controlled: loops from position to rotors.
 struct ControllerSettings {
-  std::string kind = "cascade";           ///< or "geometric"
+  Choice<ControllerKind> kind{};          ///< "cascade", "geometric" or an own one.
   LoopDesign horizontal{1.8, 0.9, 0.25};  ///< Position loop, world x and y.
   LoopDesign vertical{2.5, 0.9, 0.25};    ///< Position loop, world z.
   LoopDesign roll_pitch{12.0, 0.9, 0.0};  ///< Attitude loop about body x and y.
@@ -74,6 +75,23 @@ struct BatterySettings {
   double reserve = 0.1;     ///< Share of the capacity that is left when it counts as low.
 };
 
+/// What must stay free around a vehicle.
+enum class HullShape {
+  kSphere,   ///< `radius`
+  kBox,      ///< `size`
+  kCapsule,  ///< `radius`, `height`, upright.
+};
+
+/// Setpoints from the innermost loop to the outermost: the order of `Setpoint`.
+enum class CommandLevel {
+  kRotorSpeeds,   ///< rad/s
+  kBodyRates,     ///< rad/s and thrust
+  kAttitude,      ///< and thrust
+  kAcceleration,  ///< m/s^2
+  kVelocity,      ///< m/s
+  kPosition,      ///< m
+};
+
 /// A vehicle file, `data/vehicles/<name>.yaml`.
 struct VehicleSettings {
   std::string path;                              ///< Of the file, for messages.
@@ -81,7 +99,7 @@ struct VehicleSettings {
   std::string source;                            ///< Where the figures come from.
   double mass = 1.0;                             ///< kg
   Vector3d inertia_diagonal = Vector3d::Ones();  ///< kg m^2
-  std::string shape = "sphere";                  ///< Of the hull; or "box", "capsule" (upright)
+  HullShape shape = HullShape::kSphere;          ///< Of the hull.
   double radius = 0.3;                           ///< Of a sphere or capsule, m.
   Vector3d size = Vector3d(0.5, 0.5, 0.2);       ///< Of a box, m.
   double height = 1.0;                           ///< Of a capsule, caps included, m.
@@ -90,8 +108,8 @@ struct VehicleSettings {
   RotorModel rotor;                              ///< One for all rotors.
   /// Four or more; commands and states count them in this order.
   std::vector<RotorPlacement> rotors;
-  /// The innermost command that its autopilot takes: "rotor_speeds", "body_rates", ...
-  std::string lowest_command = "rotor_speeds";
+  /// The innermost command that its autopilot takes.
+  CommandLevel lowest_command = CommandLevel::kRotorSpeeds;
   ControllerSettings controller;  ///< Loops and limits.
   ImuSettings imu;                ///< One on each vehicle.
   BatterySettings battery;        ///< Without cells: none.
@@ -107,6 +125,9 @@ struct VehicleSettings {
   /// body frame, m/s^2.
   [[nodiscard]] Vector3d drag_in_still_air(const Vector3d& v_body) const;
 };
+
+/// As files have it: "rotor_speeds", ...
+std::string_view to_string(CommandLevel level);
 
 /// The one list of keys of a vehicle file.
 void describe(SettingsVisitor& visitor, VehicleSettings& settings);

@@ -192,15 +192,11 @@ std::optional<std::string> Autopilot::objection(const Command& command) const {
                          settings_.rotors.size());
     }
   }
-  if (command.index() < kRepeated && kNames[command.index()] != settings_.lowest_command) {
-    // levels are in order, the innermost first
-    for (std::size_t level = command.index(); level < kRepeated; ++level) {
-      if (kNames[level] == settings_.lowest_command) {
-        return fmt::format("this vehicle takes no {} commands; the innermost are {}",
-                           name_of(command),
-                           settings_.lowest_command);
-      }
-    }
+  // levels are in order, the innermost first
+  if (command.index() < static_cast<std::size_t>(settings_.lowest_command)) {
+    return fmt::format("this vehicle takes no {} commands; the innermost are {}",
+                       name_of(command),
+                       to_string(settings_.lowest_command));
   }
   return std::nullopt;
 }

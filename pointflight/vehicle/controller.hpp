@@ -37,8 +37,9 @@ struct ControllerMemory {
 
 /// Turns setpoints into rotor speeds. It sees the true state.
 ///
-/// To add one: a file in vehicle/controllers/, one line in the table of `make_controller`, a
-/// step-response test, and its keys with defaults in ControllerSettings.
+/// To add one: a file in vehicle/controllers/, one row in the table of controllers.cpp, a
+/// step-response test, and its keys with defaults in ControllerSettings. Programs add rows of their
+/// own: `ControllerKind::table().add(...)`.
 class Controller {
  public:
   virtual ~Controller() = default;
@@ -50,8 +51,9 @@ class Controller {
                                                    ControllerMemory& memory) const = 0;
 };
 
-/// By name ("cascade", "geometric"). Throws InputError that lists the names.
-std::unique_ptr<Controller> make_controller(const std::string& name,
+/// By name ("cascade", "geometric") or row of `ControllerKind::table`. Throws InputError where the
+/// settings are wrong.
+std::unique_ptr<Controller> make_controller(const Choice<ControllerKind>& kind,
                                             const VehicleSettings& settings);
 
 }  // namespace pointflight

@@ -86,7 +86,7 @@ Mission::Mission(const Vector3d& start, double yaw, const MissionSettings& setti
     }
     leg.direction = way / distance;
     const bool steep = std::hypot(way.x(), way.y()) < 0.1 * distance;
-    if (settings.yaw == "along_path" && !steep) {
+    if (settings.yaw == YawMode::kAlongPath && !steep) {
       const double turn = wrap_angle(math::atan2(way.y(), way.x()) - yaw_);
       leg.yaw_sign = turn < 0.0 ? -1.0 : 1.0;
       leg.turn = SmoothMove(std::abs(turn), turning);

@@ -48,10 +48,16 @@ class SmoothMove {
   double t_cruise_ = 0.0;
 };
 
+/// Where a mission looks.
+enum class YawMode {
+  kAlongPath,  ///< To the next waypoint.
+  kFixed,      ///< Where it looked at the start.
+};
+
 /// Waypoints and how to fly through them: a scenario's `mission`.
 struct MissionSettings {
-  MotionLimits motion;              ///< Of the straight legs.
-  std::string yaw = "along_path";   ///< or "fixed"
+  MotionLimits motion;  ///< Of the straight legs.
+  YawMode yaw = YawMode::kAlongPath;
   double yaw_rate_deg = 90.0;       ///< Limit while turning.
   double hold = 0.0;                ///< Seconds at each waypoint.
   std::vector<Vector3d> waypoints;  ///< World, m; empty: hover.

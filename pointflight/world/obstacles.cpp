@@ -18,10 +18,18 @@
 namespace pointflight {
 namespace {
 
-constexpr std::array<std::string_view, 4> kShapes = {"sphere", "box", "cylinder", "cloud"};
-constexpr std::array<std::string_view, 4> kMotions = {"random", "still", "loop", "keyframes"};
-constexpr std::array<std::string_view, 2> kDirections = {"any", "horizontal"};
-constexpr std::array<std::string_view, 2> kBorders = {"replace", "bounce"};
+constexpr Named<ObstacleShape> kShapes[] = {{ObstacleShape::kSphere, "sphere"},
+                                            {ObstacleShape::kBox, "box"},
+                                            {ObstacleShape::kCylinder, "cylinder"},
+                                            {ObstacleShape::kCloud, "cloud"}};
+constexpr Named<ObstacleMotion> kMotions[] = {{ObstacleMotion::kRandom, "random"},
+                                              {ObstacleMotion::kStill, "still"},
+                                              {ObstacleMotion::kLoop, "loop"},
+                                              {ObstacleMotion::kKeyframes, "keyframes"}};
+constexpr Named<FlightDirections> kDirections[] = {{FlightDirections::kAny, "any"},
+                                                   {FlightDirections::kHorizontal, "horizontal"}};
+constexpr Named<AtBorder> kBorders[] = {{AtBorder::kReplace, "replace"},
+                                        {AtBorder::kBounce, "bounce"}};
 constexpr double kFar = 1e7;          // m
 constexpr std::size_t kMost = 50000;  // labels have 16 bits in a scan's file
 constexpr Duration kSlice = std::chrono::milliseconds(200);
@@ -52,14 +60,15 @@ std::shared_ptr<const SurfelMap> load_cloud(const std::string& path,
 }
 
 BodyShape solid_of(const ObstacleSettings& s) {
-  if (s.shape == "box") return Solid{Cuboid{0.5 * s.size}};
-  if (s.shape == "cylinder") return Solid{Cylinder{s.radius, 0.5 * s.height}};
+  if (s.shape == ObstacleShape::kBox) return Solid{Cuboid{0.5 * s.size}};
+  if (s.shape == ObstacleShape::kCylinder) return Solid{Cylinder{s.radius, 0.5 * s.height}};
   return Solid{Ball{s.radius}};
 }
 
 Motion motion_of(const ObstacleSettings& s, const std::string& folder) {
-  if (s.motion == "loop") return loop_through(s.waypoints, s.speed);
-  if (s.motion == "keyframes") return read_keyframes(resolve_path(s.keyframes, folder), s.repeat);
+  if (s.motion == ObstacleMotion::kLoop) return loop_through(s.waypoints, s.speed);
+  if (s.motion == ObstacleMotion::kKeyframes)
+    return read_keyframes(resolve_path(s.keyframes, folder), s.repeat);
   return PoseTrack(Pose{quaternion_from_rpy(0.0, 0.0, s.yaw_deg * kDegree), s.position});
 }
 
@@ -68,32 +77,38 @@ void check(const ObstacleSettings& s, const std::function<std::string(const char
   const auto fail = [&](const char* key, const char* what) {
     throw InputError(fmt::format("{}: {}", place(key), what));
   };
-  if (s.shape == "cloud" && s.file.empty()) fail("file", "shape 'cloud' needs a cloud or mesh");
-  if (s.shape != "cloud" && !s.file.empty()) fail("file", "only shape 'cloud' has a file");
-  if (s.motion == "loop" && s.waypoints.empty()) fail("waypoints", "motion 'loop' needs some");
-  if (s.motion == "loop" && s.speed <= 0.0) fail("speed", "motion 'loop' needs one above 0");
-  if (s.motion == "keyframes" && s.keyframes.empty()) fail("keyframes", "the CSV is missing");
-  if (s.motion != "random" && s.count != 1) {
+  if (s.shape == ObstacleShape::kCloud && s.file.empty())
+    fail("file", "shape 'cloud' needs a cloud or mesh");
+  if (s.shape != ObstacleShape::kCloud && !s.file.empty())
+    fail("file", "only shape 'cloud' has a file");
+  if (s.motion == ObstacleMotion::kLoop && s.waypoints.empty())
+    fail("waypoints", "motion 'loop' needs some");
+  if (s.motion == ObstacleMotion::kLoop && s.speed <= 0.0)
+    fail("speed", "motion 'loop' needs one above 0");
+  if (s.motion == ObstacleMotion::kKeyframes && s.keyframes.empty())
+    fail("keyframes", "the CSV is missing");
+  if (s.motion != ObstacleMotion::kRandom && s.count != 1) {
     fail("count", "only obstacles that move at random come in numbers; write one entry each");
   }
   if ((s.bounds_max - s.bounds_min).minCoeff() < 0.0) fail("bounds_max", "is below bounds_min");
 }
 
 void describe_shape(SettingsVisitor& v, ObstacleSettings& s) {
-  const bool is_cloud = s.shape == "cloud";
-  v.only_if(s.shape == "sphere" || s.shape == "cylinder",
-            "shape: sphere, cylinder",
-            [&](SettingsVisitor& w) {
-              w.value({"radius", "m", "of the sphere or cylinder", 0.001, 1000}, s.radius);
-              w.only_if(s.motion == "random", "motion: random", [&](SettingsVisitor& x) {
-                x.value({"radius_max", "m", "above radius: each is drawn between the two", 0, 1000},
-                        s.radius_max);
-              });
-            });
-  v.only_if(s.shape == "cylinder", "shape: cylinder", [&](SettingsVisitor& w) {
+  const bool is_cloud = s.shape == ObstacleShape::kCloud;
+  v.only_if(
+      s.shape == ObstacleShape::kSphere || s.shape == ObstacleShape::kCylinder,
+      "shape: sphere, cylinder",
+      [&](SettingsVisitor& w) {
+        w.value({"radius", "m", "of the sphere or cylinder", 0.001, 1000}, s.radius);
+        w.only_if(s.motion == ObstacleMotion::kRandom, "motion: random", [&](SettingsVisitor& x) {
+          x.value({"radius_max", "m", "above radius: each is drawn between the two", 0, 1000},
+                  s.radius_max);
+        });
+      });
+  v.only_if(s.shape == ObstacleShape::kCylinder, "shape: cylinder", [&](SettingsVisitor& w) {
     w.value({"height", "m", "of the cylinder", 0.001, 1000}, s.height);
   });
-  v.only_if(s.shape == "box", "shape: box", [&](SettingsVisitor& w) {
+  v.only_if(s.shape == ObstacleShape::kBox, "shape: box", [&](SettingsVisitor& w) {
     w.value({"size", "m", "of the box", 0.001, 1000}, s.size);
   });
   v.only_if(is_cloud, "shape: cloud", [&](SettingsVisitor& w) {
@@ -108,11 +123,12 @@ void describe_shape(SettingsVisitor& v, ObstacleSettings& s) {
 }
 
 void describe_motion(SettingsVisitor& v, ObstacleSettings& s) {
-  v.only_if(
-      s.motion == "random" || s.motion == "loop", "motion: random, loop", [&](SettingsVisitor& w) {
-        w.value({"speed", "m/s", "along its way", 0, 100}, s.speed);
-      });
-  v.only_if(s.motion == "random", "motion: random", [&](SettingsVisitor& w) {
+  v.only_if(s.motion == ObstacleMotion::kRandom || s.motion == ObstacleMotion::kLoop,
+            "motion: random, loop",
+            [&](SettingsVisitor& w) {
+              w.value({"speed", "m/s", "along its way", 0, 100}, s.speed);
+            });
+  v.only_if(s.motion == ObstacleMotion::kRandom, "motion: random", [&](SettingsVisitor& w) {
     w.value({"count", "", "so many alike", 1, 50000}, s.count);
     w.value({"speed_max", "m/s", "above speed: each is drawn between the two", 0, 100},
             s.speed_max);
@@ -125,14 +141,14 @@ void describe_motion(SettingsVisitor& v, ObstacleSettings& s) {
     w.value({"bounds_min", "m", "both 0: the map's", -kFar, kFar}, s.bounds_min);
     w.value({"bounds_max", "m", "upper corner", -kFar, kFar}, s.bounds_max);
   });
-  v.only_if(s.motion == "still", "motion: still", [&](SettingsVisitor& w) {
+  v.only_if(s.motion == ObstacleMotion::kStill, "motion: still", [&](SettingsVisitor& w) {
     w.value({"position", "m", "where it stands", -kFar, kFar}, s.position);
     w.value({"yaw_deg", "deg", "how it stands", -360, 360}, s.yaw_deg);
   });
-  v.only_if(s.motion == "loop", "motion: loop", [&](SettingsVisitor& w) {
+  v.only_if(s.motion == ObstacleMotion::kLoop, "motion: loop", [&](SettingsVisitor& w) {
     w.value({"waypoints", "m", "of the loop, which closes by itself", -kFar, kFar}, s.waypoints);
   });
-  v.only_if(s.motion == "keyframes", "motion: keyframes", [&](SettingsVisitor& w) {
+  v.only_if(s.motion == ObstacleMotion::kKeyframes, "motion: keyframes", [&](SettingsVisitor& w) {
     w.value({"keyframes", "", "CSV: time,x,y,z and roll_deg,pitch_deg,yaw_deg or qw,qx,qy,qz"},
             s.keyframes);
     w.value({"repeat", "", "they start again after the last"}, s.repeat);
@@ -158,7 +174,7 @@ Obstacles::Obstacles(const std::vector<ObstacleSettings>& settings,
     check_settings(s, fmt::format("obstacles[{}]", entry));
     check(s, place);
     std::shared_ptr<const SurfelMap> cloud;
-    if (s.shape == "cloud") {
+    if (s.shape == ObstacleShape::kCloud) {
       try {
         cloud = load_cloud(resolve_path(s.file, world.folder), s.resolution, executor);
       } catch (const InputError& error) {
@@ -174,7 +190,7 @@ Obstacles::Obstacles(const std::vector<ObstacleSettings>& settings,
       if (obstacles_.size() >= kMost) {
         throw InputError(fmt::format("{}: more than {} obstacles", place("count"), kMost));
       }
-      if (s.motion == "random") {
+      if (s.motion == ObstacleMotion::kRandom) {
         obstacles_.push_back(
             std::make_unique<RandomFlight>(s, cloud, bounds, world, number, place("motion")));
         continue;

@@ -16,10 +16,38 @@
 
 namespace pointflight {
 
+/// What an obstacle looks like.
+enum class ObstacleShape {
+  kSphere,    ///< `radius`
+  kBox,       ///< `size`
+  kCylinder,  ///< `radius`, `height`, upright.
+  kCloud,     ///< Points of `file`.
+};
+
+/// How an obstacle moves.
+enum class ObstacleMotion {
+  kRandom,     ///< Straight, from free place to free place.
+  kStill,      ///< Stands at `position`.
+  kLoop,       ///< Through `waypoints`, round and round.
+  kKeyframes,  ///< As a file says.
+};
+
+/// Where random obstacles fly to.
+enum class FlightDirections {
+  kAny,         ///< All around.
+  kHorizontal,  ///< Level.
+};
+
+/// What happens to random obstacles at their bounds.
+enum class AtBorder {
+  kReplace,  ///< Another one appears elsewhere.
+  kBounce,   ///< They turn back.
+};
+
 /// One entry of a scenario's `obstacles`: one or more bodies alike.
 struct ObstacleSettings {
-  std::int64_t count = 1;                   ///< So many alike; more than one only in random motion.
-  std::string shape = "sphere";             ///< or "box", "cylinder", "cloud"
+  std::int64_t count = 1;  ///< So many alike; more than one only in random motion.
+  ObstacleShape shape = ObstacleShape::kSphere;
   double radius = 0.3;                      ///< Of spheres and cylinders, m.
   double radius_max = 0.0;                  ///< Above `radius`: drawn between the two.
   double height = 1.7;                      ///< Of cylinders, m.
@@ -28,11 +56,11 @@ struct ObstacleSettings {
   double resolution = 0.03;  ///< Of its import, m.
   double intensity = 100.0;  ///< Of the returns of exact shapes.
 
-  std::string motion = "random";           ///< or "still", "loop", "keyframes"
-  double speed = 1.0;                      ///< m/s
-  double speed_max = 0.0;                  ///< Above `speed`: drawn between the two.
-  std::string directions = "any";          ///< or "horizontal"
-  std::string at_border = "replace";       ///< or "bounce"
+  ObstacleMotion motion = ObstacleMotion::kRandom;
+  double speed = 1.0;      ///< m/s
+  double speed_max = 0.0;  ///< Above `speed`: drawn between the two.
+  FlightDirections directions = FlightDirections::kAny;
+  AtBorder at_border = AtBorder::kReplace;
   Vector3d bounds_min = Vector3d::Zero();  ///< Both zero: the map's bounds.
   Vector3d bounds_max = Vector3d::Zero();  ///< As bounds_min: world, m.
   Vector3d position = Vector3d::Zero();    ///< Where a still one stands.

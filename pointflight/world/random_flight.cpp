@@ -92,9 +92,9 @@ RandomFlight::Life RandomFlight::life(std::uint64_t n, SimTime from, bool strict
       drawn(settings_.radius, settings_.radius_max, random_.uniform(base + kSizeDraw));
   if (cloud_) {
     life.shape = cloud_;
-  } else if (settings_.shape == "box") {
+  } else if (settings_.shape == ObstacleShape::kBox) {
     life.shape = Solid{Cuboid{0.5 * settings_.size}};
-  } else if (settings_.shape == "cylinder") {
+  } else if (settings_.shape == ObstacleShape::kCylinder) {
     life.shape = Solid{Cylinder{radius, 0.5 * settings_.height}};
   } else {
     life.shape = Solid{Ball{radius}};
@@ -102,7 +102,7 @@ RandomFlight::Life RandomFlight::life(std::uint64_t n, SimTime from, bool strict
   life.start = free_place(n, bounding_radius(life.shape), strict);
 
   const auto [u, v] = random_.uniform2(base + kDirectionDraw);
-  const double z = settings_.directions == "horizontal" ? 0.0 : 2.0 * u - 1.0;
+  const double z = settings_.directions == FlightDirections::kHorizontal ? 0.0 : 2.0 * u - 1.0;
   const double side = std::sqrt(1.0 - z * z);
   const auto angle = math::sincos(2.0 * kPi * v);
   const double speed =
@@ -113,7 +113,7 @@ RandomFlight::Life RandomFlight::life(std::uint64_t n, SimTime from, bool strict
   }
 
   life.until = SimTime::max();
-  if (settings_.at_border == "bounce") return life;
+  if (settings_.at_border == AtBorder::kBounce) return life;
   for (int axis = 0; axis < 3; ++axis) {
     const double rate = life.velocity[axis];
     if (rate == 0.0) continue;
@@ -149,7 +149,7 @@ void RandomFlight::collect(SimTime from, SimTime until, std::vector<Body>& bodie
     motion.from = life->from == SimTime::min() ? SimTime{} : life->from;
     motion.start = life->start;
     motion.velocity = life->velocity;
-    if (settings_.at_border == "bounce") motion.walls = bounds_;
+    if (settings_.at_border == AtBorder::kBounce) motion.walls = bounds_;
     body.motion = motion;
     bodies.push_back(std::move(body));
   }

@@ -9,8 +9,11 @@
 namespace pointflight {
 namespace {
 
-constexpr std::array<std::string_view, 5> kTurbulence = {
-    "none", "light", "moderate", "severe", "custom"};
+constexpr Named<Turbulence> kTurbulence[] = {{Turbulence::kNone, "none"},
+                                             {Turbulence::kLight, "light"},
+                                             {Turbulence::kModerate, "moderate"},
+                                             {Turbulence::kSevere, "severe"},
+                                             {Turbulence::kCustom, "custom"}};
 constexpr double kFoot = 0.3048;         // m
 constexpr double kKnot = 1852.0 / 3600;  // m/s
 constexpr double kLeastAirspeed = 1.0;   // m/s: a hovering vehicle still meets gusts that drift by
@@ -65,7 +68,7 @@ void describe(SettingsVisitor& v, WindSettings& s) {
   v.choice({"turbulence", "", "Dryden gusts (MIL-F-8785C); custom: gust_sigma and gust_length"},
            s.turbulence,
            kTurbulence);
-  v.only_if(s.turbulence == "custom", "turbulence: custom", [&](SettingsVisitor& w) {
+  v.only_if(s.turbulence == Turbulence::kCustom, "turbulence: custom", [&](SettingsVisitor& w) {
     w.value({"gust_sigma", "m/s", "deviations along, across, up", 0, 50}, s.gust_sigma);
     w.value({"gust_length", "m", "scale lengths along, across, up", 0.1, 10000}, s.gust_length);
   });
@@ -81,11 +84,12 @@ GustScales low_altitude_gusts(double height, double wind_at_20_feet) {
 }
 
 GustScales Wind::scales(double height) const {
-  if (settings_.turbulence == "custom") return {settings_.gust_sigma, settings_.gust_length};
+  if (settings_.turbulence == Turbulence::kCustom)
+    return {settings_.gust_sigma, settings_.gust_length};
   // W20 of the three levels, knots (MIL-F-8785C, figure 11)
-  const double knots = settings_.turbulence == "light"      ? 15.0
-                       : settings_.turbulence == "moderate" ? 30.0
-                                                            : 45.0;
+  const double knots = settings_.turbulence == Turbulence::kLight      ? 15.0
+                       : settings_.turbulence == Turbulence::kModerate ? 30.0
+                                                                       : 45.0;
   return low_altitude_gusts(height, knots * kKnot);
 }
 
@@ -95,7 +99,7 @@ Vector3d Wind::over_step(GustState& state,
                          double dt,
                          const Vector3d& v_world,
                          double height) const {
-  if (settings_.turbulence == "none") return settings_.mean;
+  if (settings_.turbulence == Turbulence::kNone) return settings_.mean;
   const GustScales gusts = scales(height);
   const double airspeed = std::max(kLeastAirspeed, (v_world - settings_.mean).norm());
   const RandomStream random(seed_, StreamId::kGusts, vehicle);

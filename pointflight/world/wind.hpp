@@ -9,10 +9,19 @@
 
 namespace pointflight {
 
+/// Strength of Dryden gusts (MIL-F-8785C).
+enum class Turbulence {
+  kNone,      ///< Calm air.
+  kLight,     ///< Wind of 15 knots at 20 feet.
+  kModerate,  ///< 30 knots.
+  kSevere,    ///< 45 knots.
+  kCustom,    ///< `gust_sigma` and `gust_length`.
+};
+
 /// How the air moves.
 struct WindSettings {
-  Vector3d mean = Vector3d::Zero();             ///< Where it blows to, world, m/s.
-  std::string turbulence = "none";              ///< or "light", "moderate", "severe", "custom"
+  Vector3d mean = Vector3d::Zero();  ///< Where it blows to, world, m/s.
+  Turbulence turbulence = Turbulence::kNone;
   Vector3d gust_sigma = Vector3d::Zero();       ///< custom: along, across, up, m/s
   Vector3d gust_length = Vector3d(50, 50, 20);  ///< custom: scale lengths, m
 };
@@ -60,7 +69,7 @@ class Wind {
 
   /// True without mean wind and gusts: `over_step` need not be called.
   [[nodiscard]] bool is_calm() const {
-    return settings_.mean.isZero(0.0) && settings_.turbulence == "none";
+    return settings_.mean.isZero(0.0) && settings_.turbulence == Turbulence::kNone;
   }
 
  private:

@@ -28,7 +28,8 @@ TEST(Arguments, OfRenderers) {
   EXPECT_THROW(make_renderer("beam", {}), std::invalid_argument);
   EXPECT_THROW(BeamRenderer(Scene{}), std::invalid_argument);
   EXPECT_THROW(PaperRenderer(Scene{}, PaperOptions{}), std::invalid_argument);
-  for (const std::string& name : renderer_names()) {
+  for (const RendererKind& kind : RendererKind::table().rows()) {
+    const std::string& name = kind.name;
     SCOPED_TRACE(name);
     const auto renderer = make_renderer(name, {wall()});
     const std::vector<Ray> rays(2);

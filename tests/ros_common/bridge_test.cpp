@@ -74,7 +74,7 @@ Scenario flight(double duration = 1.0) {
   s.vehicles[0].lidars = {LidarMount{}};
   s.vehicles[0].mission.waypoints = {{14, 6, 3}};
   s.vehicles[0].start_yaw_deg = 90.0;
-  s.vehicles[0].mission.yaw = "fixed";
+  s.vehicles[0].mission.yaw = YawMode::kFixed;
   return s;
 }
 

@@ -36,7 +36,7 @@ std::string with_battery(const TemporaryFolder& folder, double capacity, double 
   return folder / "small.yaml";
 }
 
-Scenario on_battery(const std::string& model, const char* action) {
+Scenario on_battery(const std::string& model, LowBatteryReaction action) {
   Scenario scenario = hovering();
   scenario.vehicles[0].model = model;
   scenario.vehicles[0].battery = true;
@@ -47,7 +47,7 @@ Scenario on_battery(const std::string& model, const char* action) {
 
 TEST(Battery, LandsTheVehicleAtItsReserveAndTakesNoMoreCommands) {
   const TemporaryFolder folder;
-  Scenario scenario = on_battery(with_battery(folder, 0.08, 0.5), "land");
+  Scenario scenario = on_battery(with_battery(folder, 0.08, 0.5), LowBatteryReaction::kLand);
   scenario.vehicles[0].mission.waypoints = {{30, 6, 3}};
   scenario.vehicles[0].mission.motion.speed = 0.5;
   EventSink sink;
@@ -76,8 +76,8 @@ TEST(Battery, LandsTheVehicleAtItsReserveAndTakesNoMoreCommands) {
 TEST(Battery, StopsTheRotorsWhenEmptyWhateverTheScenarioSays) {
   const TemporaryFolder folder;
   const std::string model = with_battery(folder, 0.04, 0.5);
-  for (const char* action : {"report", "fall"}) {
-    SCOPED_TRACE(action);
+  for (const auto action : {LowBatteryReaction::kReport, LowBatteryReaction::kFall}) {
+    SCOPED_TRACE(static_cast<int>(action));
     EventSink sink;
     const Simulation simulation = run(on_battery(model, action), sink, Executor(1));
     const VehicleStatus& status = simulation.status(0);
@@ -86,7 +86,7 @@ TEST(Battery, StopsTheRotorsWhenEmptyWhateverTheScenarioSays) {
     EXPECT_EQ(sink.on_board[1].kind, "battery_empty");
     // reported, it flies on with the half that is left
     const double between = to_seconds(sink.on_board[1].time - sink.on_board[0].time);
-    if (std::string(action) == "fall") {
+    if (action == LowBatteryReaction::kFall) {
       EXPECT_EQ(between, 0.0);
       EXPECT_NEAR(status.battery.used, 0.02, 0.002);  // rotors run down
     } else {
@@ -285,8 +285,8 @@ TEST(SimulationCalls, ScenariosThatAProgramFilledInAreHeldToWhatFilesMaySay) {
   expect_contains(error([&](Scenario& s) { s.physics_step = 0.0; }), "physics_step: 0 s is not");
   expect_contains(error([&](Scenario& s) { s.output.trajectory_rate = 0.0; }),
                   "output.trajectory_rate: 0 Hz");
-  expect_contains(error([&](Scenario& s) { s.vehicles[0].on_collision = "explode"; }),
-                  "'explode' is unknown; one of: report, stop, crash");
+  expect_contains(error([&](Scenario& s) { s.vehicles[0].on_collision = CollisionReaction{9}; }),
+                  "on_collision: '' is unknown; one of: report, stop, crash");
   expect_contains(error([&](Scenario& s) {
                     s.vehicles[0].mission.waypoints = {{0, INFINITY, 1}};
                   }),

@@ -112,7 +112,7 @@ inline Simulation run(const Scenario& scenario, SampleSink& sink, const Executor
 inline ObstacleSettings passing(double speed) {
   ObstacleSettings o;
   o.radius = 0.3;
-  o.motion = "loop";
+  o.motion = ObstacleMotion::kLoop;
   o.speed = speed;
   o.waypoints = {{10, 3, 3}, {10, 9, 3}};
   return o;

@@ -133,30 +133,17 @@ TEST(KeysWithoutEffect, AreNotWritten) {
   Scenario scenario;
   scenario.map = "m.pfmap";
   scenario.vehicles[0].lidars[0].renderer = "paper";
-  for (const char* kind : {"rotor_speeds",
-                           "body_rates",
-                           "attitude",
-                           "acceleration",
-                           "velocity",
-                           "position",
-                           "polynomial",
-                           "b_spline",
-                           "waypoint",
-                           "take_off",
-                           "land",
-                           "hover",
-                           "arm",
-                           "disarm"}) {
-    scenario.vehicles[0].commands.emplace_back().kind = kind;
+  for (int kind = 0; kind <= static_cast<int>(CommandKind::kDisarm); ++kind) {
+    scenario.vehicles[0].commands.emplace_back().kind = static_cast<CommandKind>(kind);
   }
-  for (const char* kind : {"rotor", "lidar", "imu", "odometry_delay", "scan_drop"}) {
-    scenario.vehicles[0].faults.emplace_back().kind = kind;
+  for (int kind = 0; kind <= static_cast<int>(FaultKind::kScanDrop); ++kind) {
+    scenario.vehicles[0].faults.emplace_back().kind = static_cast<FaultKind>(kind);
   }
-  for (const char* motion : {"random", "still", "loop", "keyframes"}) {
-    for (const char* shape : {"sphere", "box", "cylinder", "cloud"}) {
+  for (int motion = 0; motion <= static_cast<int>(ObstacleMotion::kKeyframes); ++motion) {
+    for (int shape = 0; shape <= static_cast<int>(ObstacleShape::kCloud); ++shape) {
       auto& obstacle = scenario.obstacles.emplace_back();
-      obstacle.motion = motion;
-      obstacle.shape = shape;
+      obstacle.motion = static_cast<ObstacleMotion>(motion);
+      obstacle.shape = static_cast<ObstacleShape>(shape);
     }
   }
   const std::string text = scenario_yaml(scenario);
@@ -208,7 +195,7 @@ TEST(Pages, ExamplesOfSensorFilesLoadAndHoldEveryKey) {
   ASSERT_GT(missing.size(), 40u);
   for (const std::string& block : blocks) {
     const LidarSettings settings = parse_lidar(block, "docs/sensors.md");
-    if (settings.pattern != "csv") {  // whose file is the user's
+    if (settings.pattern != ScanPattern::kCsv) {  // whose file is the user's
       EXPECT_FALSE(make_pattern(settings)->beams(0, Executor(1)).empty()) << block;
     }
     for (const auto& [key, line] : settings.lines) missing.erase(without_numbers(key));

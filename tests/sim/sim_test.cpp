@@ -287,7 +287,7 @@ TEST(Simulation, ReportsACollisionOrStopsAtIt) {
   EXPECT_EQ(reported.collisions, 1u);
   EXPECT_EQ(sink.collisions, 2);  // entered and left
   EXPECT_FALSE(sink.last.entered);
-  scenario.vehicles[0].on_collision = "stop";
+  scenario.vehicles[0].on_collision = CollisionReaction::kStop;
   HashSink stopped_sink;
   const Ran stopped = run(scenario, map, stopped_sink);
   EXPECT_EQ(stopped.end, RunEnd::kCollision);
@@ -354,11 +354,11 @@ TEST(Simulation, AFastSmallVehicleMeetsAThinWall) {
     scenario.duration = 4.0;
     scenario.vehicles[0].lidars.clear();
     scenario.vehicles[0].model = folder / "tiny.yaml";
-    scenario.vehicles[0].on_collision = "stop";
+    scenario.vehicles[0].on_collision = CollisionReaction::kStop;
     scenario.vehicles[0].start = {-5.0 + 0.01 * i, 0, 0};
     scenario.vehicles[0].mission = MissionSettings{};
     scenario.vehicles[0].mission.motion = {12.0, 20.0, 200.0};
-    scenario.vehicles[0].mission.yaw = "fixed";
+    scenario.vehicles[0].mission.yaw = YawMode::kFixed;
     scenario.vehicles[0].mission.waypoints = {{60, 0, 0}};
     HashSink sink;
     EXPECT_EQ(run(scenario, map, sink).end, RunEnd::kCollision) << i;

@@ -42,11 +42,11 @@ Scenario swarm(double duration) {
   balls.speed_max = 3.0;
   ObstacleSettings boxes = balls;
   boxes.count = 10;
-  boxes.shape = "box";
-  boxes.at_border = "bounce";
+  boxes.shape = ObstacleShape::kBox;
+  boxes.at_border = AtBorder::kBounce;
   s.obstacles = {balls, boxes};
   s.air.wind.mean = {1, 0.5, 0};
-  s.air.wind.turbulence = "light";
+  s.air.wind.turbulence = Turbulence::kLight;
   s.output.odometry = true;
   return s;
 }

@@ -54,7 +54,7 @@ TEST(Collisions, OfTwoVehiclesAreBoths) {
   scenario.vehicles[1].name = "b";
   scenario.vehicles[1].start = {14, 6, 3};
   scenario.vehicles[1].mission.waypoints = {{6, 6, 3}};
-  scenario.vehicles[1].mission.yaw = "fixed";
+  scenario.vehicles[1].mission.yaw = YawMode::kFixed;
   scenario.duration = 8.0;
   ByteSink sink;
   const Simulation simulation = run(scenario, sink, executor);
@@ -71,10 +71,10 @@ TEST(Collisions, CrashTurnsTheRotorsOffAndTheWreckLiesOnTheGround) {
   const Executor executor(1);
   Scenario scenario = hovering();
   scenario.obstacles = {passing(2.0)};
-  scenario.vehicles[0].on_collision = "crash";
+  scenario.vehicles[0].on_collision = CollisionReaction::kCrash;
   scenario.vehicles[0].commands.resize(1);  // a wreck does not start again
   scenario.vehicles[0].commands[0].time = 1.5;
-  scenario.vehicles[0].commands[0].kind = "take_off";
+  scenario.vehicles[0].commands[0].kind = CommandKind::kTakeOff;
   scenario.duration = 6.0;
   ByteSink sink;
   const Simulation simulation = run(scenario, sink, executor);
@@ -90,7 +90,7 @@ TEST(Collisions, StopEndsTheRunAtOnce) {
   const Executor executor(1);
   Scenario scenario = hovering();
   scenario.obstacles = {passing(2.0)};
-  scenario.vehicles[0].on_collision = "stop";
+  scenario.vehicles[0].on_collision = CollisionReaction::kStop;
   ByteSink sink;
   const Simulation simulation = run(scenario, sink, executor);
   EXPECT_EQ(simulation.end(), RunEnd::kCollision);
@@ -154,8 +154,8 @@ TEST(Obstacles, FlyStraightStayInsideAndAreReplaced) {
 TEST(Obstacles, BounceWhereTheyAreToldTo) {
   Scenario scenario = hovering();
   ObstacleSettings ball;
-  ball.at_border = "bounce";
-  ball.directions = "horizontal";
+  ball.at_border = AtBorder::kBounce;
+  ball.directions = FlightDirections::kHorizontal;
   ball.speed = 5.0;
   ball.bounds_min = {5, 3, 4};
   ball.bounds_max = {9, 9, 5};
@@ -183,11 +183,11 @@ TEST(Obstacles, ThoseThatAreNearAreFoundWithoutLookingAtAll) {
   settings[0].speed = 0.5;
   settings[0].speed_max = 30.0;  // many are replaced within a slice of time
   settings[1].count = 50;
-  settings[1].at_border = "bounce";
+  settings[1].at_border = AtBorder::kBounce;
   settings[1].speed = 20.0;
   settings[2] = passing(3.0);
-  settings[3].motion = "still";
-  settings[3].shape = "box";
+  settings[3].motion = ObstacleMotion::kStill;
+  settings[3].shape = ObstacleShape::kBox;
   settings[3].position = {4, 4, 2};
   ObstacleWorld world;
   world.map = hall();
@@ -287,7 +287,7 @@ TEST(Obstacles, OfACloudAreSeenAndMet) {
   scenario.vehicles[0].start = {10, 6, 1};
   scenario.vehicles[0].lidars = {LidarMount{}};
   ObstacleSettings person = passing(1.0);
-  person.shape = "cloud";
+  person.shape = ObstacleShape::kCloud;
   person.file = folder / "person.xyz";
   person.resolution = 0.05;
   person.waypoints = {{10, 4, 0}, {10, 7, 0}};
@@ -307,15 +307,15 @@ TEST(Commands, OfAScenarioTakeOffFlyAndLand) {
   v.landed = true;
   v.commands.resize(4);
   v.commands[0].time = 0.5;
-  v.commands[0].kind = "take_off";
+  v.commands[0].kind = CommandKind::kTakeOff;
   v.commands[0].height = 2.0;
   v.commands[1].time = 5.0;
-  v.commands[1].kind = "velocity";
+  v.commands[1].kind = CommandKind::kVelocity;
   v.commands[1].vector = {1, 0, 0};
   v.commands[2].time = 8.0;
-  v.commands[2].kind = "hover";
+  v.commands[2].kind = CommandKind::kHover;
   v.commands[3].time = 11.0;
-  v.commands[3].kind = "land";
+  v.commands[3].kind = CommandKind::kLand;
   scenario.duration = 20.0;
   ByteSink sink;
   const Simulation simulation = run(scenario, sink, Executor(1));
@@ -337,8 +337,8 @@ TEST(Commands, ALargeVehicleStaysOnTheGroundThatItHasLandedOn) {
   v.lidars.clear();
   v.start = {10, 6, 1.5};
   v.commands.resize(1);
-  v.commands[0].kind = "land";
-  scenario.air.wind.turbulence = "light";
+  v.commands[0].kind = CommandKind::kLand;
+  scenario.air.wind.turbulence = Turbulence::kLight;
   scenario.duration = 8.0;
   ByteSink sink;
   const Simulation simulation = run(scenario, sink, Executor(1));
@@ -352,7 +352,7 @@ TEST(Commands, ALargeVehicleStaysOnTheGroundThatItHasLandedOn) {
 TEST(Commands, DisarmedInTheAirItFallsAndLiesWhereItFell) {
   Scenario scenario = hovering();
   scenario.vehicles[0].commands.resize(1);
-  scenario.vehicles[0].commands[0].kind = "disarm";
+  scenario.vehicles[0].commands[0].kind = CommandKind::kDisarm;
   ByteSink sink;
   const Simulation simulation = run(scenario, sink, Executor(1));
   EXPECT_TRUE(simulation.status(0).landed);
@@ -365,10 +365,10 @@ TEST(Faults, DoWhatTheySay) {
   Scenario scenario = hovering();
   VehicleSetup& v = scenario.vehicles[0];
   v.lidars = {LidarMount{}, LidarMount{"vlp32c"}};
-  v.faults = {{.kind = "lidar", .from = 1.0, .until = 2.0, .index = 0},
-              {.kind = "scan_drop", .from = 0.0, .until = 0.0, .index = 1, .value = 0.5},
-              {.kind = "imu", .from = 0.5, .until = 0.0, .axis = "accel_y"},
-              {.kind = "odometry_delay", .from = 1.0, .until = 2.0, .value = 0.05}};
+  v.faults = {{.kind = FaultKind::kLidar, .from = 1.0, .until = 2.0, .index = 0},
+              {.kind = FaultKind::kScanDrop, .from = 0.0, .until = 0.0, .index = 1, .value = 0.5},
+              {.kind = FaultKind::kImu, .from = 0.5, .until = 0.0, .axis = ImuAxis::kAccelY},
+              {.kind = FaultKind::kOdometryDelay, .from = 1.0, .until = 2.0, .value = 0.05}};
   struct Watch : SampleSink {
     void on_sample(const Sample& sample) override {
       if (const auto* scanned = std::get_if<ScanSample>(&sample)) ++scans[scanned->scan->sensor];
@@ -396,7 +396,8 @@ TEST(Faults, DoWhatTheySay) {
   EXPECT_EQ(watch.late, 200);
   // a dead rotor
   scenario = hovering();
-  scenario.vehicles[0].faults = {{.kind = "rotor", .from = 1.0, .until = 0.0, .index = 2}};
+  scenario.vehicles[0].faults = {
+      {.kind = FaultKind::kRotor, .from = 1.0, .until = 0.0, .index = 2}};
   ByteSink sink;
   const Simulation simulation = run(scenario, sink, Executor(1));
   EXPECT_LT(simulation.status(0).state.rotors[2].speed, 1.0);

@@ -208,7 +208,7 @@ TEST(Autopilot, HoversWhenCommandsStop) {
 
 TEST(Autopilot, RefusesWhatIsNotFiniteOrNotForThisVehicleAndCounts) {
   VehicleSettings settings = load_vehicle("quad_330");
-  settings.lowest_command = "velocity";
+  settings.lowest_command = CommandLevel::kVelocity;
   Flight flight(settings);
   const double nan = std::numeric_limits<double>::quiet_NaN();
   expect_contains(*flight.give(VelocityCommand{{nan, 0, 0}, 0.0, 0.0}), "velocity");

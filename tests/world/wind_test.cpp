@@ -33,7 +33,7 @@ double density(const std::vector<double>& x, double dt, std::size_t length, doub
 
 TEST(Wind, GustsHaveDrydensSpectra) {
   WindSettings settings;
-  settings.turbulence = "custom";
+  settings.turbulence = Turbulence::kCustom;
   settings.gust_sigma = {1.5, 1.0, 0.7};
   settings.gust_length = {40.0, 25.0, 10.0};
   const Wind wind(settings, 5);
@@ -69,7 +69,7 @@ TEST(Wind, AutocovarianceIsThatOfTheSpectraAtAnyStep) {
   for (const double dt : {0.001, 0.05, 0.4}) {
     SCOPED_TRACE(dt);
     WindSettings settings;
-    settings.turbulence = "custom";
+    settings.turbulence = Turbulence::kCustom;
     settings.gust_sigma = {1, 1, 1};
     settings.gust_length = {10, 10, 10};
     const Wind wind(settings, 9);

@@ -12,7 +12,7 @@ class GridPattern : public BeamPattern {
  public:
   explicit GridPattern(const LidarSettings& settings) {
     const GridSettings& s = settings.grid;
-    const bool pinhole = s.projection == "pinhole";
+    const bool pinhole = s.projection == GridProjection::kPinhole;
     if (pinhole && !(s.fx > 0.0 && s.fy > 0.0)) {
       throw InputError("grid.projection: pinhole needs fx and fy");
     }

@@ -42,7 +42,7 @@ CsvTable table_of(std::vector<Channel> channels, const RingsSettings& s, const s
     return a.elevation_deg < b.elevation_deg;
   };
   std::string text;
-  if (s.convention == "ouster") {  // whose rows are counted from the top
+  if (s.convention == RingConvention::kOuster) {  // whose rows are counted from the top
     std::stable_sort(channels.begin(), channels.end(), [&](const Channel& a, const Channel& b) {
       return below(b, a);
     });
@@ -236,7 +236,8 @@ class OusterPattern : public BeamPattern {
 }  // namespace
 
 std::unique_ptr<BeamPattern> make_rings_pattern(const LidarSettings& settings) {
-  if (settings.rings.convention == "ouster") return std::make_unique<OusterPattern>(settings);
+  if (settings.rings.convention == RingConvention::kOuster)
+    return std::make_unique<OusterPattern>(settings);
   return std::make_unique<VelodynePattern>(settings);
 }
 
