@@ -4,18 +4,16 @@
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
-#include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <thread>
 
 #include "apps/commands.hpp"
 #include "apps/flags.hpp"
-#include "apps/pictures.hpp"
-#include "apps/ros_session.hpp"
+#include "apps/fly_links.hpp"
+#include "apps/ros_flags.hpp"
 #include "apps/scenario_command.hpp"
 #include "apps/settings_json.hpp"
 #include "apps/terminal.hpp"
@@ -30,7 +28,6 @@ namespace pointflight::apps {
 namespace {
 
 namespace fs = std::filesystem;
-using Clock = std::chrono::steady_clock;
 
 struct FlyFlags {
   std::string input;
@@ -51,96 +48,6 @@ struct FlyFlags {
   bool json = false;
   RosFlags ros;
 };
-
-/// Says collisions and what happens on board as they happen.
-class CollisionLog : public SampleSink {
- public:
-  explicit CollisionLog(const Simulation& simulation) : simulation_(simulation) {}
-
-  void on_sample(const Sample& sample) override {
-    if (const auto* event = std::get_if<CollisionEvent>(&sample)) say(*event);
-    if (const auto* event = std::get_if<VehicleEvent>(&sample)) say(*event);
-  }
-
- private:
-  void say(const CollisionEvent& event) {
-    constexpr int kSaid = 20;
-    if (!event.entered || said_ > kSaid) return;
-    log(said_++ == kSaid ? std::string("more collisions: see events.csv")
-                         : fmt::format("warning: collision at {:.3f} s, {} at {}, with {} at {}",
-                                       to_seconds(event.time),
-                                       simulation_.vehicle(event.vehicle).setup().name,
-                                       point_text(event.vehicle_world),
-                                       label_name(simulation_, event.partner),
-                                       point_text(event.place_world)));
-  }
-
-  void say(const VehicleEvent& event) {
-    if (events_ > kEventsSaid) return;
-    log(events_++ == kEventsSaid ? std::string("more on board: see events.csv")
-                                 : fmt::format("warning: {} at {:.3f} s: {}",
-                                               simulation_.vehicle(event.vehicle).setup().name,
-                                               to_seconds(event.time),
-                                               event.words));
-  }
-
-  static constexpr int kEventsSaid = 20;
-  const Simulation& simulation_;
-  int said_ = 0;
-  int events_ = 0;
-};
-
-/// Holds the run back to `rate` simulated seconds a second; 0: as fast as it goes.
-class Pace {
- public:
-  explicit Pace(double rate) : rate_(rate) {}
-
-  /// After a pause: from here on.
-  void restart_at(SimTime time) {
-    start_ = Clock::now();
-    from_ = time;
-    next_trouble_ = 1.0;
-  }
-
-  /// How long ago an instant was due, s.
-  [[nodiscard]] std::optional<double> late(SimTime time) const {
-    if (rate_ <= 0.0) return std::nullopt;
-    const std::chrono::duration<double> since = Clock::now() - start_;
-    return since.count() - to_seconds(time - from_) / rate_;
-  }
-
-  /// A line for the user where the run has fallen behind by a second, and when that has doubled.
-  std::optional<std::string> trouble(SimTime time) {
-    const double behind = late(time).value_or(0.0);
-    if (behind < next_trouble_) return std::nullopt;
-    const double passed = to_seconds(time - from_) / rate_;
-    next_trouble_ = 2.0 * behind;
-    return fmt::format(
-        "warning: {:.1f} s behind: this machine manages a rate of {:.2f}, not {}; "
-        "use fewer LiDARs, a coarser map or --rate {:.1f}, or --lockstep",
-        behind,
-        rate_ * passed / (passed + behind),
-        rate_,
-        std::max(0.1, std::floor(9.0 * rate_ * passed / (passed + behind)) / 10.0));
-  }
-
-  void wait_for(SimTime time) const {
-    if (rate_ <= 0.0) return;
-    const auto due = start_ + std::chrono::duration_cast<Clock::duration>(
-                                  std::chrono::duration<double>(to_seconds(time - from_) / rate_));
-    if (due - Clock::now() > std::chrono::milliseconds(2)) std::this_thread::sleep_until(due);
-  }
-
- private:
-  double rate_;
-  double next_trouble_ = 1.0;  ///< s behind.
-  Clock::time_point start_ = Clock::now();
-  SimTime from_;
-};
-
-double seconds_since(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 double parse_rate(const std::string& text) {
   if (text == "max") return 0.0;
@@ -320,116 +227,59 @@ int exit_code_of(RunEnd end) {
   }
 }
 
-/// Files and picture of a run; nothing without a folder.
-class RunFiles {
- public:
-  RunFiles(const FlyFlags& flags, const Simulation& simulation) {
-    if (flags.output.empty()) return;
-    recorder_.emplace(
-        flags.output, simulation, flags.force ? Existing::kReplace : Existing::kRefuse);
-    sinks_.add(*recorder_);
-    sinks_.add(picture_);
+/// How late scans left, what lockstep waited for in vain.
+void say_waits(const RunLoop& loop, const RosFlags& ros) {
+  const ScanDelays& delays = loop.scan_delays();
+  if (ros.is_live() && delays.count() > 0) {
+    log(fmt::format("scans left {:.1f} ms after their end (median), {:.1f} ms at p99",
+                    1e3 * delays.below(0.5),
+                    1e3 * delays.below(0.99)));
   }
-
-  [[nodiscard]] SampleSink& sink() { return ended_ ? nothing_ : sinks_; }
-
-  /// The run ends, or starts again, which its files cannot. `wall`: s that it took.
-  void end(const Simulation& simulation, double wall, int threads) {
-    if (ended_ || !recorder_) return;
-    ended_ = true;
-    describe_run(simulation, picture_);
-    draw_overview(simulation.map(), picture_, recorder_->path_for("overview.png"));
-    write_timing(simulation, wall, threads);
-    recorder_->finish(simulation);
+  if (loop.unanswered_scans() > 0) {
+    log(fmt::format("{} scans had no command within {} s", loop.unanswered_scans(), ros.lockstep));
   }
-
- private:
-  /// The one file that knows of clocks and of this machine's folders.
-  void write_timing(const Simulation& simulation, double wall, int threads) const {
-    const Scenario& scenario = simulation.scenario();
-    nlohmann::ordered_json json;
-    json["wall_time"] = wall;
-    json["real_time_factor"] = to_seconds(simulation.time()) / wall;
-    json["threads"] = threads;
-    json["map"] = fs::weakly_canonical(resolve_path(scenario.map, scenario.folder())).string();
-    json["command_line"] = command_line();
-    OutputFile file(recorder_->path_for("timing.json"));
-    file.write(json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
-    file.commit();
-  }
-
-  std::optional<FlightRecorder> recorder_;
-  RunPicture picture_;
-  SampleSplitter sinks_;
-  SampleSplitter nothing_;
-  bool ended_ = false;
-};
+}
 
 int fly(const FlyFlags& flags) {
   if (flags.output.empty() && !flags.ros.any()) {
     throw InputError("give a folder for the results with -o, or --ros1, --ros2 or --record");
   }
   check_ros_flags(flags.ros);
+  RunOptions options;
   // others live on the wall clock
-  const double rate =
-      parse_rate(flags.rate.empty() ? (flags.ros.is_live() ? "1.0" : "max") : flags.rate);
+  options.rate = parse_rate(flags.rate.empty() ? (flags.ros.is_live() ? "1.0" : "max") : flags.rate);
+  options.lockstep = flags.ros.lockstep;
+  options.log = [](const std::string& line) { log(line); };
+  options.progress = terminal_progress();
+  options.interrupted = interrupted;
   if (!flags.output.empty()) check_folder(flags);
   const Executor executor(flags.threads);
   Scenario scenario = load_input(flags, executor);
   const auto map = scenario.open_map();
-  prepare_for_ros(flags.ros, rate, scenario);
+  prepare_for_ros(flags.ros, options.rate, scenario);
   Simulation simulation(scenario, map, executor);
   warn_about(scenario, *map);
   for (const std::string& warning : start_warnings(simulation, executor)) log(warning);
 
-  RunFiles files(flags, simulation);
-  CollisionLog collisions(simulation);
-  catch_interrupts();
-  RosSession ros(flags.ros, simulation);
-  const Progress progress = terminal_progress();
-  const SimulationState at_start = simulation.state();
-  if (!ros.start()) return kInterrupted;
-  Pace pace(rate);
-  ros.measure_lateness([&](SimTime time) { return pace.late(time); });
-  const auto start = Clock::now();
-  for (bool running = true; running;) {
-    SampleSplitter sink;
-    sink.add(files.sink());
-    sink.add(collisions);
-    if (ros.sink() != nullptr) sink.add(*ros.sink());
-    const auto began = Clock::now();
-    running = simulation.step(sink);
-    const std::chrono::duration<double> took = Clock::now() - began;
-    RosSession::Next next = ros.after_step(took.count());
-    while (next == RosSession::Next::kWait && !ros.is_over()) {
-      next = ros.after_step();
-      pace.restart_at(simulation.time());
-    }
-    if (next == RosSession::Next::kReset) {
-      files.end(simulation, seconds_since(start), executor.threads());
-      const SimTime reached = simulation.time();
-      simulation.restore(at_start);
-      ros.was_reset(reached);
-      pace.restart_at(simulation.time());
-      running = true;
-    }
-    const bool for_nobody = flags.output.empty() && !flags.ros.is_live() &&
-                            ros.failed_recordings() == flags.ros.records.size();
-    if (ros.is_over() || for_nobody) simulation.interrupt();
-    if (flags.ros.lockstep <= 0.0) {
-      if (const auto trouble = pace.trouble(simulation.time())) log(*trouble);
-    }
-    pace.wait_for(simulation.time());
-    if (simulation.time().time_since_epoch() % std::chrono::milliseconds(100) == Duration{0}) {
-      report(progress, "flying", to_seconds(simulation.time()) / to_seconds(simulation.end_time()));
-    }
+  RunLoop loop(simulation, options);
+  std::optional<FolderLink> folder;
+  if (!flags.output.empty()) {
+    const Existing existing = flags.force ? Existing::kReplace : Existing::kRefuse;
+    folder.emplace(flags.output, simulation, loop, executor.threads(), existing);
+    loop.add(*folder);
   }
-  const double wall = seconds_since(start);
+  TerminalLink terminal(simulation);
+  loop.add(terminal);
+  catch_interrupts();
+  const std::unique_ptr<RosLink> ros = make_ros_link(flags.ros, simulation);
+  if (ros) loop.add(*ros);
+  const RunEnd end = loop.run();
   end_progress();
-  ros.close();
-  files.end(simulation, wall, executor.threads());
-  print_result(flags, simulation, wall);
-  return ros.failed_recordings() > 0 ? kWrongInput : exit_code_of(simulation.end());
+  if (!loop.has_started()) return kInterrupted;
+  say_recordings(flags.ros);
+  say_waits(loop, flags.ros);
+  print_result(flags, simulation, loop.wall_time());
+  return ros && ros->has_failed_recording() ? kWrongInput : exit_code_of(end);
 }
 
 }  // namespace

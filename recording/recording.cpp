@@ -47,11 +47,6 @@ void Recording::guarded(const Action& action) {
   }
 }
 
-std::optional<std::string> Recording::take_failure() {
-  if (!has_failed() || std::exchange(told_, true)) return std::nullopt;
-  return failure_;
-}
-
 int Recording::advertise(const Topic& topic) {
   guarded([&] { outlet_->advertise(topic); });
   return topics_++;

@@ -36,10 +36,7 @@ class Recording : public Outlet {
 
   /// As given to the constructor.
   [[nodiscard]] const std::string& path() const { return path_; }
-  /// True once it has ended too early.
-  [[nodiscard]] bool has_failed() const { return !failure_.empty(); }
-  /// Why, in words for the user; the first time that it is asked for after that.
-  std::optional<std::string> take_failure();
+  [[nodiscard]] std::string failure() const override { return failure_; }
 
  private:
   template <class Action>
@@ -51,7 +48,6 @@ class Recording : public Outlet {
   int lock_;
   int topics_ = 0;
   std::string failure_;
-  bool told_ = false;
 };
 
 }  // namespace pointflight

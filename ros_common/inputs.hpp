@@ -9,26 +9,12 @@
 #include <variant>
 #include <vector>
 
+#include "pointflight/run/order.hpp"
 #include "pointflight/sim/simulation.hpp"
 #include "ros_common/profile.hpp"
 #include "ros_common/wire.hpp"
 
 namespace pointflight {
-
-/// What a message from outside asks for.
-struct VehicleOrder {
-  std::size_t vehicle = 0;  ///< Number in the fleet.
-  Command command;          ///< What the message says, in the program's units and frames.
-  bool is_answer = false;   ///< A planner's: what lockstep waits for.
-};
-/// Stop the run, or go on.
-struct PauseOrder {
-  bool pause = true;  ///< False: go on.
-};
-struct StepOrder {};  ///< While paused: go on until the next scan.
-struct ResetOrder {};
-/// One of them; those without a vehicle are about the run.
-using Order = std::variant<VehicleOrder, PauseOrder, StepOrder, ResetOrder>;
 
 /// One topic that is read, for one vehicle and one kind of message.
 struct InputStream {

@@ -96,6 +96,9 @@ class Outlet {
 
   /// Ends what is open; nothing is sent after.
   virtual void close() {}
+
+  /// Why it had to end, in words for the user; empty where nothing is wrong.
+  virtual std::string failure() const { return {}; }
 };
 
 /// A ROS: messages go out and come in.
@@ -123,9 +126,6 @@ class Transport : public Outlet {
 
   /// True once somebody outside has ended the node (ROS 1: rosnode kill, another node of its name).
   virtual bool is_over() const { return false; }
-
-  /// Why it had to end, in words for the user; empty where nothing is wrong.
-  virtual std::string failure() const { return {}; }
 
   /// False where `close` had to leave threads behind (ROS 1: a master that does not answer): the
   /// process must then end without the destructors of static objects.

@@ -1,0 +1,91 @@
+#include "apps/fly_links.hpp"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "apps/pictures.hpp"
+#include "apps/terminal.hpp"
+#include "pointflight/core/number_text.hpp"
+#include "pointflight/core/output_file.hpp"
+#include "pointflight/core/resources.hpp"
+
+namespace pointflight::apps {
+namespace {
+
+namespace fs = std::filesystem;
+constexpr int kSaid = 20;
+
+}  // namespace
+
+void TerminalLink::on_sample(const Sample& sample) {
+  if (const auto* event = std::get_if<CollisionEvent>(&sample)) say(*event);
+  if (const auto* event = std::get_if<VehicleEvent>(&sample)) say(*event);
+}
+
+void TerminalLink::say(const CollisionEvent& event) {
+  if (!event.entered || collisions_ > kSaid) return;
+  log(collisions_++ == kSaid
+          ? std::string("more collisions: see events.csv")
+          : fmt::format("warning: collision at {:.3f} s, {} at {}, with {} at {}",
+                        to_seconds(event.time),
+                        simulation_.vehicle(event.vehicle).setup().name,
+                        point_text(event.vehicle_world),
+                        label_name(simulation_, event.partner),
+                        point_text(event.place_world)));
+}
+
+void TerminalLink::say(const VehicleEvent& event) {
+  if (events_ > kSaid) return;
+  log(events_++ == kSaid ? std::string("more on board: see events.csv")
+                         : fmt::format("warning: {} at {:.3f} s: {}",
+                                       simulation_.vehicle(event.vehicle).setup().name,
+                                       to_seconds(event.time),
+                                       event.words));
+}
+
+FolderLink::FolderLink(const std::string& folder,
+                       const Simulation& simulation,
+                       const RunLoop& loop,
+                       int threads,
+                       Existing existing)
+    : simulation_(simulation),
+      loop_(loop),
+      threads_(threads),
+      recorder_(folder, simulation, existing) {}
+
+void FolderLink::on_sample(const Sample& sample) {
+  if (ended_) return;
+  recorder_.on_sample(sample);
+  picture_.on_sample(sample);
+}
+
+void FolderLink::on_reset(SimTime /*reached*/) {
+  close();
+}
+
+void FolderLink::close() {
+  if (ended_) return;
+  ended_ = true;
+  describe_run(simulation_, picture_);
+  draw_overview(simulation_.map(), picture_, recorder_.path_for("overview.png"));
+  write_timing();
+  recorder_.finish(simulation_);
+}
+
+/// The one file that knows of clocks and of this machine's folders.
+void FolderLink::write_timing() const {
+  const Scenario& scenario = simulation_.scenario();
+  nlohmann::ordered_json json;
+  json["wall_time"] = loop_.wall_time();
+  json["real_time_factor"] = to_seconds(simulation_.time()) / loop_.wall_time();
+  json["threads"] = threads_;
+  json["map"] = fs::weakly_canonical(resolve_path(scenario.map, scenario.folder())).string();
+  json["command_line"] = command_line();
+  OutputFile file(recorder_.path_for("timing.json"));
+  file.write(json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
+  file.commit();
+}
+
+}  // namespace pointflight::apps

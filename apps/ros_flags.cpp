@@ -1,0 +1,202 @@
+#include "apps/ros_flags.hpp"
+
+#include <fmt/format.h>
+
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <algorithm>
+#include <filesystem>
+
+#include "apps/flags.hpp"
+#include "apps/modules.hpp"
+#include "apps/terminal.hpp"
+#include "pointflight/core/input_error.hpp"
+#include "pointflight/core/locked_file.hpp"
+#include "pointflight/core/mapped_file.hpp"
+#include "recording/mcap_writer.hpp"
+#include "recording/recording.hpp"
+#include "ros_common/ros_names.hpp"
+
+namespace pointflight::apps {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Some ROS programs misread times near zero: runs start here unless told otherwise.
+constexpr Duration kFixedEpoch = std::chrono::seconds(1'700'000'000);
+constexpr double kEndless = 1e6;  // s
+
+/// Of a flag or a scenario's key: "now", or seconds since 1970.
+Duration epoch_from(const std::string& text, const std::string& place) {
+  if (text == "now") {
+    return std::chrono::duration_cast<Duration>(
+        std::chrono::system_clock::now().time_since_epoch());
+  }
+  char* end = nullptr;
+  const double seconds = std::strtod(text.c_str(), &end);
+  // a stamp has 31 bits of seconds
+  if (end == text.c_str() || *end != '\0' || !(seconds >= 0.0) || !(seconds < 2.1e9)) {
+    throw InputError(
+        fmt::format("{}: '{}'; 'now' or seconds since 1970, such as 1.7e9", place, text));
+  }
+  return from_seconds(seconds);
+}
+
+Duration epoch_of(const RosFlags& flags, const Scenario& scenario, const RosProfile& profile) {
+  if (!flags.epoch.empty()) return epoch_from(flags.epoch, "--epoch");
+  if (!scenario.ros.epoch.empty()) {
+    return epoch_from(scenario.ros.epoch, scenario.place("ros.epoch"));
+  }
+  // living nodes must not see time jump back after a restart; recordings by themselves and runs in
+  // lockstep are the same each time
+  const bool live = flags.is_live() && flags.lockstep <= 0.0;
+  return live && profile.epoch == "now" ? epoch_from("now", "") : kFixedEpoch;
+}
+
+/// The file that a scenario came from, or the scenario as a file.
+std::string text_of(const Scenario& scenario) {
+  if (scenario.path.empty()) return scenario_yaml(scenario);
+  const MappedFile file(scenario.path);
+  const auto bytes = file.bytes();
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+}  // namespace
+
+void add_ros_flags(CLI::App& app, RosFlags& flags) {
+  app.add_flag("--ros1", flags.ros1, "Publish to ROS 1 and take commands from it, in real time");
+  app.add_flag("--ros2", flags.ros2, "The same with ROS 2, for which none has to be installed");
+  app.add_flag("--ros2-localhost", flags.localhost, "Let only this machine find the ROS 2 node");
+  app.add_option("--profile",
+                 flags.profile,
+                 "Names of messages: default, marsim, ego, livox, ... or a path (docs/ros.md)");
+  app.add_option("--epoch", flags.epoch, "Stamps start 'now', or at seconds since 1970");
+  app.add_option("--node", flags.node, "Name of the ROS node")->capture_default_str();
+  app.add_flag("--no-wait", flags.no_wait, "Fly even while there is no ROS 1 master yet");
+  auto* stay = app.add_flag("--stay",
+                            flags.stay,
+                            "Hover when the mission is flown, until interrupted (the default with "
+                            "ROS in real time, unless --lockstep or a duration is given)");
+  app.add_flag("--no-stay", flags.no_stay, "End when the mission is flown")->excludes(stay);
+  app.add_option("--lockstep",
+                 flags.lockstep,
+                 "Wait after each scan for a command, so many seconds at most")
+      ->check(within(0.0, 3600.0));
+  app.add_option("--record",
+                 flags.records,
+                 "Record all messages into FILE.mcap (ROS 2) or FILE.bag (ROS 1); again for more")
+      ->type_name("FILE")
+      ->expected(1)
+      ->take_all();
+  app.add_option("--compression", flags.compression, "Of recordings: zstd, lz4 or none")
+      ->check(CLI::IsMember({"zstd", "lz4", "none"}))
+      ->capture_default_str();
+}
+
+void check_ros_flags(const RosFlags& flags) {
+  for (const auto& [flag, given] : {std::pair{"--lockstep", flags.lockstep > 0.0},
+                                    std::pair{"--stay", flags.stay},
+                                    std::pair{"--no-wait", flags.no_wait}}) {
+    if (given && !flags.is_live()) {
+      throw InputError(fmt::format("{}: has no effect without --ros1 or --ros2", flag));
+    }
+  }
+  if (!flags.profile.empty() && !flags.any()) {
+    throw InputError("--profile: has no effect without --ros1, --ros2 or --record");
+  }
+}
+
+void prepare_for_ros(const RosFlags& flags, double rate, Scenario& scenario) {
+  if (!flags.any()) return;
+  const RosProfile profile = profile_for(scenario, flags.profile);
+  scenario.output.odometry_rate =
+      std::max(scenario.output.odometry_rate, RosBridge::odometry_rate(profile));
+  const bool planned = std::any_of(
+      scenario.vehicles.begin(), scenario.vehicles.end(), [](const VehicleSetup& vehicle) {
+        return !vehicle.mission.waypoints.empty() || !vehicle.commands.empty();
+      });
+  if (!flags.is_live()) return;
+  const bool is_open = scenario.duration <= 0.0;
+  const bool stays = rate > 0.0 && flags.lockstep <= 0.0 && !flags.no_stay;
+  if (flags.stay || (is_open && (stays || !planned))) scenario.duration = kEndless;
+}
+
+namespace {
+
+std::unique_ptr<Outlet> open_recording(const RosFlags& flags,
+                                       const std::string& path,
+                                       const Scenario& scenario,
+                                       Duration epoch) {
+  const bool is_mcap = fs::path(path).extension() == ".mcap";
+  if (!is_mcap && fs::path(path).extension() != ".bag") {
+    throw InputError(fmt::format("--record: {}: give a name that ends in .mcap or .bag", path));
+  }
+  check_recording({path, flags.overwrite});
+  if (is_mcap) {
+    McapOptions options;
+    options.compression = flags.compression;
+    auto writer = std::make_unique<McapWriter>(path, options);
+    writer->attach("scenario.yaml", "application/yaml", text_of(scenario), epoch.count());
+    return std::make_unique<Recording>(path, std::move(writer));
+  }
+  const Ros1Module& ros1 = ros1_module();
+  // rosbag itself knows of no locks
+  const int lock = open_locked(path + ".active", path + ".active");
+  // bags know no zstd
+  const std::string compression = flags.compression == "zstd" ? "lz4" : flags.compression;
+  return std::make_unique<Recording>(path, ros1.bag_writer(path, compression), lock);
+}
+
+void check_twice(const std::vector<std::string>& paths) {
+  for (std::size_t i = 0; i < paths.size(); ++i) {
+    for (std::size_t k = 0; k < i; ++k) {
+      if (fs::weakly_canonical(paths[k]) != fs::weakly_canonical(paths[i])) continue;
+      throw InputError(fmt::format("--record: {} is given twice", paths[i]));
+    }
+  }
+}
+
+}  // namespace
+
+std::unique_ptr<RosLink> make_ros_link(const RosFlags& flags, const Simulation& simulation) {
+  if (!flags.any()) return nullptr;
+  const bool digit = flags.node.find_first_of("0123456789") == 0;
+  if (!is_ros_word(flags.node) || digit) {
+    throw InputError(
+        fmt::format("--node: '{}'; letters, digits and _ only, and no digit at first", flags.node));
+  }
+  check_twice(flags.records);
+  const Scenario& scenario = simulation.scenario();
+  const RosProfile profile = profile_for(scenario, flags.profile);
+  RosLinkOptions options;
+  options.epoch = epoch_of(flags, scenario, profile);
+  options.waits = !flags.no_wait;
+  options.lockstep = flags.lockstep > 0.0;
+  options.log = [](const std::string& line) { log(line); };
+  options.on_left_behind = leave_static_objects;
+  const Duration epoch = options.epoch;
+  auto link = std::make_unique<RosLink>(simulation, profile, std::move(options));
+  for (const std::string& path : flags.records) {
+    link->add(open_recording(flags, path, scenario, epoch));
+  }
+  TransportOptions transport;
+  transport.node = flags.node;
+  transport.log = [](const std::string& text) { log(text); };
+  transport.localhost_only = flags.localhost;
+  if (flags.ros2) transport.large_rate = large_rate(simulation, profile);
+  if (flags.ros1) link->add(ros1_module().transport(transport));
+  if (flags.ros2) link->add(ros2_module().transport(transport));
+  return link;
+}
+
+void say_recordings(const RosFlags& flags) {
+  for (const std::string& path : flags.records) {
+    std::error_code error;
+    const auto size = fs::file_size(path, error);
+    if (error) continue;  // it has failed, and was said
+    log(fmt::format("recorded {}, {:.1f} MB", path, 1e-6 * static_cast<double>(size)));
+  }
+}
+
+}  // namespace pointflight::apps

@@ -1,0 +1,62 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "pointflight/run/order.hpp"
+#include "pointflight/sim/samples.hpp"
+
+namespace pointflight {
+
+/// A step that was done.
+struct StepDone {
+  SimTime time;             ///< Start of the next step.
+  double took = 0.0;        ///< s by the wall clock.
+  std::uint64_t scans = 0;  ///< That were delivered in it.
+};
+
+/// Why the run stands still.
+enum class Waiting {
+  kForLinks,   ///< Not all are ready yet; about every 20 ms.
+  kPaused,     ///< By an order; about every 20 ms.
+  kForAnswer,  ///< In lockstep, for a command; about every 0.2 ms.
+};
+
+/// What somebody outside is to a run: a ROS, a recording, files, a page, a flight controller,
+/// another process. Samples come in, orders go out. All calls come from the thread of the run's loop
+/// (`RunLoop`), in this order: `open`, `is_ready` until it is, then for each step samples,
+/// `on_step` and `take_orders`, at last `close`. A link with a thread of its own: `ThreadedLink`.
+class Link : public SampleSink {
+ public:
+  /// The run is about to start. May throw InputError.
+  virtual void open() {}
+  /// False while the run should not start yet. May throw InputError.
+  virtual bool is_ready() { return true; }
+
+  void on_sample(const Sample& /*sample*/) override {}
+  /// All samples of a step have come.
+  virtual void on_step(const StepDone& /*step*/) {}
+  /// The run stands still at a time.
+  virtual void on_wait(SimTime /*now*/, Waiting /*why*/) {}
+
+  /// What this link asks for since it was last asked, in order; obeyed between steps.
+  virtual std::vector<Order> take_orders() { return {}; }
+  /// A command of its was not taken, and why.
+  virtual void on_rejected(const VehicleOrder& /*order*/, const std::string& /*why*/) {}
+
+  /// The run is about to start again at time zero; it has come to `reached`.
+  virtual void on_reset(SimTime /*reached*/) {}
+  /// The run has ended: nothing comes any more.
+  virtual void close() {}
+
+  /// True once the run has to end for its sake: an interrupt, a master that is gone.
+  [[nodiscard]] virtual bool is_over() const { return false; }
+  /// False once nothing of the run reaches anybody through it: a recording that failed. A run ends
+  /// where no link is in use any more.
+  [[nodiscard]] virtual bool is_in_use() const { return true; }
+  /// Samples, or messages made of them, that somebody was too slow for.
+  [[nodiscard]] virtual std::uint64_t dropped() const { return 0; }
+};
+
+}  // namespace pointflight

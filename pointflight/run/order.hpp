@@ -1,0 +1,27 @@
+#pragma once
+
+#include <cstddef>
+#include <variant>
+
+#include "pointflight/vehicle/command.hpp"
+
+namespace pointflight {
+
+/// A command for a vehicle.
+struct VehicleOrder {
+  std::size_t vehicle = 0;  ///< Number in the fleet.
+  Command command;          ///< In the program's units and frames.
+  bool is_answer = false;   ///< A planner's: what lockstep waits for.
+};
+/// Stop the run, or go on.
+struct PauseOrder {
+  bool pause = true;  ///< False: go on.
+};
+struct StepOrder {};   ///< While paused: go on until the next scan.
+struct ResetOrder {};  ///< Back to the start.
+struct EndOrder {};    ///< End the run as interrupted.
+
+/// What may be told to a run from outside; those without a vehicle are about the run.
+using Order = std::variant<VehicleOrder, PauseOrder, StepOrder, ResetOrder, EndOrder>;
+
+}  // namespace pointflight

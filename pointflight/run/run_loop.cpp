@@ -1,0 +1,232 @@
+#include "pointflight/run/run_loop.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <thread>
+#include <utility>
+
+namespace pointflight {
+namespace {
+
+constexpr std::chrono::milliseconds kLook(20);         // while links are not ready, or the run paused
+constexpr std::chrono::microseconds kAnswerLook(200);  // in lockstep
+constexpr Duration kProgressPeriod = std::chrono::milliseconds(100);
+
+}  // namespace
+
+void Pace::restart_at(SimTime time) {
+  start_ = Clock::now();
+  from_ = time;
+  next_said_ = 1.0;
+}
+
+std::optional<double> Pace::late(SimTime time) const {
+  if (rate_ <= 0.0) return std::nullopt;
+  const std::chrono::duration<double> since = Clock::now() - start_;
+  return since.count() - to_seconds(time - from_) / rate_;
+}
+
+void Pace::wait_for(SimTime time) const {
+  if (rate_ <= 0.0) return;
+  const auto due = start_ + std::chrono::duration_cast<Clock::duration>(
+                                std::chrono::duration<double>(to_seconds(time - from_) / rate_));
+  if (due - Clock::now() > std::chrono::milliseconds(2)) std::this_thread::sleep_until(due);
+}
+
+std::optional<Pace::Behind> Pace::fallen_behind(SimTime time) {
+  const double behind = late(time).value_or(0.0);
+  if (behind < next_said_) return std::nullopt;
+  const double passed = to_seconds(time - from_) / rate_;
+  next_said_ = 2.0 * behind;
+  return Behind{behind, rate_ * passed / (passed + behind)};
+}
+
+void ScanDelays::add(double seconds) {
+  const double bin = std::clamp(seconds / kBin, 0.0, static_cast<double>(bins_.size() - 1));
+  ++bins_[static_cast<std::size_t>(bin)];
+  ++count_;
+}
+
+double ScanDelays::below(double share) const {
+  std::uint64_t below = 0;
+  std::size_t bin = 0;
+  const auto wanted = static_cast<std::uint64_t>(share * static_cast<double>(count_));
+  while (bin + 1 < bins_.size() && below + bins_[bin] <= wanted) below += bins_[bin++];
+  return kBin * (static_cast<double>(bin) + 0.5);
+}
+
+/// Hands samples to all links; counts scans and measures how late they are.
+class RunLoop::Splitter : public SampleSink {
+ public:
+  explicit Splitter(RunLoop& loop) : loop_(loop) {}
+
+  void on_sample(const Sample& sample) override {
+    for (Link* link : loop_.links_) link->on_sample(sample);
+    const auto* scanned = std::get_if<ScanSample>(&sample);
+    if (scanned == nullptr) return;
+    ++loop_.scans_;
+    if (const auto late = loop_.pace_.late(scanned->scan->end)) loop_.delays_.add(*late);
+  }
+
+ private:
+  RunLoop& loop_;
+};
+
+RunLoop::RunLoop(Simulation& simulation, RunOptions options)
+    : simulation_(simulation),
+      options_(std::move(options)),
+      at_start_(simulation.state()),
+      pace_(options_.rate) {}
+
+void RunLoop::add(Link& link) {
+  links_.push_back(&link);
+}
+
+RunEnd RunLoop::run() {
+  for (Link* link : links_) link->open();
+  if (!wait_until_ready()) {
+    simulation_.interrupt();
+    return simulation_.end();
+  }
+  Splitter sink(*this);
+  pace_.restart_at(simulation_.time());
+  started_ = Clock::now();
+  has_started_ = true;
+  for (bool running = true; running;) {
+    const auto began = Clock::now();
+    running = simulation_.step(sink);
+    after_step(std::chrono::duration<double>(Clock::now() - began).count());
+    wait_while_paused();
+    if (std::exchange(reset_, false)) {
+      reset();
+      running = true;
+    }
+    if (is_over()) simulation_.interrupt();
+    if (options_.lockstep <= 0.0) say_behind();
+    pace_.wait_for(simulation_.time());
+    if (simulation_.time().time_since_epoch() % kProgressPeriod == Duration{0}) {
+      report(options_.progress,
+             "flying",
+             to_seconds(simulation_.time()) / to_seconds(simulation_.end_time()));
+    }
+  }
+  wall_time_ = wall_time();
+  for (Link* link : links_) link->close();
+  return simulation_.end();
+}
+
+double RunLoop::wall_time() const {
+  return wall_time_.value_or(std::chrono::duration<double>(Clock::now() - started_).count());
+}
+
+std::uint64_t RunLoop::dropped() const {
+  std::uint64_t dropped = 0;
+  for (const Link* link : links_) dropped += link->dropped();
+  return dropped;
+}
+
+/// False where the run is over before its first step.
+bool RunLoop::wait_until_ready() {
+  for (;;) {
+    const bool ready = std::all_of(links_.begin(), links_.end(), [](Link* l) { return l->is_ready(); });
+    if (is_over()) return false;
+    if (ready) return true;
+    for (Link* link : links_) link->on_wait(simulation_.time(), Waiting::kForLinks);
+    std::this_thread::sleep_for(kLook);
+  }
+}
+
+bool RunLoop::is_over() const {
+  if (options_.interrupted && options_.interrupted()) return true;
+  const bool used = std::any_of(links_.begin(), links_.end(), [](Link* l) { return l->is_in_use(); });
+  return (!links_.empty() && !used) ||
+         std::any_of(links_.begin(), links_.end(), [](Link* l) { return l->is_over(); });
+}
+
+void RunLoop::after_step(double took) {
+  const std::uint64_t scans = std::exchange(scans_, 0);
+  for (Link* link : links_) link->on_step({simulation_.time(), took, scans});
+  if (options_.lockstep > 0.0 && scans > 0) wait_for_answer();
+  if (scans > 0) step_once_ = false;
+  take_orders();
+}
+
+void RunLoop::wait_for_answer() {
+  const std::uint64_t before = answers_;
+  const auto until = Clock::now() + std::chrono::duration<double>(options_.lockstep);
+  while (answers_ == before && !paused_ && !reset_ && !is_over()) {
+    if (Clock::now() > until) {
+      if (unanswered_++ > 0) return;
+      say(fmt::format("warning: no command within {} s of the scan at {:.1f} s; flying on (said once)",
+                      options_.lockstep,
+                      to_seconds(simulation_.time())));
+      return;
+    }
+    std::this_thread::sleep_for(kAnswerLook);
+    for (Link* link : links_) link->on_wait(simulation_.time(), Waiting::kForAnswer);
+    take_orders();
+  }
+}
+
+void RunLoop::take_orders() {
+  for (Link* link : links_) {
+    for (const Order& order : link->take_orders()) obey(*link, order);
+  }
+}
+
+void RunLoop::obey(Link& link, const Order& order) {
+  if (const auto* vehicle = std::get_if<VehicleOrder>(&order)) {
+    answers_ += vehicle->is_answer ? 1 : 0;
+    const auto why = simulation_.command(vehicle->vehicle, vehicle->command);
+    if (!why) return;
+    link.on_rejected(*vehicle, *why);
+    if (std::exchange(said_rejected_, true)) return;
+    say(fmt::format("warning: {}: {}; not taken (said once, counted)",
+                    simulation_.vehicle(vehicle->vehicle).setup().name,
+                    *why));
+  } else if (const auto* pause = std::get_if<PauseOrder>(&order)) {
+    if (paused_ != pause->pause) say(pause->pause ? "paused" : "going on");
+    paused_ = pause->pause;
+  } else if (std::holds_alternative<StepOrder>(order)) {
+    step_once_ = paused_;
+  } else if (std::holds_alternative<ResetOrder>(order)) {
+    reset_ = true;
+  } else {
+    simulation_.interrupt();
+  }
+}
+
+void RunLoop::wait_while_paused() {
+  while (paused_ && !step_once_ && !reset_ && !is_over()) {
+    for (Link* link : links_) link->on_wait(simulation_.time(), Waiting::kPaused);
+    std::this_thread::sleep_for(kLook);
+    take_orders();
+    pace_.restart_at(simulation_.time());
+  }
+}
+
+void RunLoop::reset() {
+  for (Link* link : links_) link->on_reset(simulation_.time());
+  simulation_.restore(at_start_);
+  say("reset: at the start again; stamps go on");
+  pace_.restart_at(simulation_.time());
+}
+
+void RunLoop::say_behind() {
+  const auto behind = pace_.fallen_behind(simulation_.time());
+  if (!behind) return;
+  say(fmt::format("warning: {:.1f} s behind: this machine manages a rate of {:.2f}, not {}; "
+                  "use fewer LiDARs, a coarser map or --rate {:.1f}, or --lockstep",
+                  behind->seconds,
+                  behind->rate,
+                  pace_.rate(),
+                  std::max(0.1, std::floor(9.0 * behind->rate) / 10.0)));
+}
+
+void RunLoop::say(const std::string& line) const {
+  if (options_.log) options_.log(line);
+}
+
+}  // namespace pointflight

@@ -1,0 +1,135 @@
+#pragma once
+
+#include <array>
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "pointflight/core/progress.hpp"
+#include "pointflight/run/link.hpp"
+#include "pointflight/sim/simulation.hpp"
+
+namespace pointflight {
+
+/// Holds a run back to so many simulated seconds a second of the wall clock.
+class Pace {
+ public:
+  /// 0: as fast as it goes.
+  explicit Pace(double rate) : rate_(rate) {}
+
+  /// From here on: at the start, after a pause.
+  void restart_at(SimTime time);
+  /// How long ago an instant was due, s; nothing where the run is not held back.
+  [[nodiscard]] std::optional<double> late(SimTime time) const;
+  /// Waits until an instant is due; not for less than 2 ms.
+  void wait_for(SimTime time) const;
+  /// Where the run has fallen behind by a second, and when that has doubled: how far (s), and the
+  /// rate that this machine manages.
+  struct Behind {
+    double seconds;  ///< s
+    double rate;     ///< Simulated seconds a second since the start or the last pause.
+  };
+  /// Once for each time that it has doubled.
+  std::optional<Behind> fallen_behind(SimTime time);
+
+  /// As given.
+  [[nodiscard]] double rate() const { return rate_; }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  double rate_;
+  double next_said_ = 1.0;  ///< s behind.
+  Clock::time_point start_ = Clock::now();
+  SimTime from_;
+};
+
+/// Delays of scans in bins of 0.1 ms up to 10 s: however long a run, they take the same memory.
+class ScanDelays {
+ public:
+  /// One more, s.
+  void add(double seconds);
+  /// The delay that a share of all stayed below, s.
+  [[nodiscard]] double below(double share) const;
+  /// How many were added.
+  [[nodiscard]] std::uint64_t count() const { return count_; }
+
+ private:
+  static constexpr double kBin = 1e-4;  // s
+  std::vector<std::uint64_t> bins_ = std::vector<std::uint64_t>(100000);
+  std::uint64_t count_ = 0;
+};
+
+/// How a simulation is run.
+struct RunOptions {
+  double rate = 0.0;      ///< Simulated seconds a second; 0: as fast as it goes.
+  double lockstep = 0.0;  ///< After each scan wait so long for a planner's command, s; 0: do not.
+  /// Lines for users: what the run fell behind, that it was paused.
+  std::function<void(const std::string& line)> log;
+  Progress progress;                   ///< Of the run's length.
+  std::function<bool()> interrupted;  ///< True once the user wants it to end.
+};
+
+/// Turns a simulation into a run: steps it, hands its samples to links and obeys their orders
+/// between steps, so that a run is a function of its orders and the steps that they came at. Pace,
+/// pause and lockstep are waits around the steps; they change no number.
+class RunLoop {
+ public:
+  /// The simulation must outlive the loop; its state is where a reset leads back to.
+  RunLoop(Simulation& simulation, RunOptions options);
+
+  /// Before `run`. The link must outlive the loop; links get samples in the order in which they
+  /// were added.
+  void add(Link& link);
+
+  /// Opens the links, waits until they are ready, runs to the end and closes them; interrupted
+  /// before the first step it closes none. Throws what links and simulation throw.
+  RunEnd run();
+
+  /// False where it was interrupted before its first step.
+  [[nodiscard]] bool has_started() const { return has_started_; }
+  /// Since the first step by the wall clock, s.
+  [[nodiscard]] double wall_time() const;
+  /// From a scan's end until it was handed over, where the run is held to the wall clock.
+  [[nodiscard]] const ScanDelays& scan_delays() const { return delays_; }
+  /// Scans that lockstep waited for in vain.
+  [[nodiscard]] std::uint64_t unanswered_scans() const { return unanswered_; }
+  /// Of all links: the one place that counts.
+  [[nodiscard]] std::uint64_t dropped() const;
+
+ private:
+  class Splitter;
+  using Clock = std::chrono::steady_clock;
+
+  [[nodiscard]] bool wait_until_ready();
+  [[nodiscard]] bool is_over() const;
+  void after_step(double took);
+  void wait_for_answer();
+  void take_orders();
+  void obey(Link& link, const Order& order);
+  void wait_while_paused();
+  void reset();
+  void say_behind();
+  void say(const std::string& line) const;
+
+  Simulation& simulation_;
+  RunOptions options_;
+  SimulationState at_start_;
+  Pace pace_;
+  std::vector<Link*> links_;
+  ScanDelays delays_;
+  Clock::time_point started_ = Clock::now();
+  std::optional<double> wall_time_;
+  bool has_started_ = false;
+  bool paused_ = false;
+  bool step_once_ = false;  ///< While paused: until a scan has come.
+  bool reset_ = false;
+  std::uint64_t scans_ = 0;  ///< In the step under way.
+  std::uint64_t answers_ = 0;
+  std::uint64_t unanswered_ = 0;
+  bool said_rejected_ = false;
+};
+
+}  // namespace pointflight

@@ -1,0 +1,73 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "pointflight/run/link.hpp"
+#include "ros_common/bridge.hpp"
+#include "ros_common/inputs.hpp"
+#include "ros_common/wire.hpp"
+
+namespace pointflight {
+
+/// How ROS takes part in a run.
+struct RosLinkOptions {
+  Duration epoch{0};       ///< Since the Unix epoch: what stamps count from.
+  bool waits = true;       ///< The run starts when all transports have found their ROS...
+  bool lockstep = false;   ///< ...and somebody reads scans and sends commands.
+  std::function<void(const std::string& line)> log;  ///< Lines for users.
+  /// A transport could not be ended (`Transport::has_ended`).
+  std::function<void()> on_left_behind;
+};
+
+/// ROS 1, ROS 2 and recordings of a run: messages out, orders in.
+class RosLink : public Link {
+ public:
+  /// The simulation must outlive it. Throws InputError (a profile that cannot be).
+  RosLink(const Simulation& simulation, const RosProfile& profile, RosLinkOptions options);
+  /// Ends the transports.
+  ~RosLink() override;
+
+  /// Before `open`: a ROS that is published to and listened to.
+  void add(std::unique_ptr<Transport> transport);
+  /// Before `open`: a recording.
+  void add(std::unique_ptr<Outlet> recording);
+
+  void open() override;
+  bool is_ready() override;
+  void on_sample(const Sample& sample) override { bridge_.on_sample(sample); }
+  void on_step(const StepDone& step) override;
+  void on_wait(SimTime now, Waiting why) override;
+  std::vector<Order> take_orders() override;
+  void on_reset(SimTime reached) override;
+  void close() override;
+  [[nodiscard]] bool is_over() const override;
+  [[nodiscard]] bool is_in_use() const override;
+  [[nodiscard]] std::uint64_t dropped() const override;
+
+  /// True where some recording could not be written to its end; it was said.
+  [[nodiscard]] bool has_failed_recording() const;
+
+ private:
+  struct StoredOutlet {
+    std::unique_ptr<Outlet> outlet;
+    bool told = false;  ///< That it has failed.
+  };
+  [[nodiscard]] bool has_planner() const;
+  void say_failed_recordings();
+  void say_refused();
+  void close_transports();
+
+  RosLinkOptions options_;
+  std::vector<StoredOutlet> recordings_;
+  Inbox inbox_;  ///< Outlives the transports, whose threads fill it.
+  std::vector<std::unique_ptr<Transport>> transports_;
+  RosBridge bridge_;
+  int settled_ = 0;  ///< Looks since a planner is there.
+  bool said_waiting_ = false;
+  std::uint64_t told_refused_ = 0;
+};
+
+}  // namespace pointflight
