@@ -22,6 +22,7 @@ enum class StreamId : std::uint32_t {
   kObstacles = 12,     ///< entity: obstacle, index: (times replaced << 12) + draw
   kGusts = 13,         ///< entity: vehicle, index: physics step * 4 + draw
   kDroppedScans = 14,  ///< entity: vehicle << 8 | lidar, index: scan
+  kOwnSensors = 15,    ///< of kinds that programs add; entity: vehicle << 8 | sensor
   kTest = 1000,        ///< inputs of tests and benchmarks
 };
 

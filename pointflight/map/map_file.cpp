@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 
@@ -9,6 +10,7 @@
 #include "pointflight/core/hash.hpp"
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/core/mapped_file.hpp"
+#include "pointflight/io/byte_cursor.hpp"
 
 namespace pointflight {
 namespace {
@@ -21,10 +23,28 @@ std::size_t aligned(std::size_t offset) {
 
 struct Layout {
   std::vector<std::byte> header;
-  std::array<std::span<const std::byte>, kMapSections> sections;
-  std::array<std::size_t, kMapSections> offsets{};
+  std::vector<std::span<const std::byte>> sections;
+  std::vector<std::size_t> offsets;
   std::size_t size = 0;
 };
+
+/// What the sections of version 1 are, whatever their number.
+bool is_known(std::string_view name) {
+  return std::find(std::begin(kMapSectionNames), std::end(kMapSectionNames), name) !=
+         std::end(kMapSectionNames);
+}
+
+std::string_view name_of(const MapSection& section) {
+  return {section.name, strnlen(section.name, sizeof section.name)};
+}
+
+MapSection section_named(std::string_view name) {
+  MapSection section{};
+  require_argument(!name.empty() && name.size() <= sizeof section.name,
+                   "write_map: a section's name has 1 to 16 bytes");
+  std::memcpy(section.name, name.data(), name.size());
+  return section;
+}
 
 /// A map that could not be opened again is not written.
 void check(const Bvh8& tree, const MapDescription& d) {
@@ -44,14 +64,24 @@ void check(const Bvh8& tree, const MapDescription& d) {
 Layout lay_out(const Bvh8& tree, const MapDescription& d) {
   check(tree, d);
   Layout layout;
-  layout.sections = {std::as_bytes(tree.nodes.span()),
-                     std::as_bytes(tree.words.span()),
-                     std::as_bytes(tree.intensity.span()),
-                     std::as_bytes(std::span<const char>(d.metadata.data(), d.metadata.size()))};
+  std::vector<MapSection> table;
+  const auto add = [&](std::string_view name, std::span<const std::byte> bytes) {
+    table.push_back(section_named(name));
+    layout.sections.push_back(bytes);
+  };
+  add("nodes", std::as_bytes(tree.nodes.span()));
+  add("words", std::as_bytes(tree.words.span()));
+  add("intensity", std::as_bytes(tree.intensity.span()));
+  add("metadata", std::as_bytes(std::span<const char>(d.metadata.data(), d.metadata.size())));
+  for (const ExtraSection& extra : d.extra) {
+    require_argument(!is_known(extra.name), "write_map: an extra section with the name of another");
+    add(extra.name, extra.bytes);
+  }
+  require_argument(table.size() <= kMapSectionsMax, "write_map: too many sections");
   MapHeader header{};
   std::memcpy(header.magic, kMapMagic, sizeof kMapMagic);
   header.version = kMapVersion;
-  header.section_count = kMapSections;
+  header.section_count = static_cast<std::uint32_t>(table.size());
   header.resolution = d.resolution;
   for (int axis = 0; axis < 3; ++axis) {
     header.origin[axis] = d.origin_world[axis];
@@ -65,23 +95,48 @@ Layout lay_out(const Bvh8& tree, const MapDescription& d) {
   header.intensity_step = d.intensity_step;
   header.surfel_count = d.surfel_count;
   std::size_t offset = kMapHeaderSize;
-  for (std::size_t i = 0; i < kMapSections; ++i) {
-    layout.offsets[i] = offset;
-    header.sections[i] = {offset, layout.sections[i].size(), hash64(layout.sections[i])};
+  for (std::size_t i = 0; i < table.size(); ++i) {
+    layout.offsets.push_back(offset);
+    table[i].offset = offset;
+    table[i].size = layout.sections[i].size();
+    table[i].checksum = hash64(layout.sections[i]);
     offset = aligned(offset + layout.sections[i].size());
   }
   layout.size = offset;
   layout.header.resize(kMapHeaderSize);
   std::memcpy(layout.header.data(), &header, sizeof header);
+  std::memcpy(
+      layout.header.data() + sizeof header, table.data(), table.size() * sizeof(MapSection));
   const std::uint64_t checksum = hash64(std::span(layout.header).first(kChecksumAt));
   std::memcpy(layout.header.data() + kChecksumAt, &checksum, sizeof checksum);
   return layout;
 }
 
+/// The table of sections of a file whose header is whole. Empty where it has more than fit.
+std::vector<MapSection> table_of(std::span<const std::byte> bytes, const MapHeader& header) {
+  std::vector<MapSection> table;
+  const std::byte* at = bytes.data() + sizeof header;
+  if (header.version == 1) {
+    for (const char* name : kMapSectionNames) {
+      MapSectionV1 old{};
+      std::memcpy(&old, at, sizeof old);
+      at += sizeof old;
+      MapSection& section = table.emplace_back(section_named(name));
+      section.offset = old.offset;
+      section.size = old.size;
+      section.checksum = old.checksum;
+    }
+    return table;
+  }
+  if (header.section_count > kMapSectionsMax) return {};
+  table.resize(header.section_count);
+  std::memcpy(table.data(), at, table.size() * sizeof(MapSection));
+  return table;
+}
+
 template <class T>
-std::span<const T> section_view(std::span<const std::byte> bytes, const MapSection& section) {
-  return {reinterpret_cast<const T*>(bytes.data() + section.offset),
-          static_cast<std::size_t>(section.size / sizeof(T))};
+std::span<const T> view_of(std::span<const std::byte> bytes) {
+  return {reinterpret_cast<const T*>(bytes.data()), bytes.size() / sizeof(T)};
 }
 
 /// A map whose bytes are a mapped file.
@@ -116,7 +171,7 @@ void write_map(OutputFile file, const Bvh8& tree, const MapDescription& descript
   file.write(layout.header);
   std::size_t written = kMapHeaderSize;
   const std::vector<std::byte> zeros(kMapAlignment);
-  for (std::size_t i = 0; i < kMapSections; ++i) {
+  for (std::size_t i = 0; i < layout.sections.size(); ++i) {
     file.write(layout.sections[i]);
     written += layout.sections[i].size();
     file.write(std::span(zeros).first(aligned(written) - written));
@@ -129,7 +184,7 @@ std::vector<std::byte> map_bytes(const Bvh8& tree, const MapDescription& descrip
   const Layout layout = lay_out(tree, description);
   std::vector<std::byte> bytes(layout.size);
   std::memcpy(bytes.data(), layout.header.data(), layout.header.size());
-  for (std::size_t i = 0; i < kMapSections; ++i) {
+  for (std::size_t i = 0; i < layout.sections.size(); ++i) {
     if (layout.sections[i].empty()) continue;
     std::memcpy(
         bytes.data() + layout.offsets[i], layout.sections[i].data(), layout.sections[i].size());
@@ -160,24 +215,39 @@ void SurfelMap::attach(std::span<const std::byte> bytes, const std::string& name
   }
   if (bytes.size() < kMapHeaderSize) fail(bytes.size(), "the map is cut off within its header");
   std::memcpy(&header, bytes.data(), sizeof header);
-  if (header.version != kMapVersion) {
-    fail(8, fmt::format("map version {}, this program reads {}", header.version, kMapVersion));
+  if (header.version < kMapOldestVersion || header.version > kMapVersion) {
+    fail(8,
+         fmt::format("map version {}, this program reads {} to {}",
+                     header.version,
+                     kMapOldestVersion,
+                     kMapVersion));
   }
   std::uint64_t checksum = 0;
   std::memcpy(&checksum, bytes.data() + kChecksumAt, sizeof checksum);
   if (checksum != hash64(bytes.first(kChecksumAt))) fail(kChecksumAt, "the header is corrupt");
-  if (header.section_count != kMapSections) fail(12, "wrong number of sections");
-  constexpr std::size_t kElement[kMapSections] = {sizeof(Bvh8Node), sizeof(SurfelWord), 1, 1};
-  for (std::size_t i = 0; i < kMapSections; ++i) {
-    const MapSection& s = header.sections[i];
+  sections_ = table_of(bytes, header);
+  if (sections_.empty() || (header.version == 1 && header.section_count != sections_.size())) {
+    fail(12, "wrong number of sections");
+  }
+  for (std::size_t i = 0; i < sections_.size(); ++i) {
+    const MapSection& s = sections_[i];
+    const std::string_view section = name_of(s);
+    const std::size_t element = section == "nodes"   ? sizeof(Bvh8Node)
+                                : section == "words" ? sizeof(SurfelWord)
+                                                     : 1;
     const bool inside = s.offset <= bytes.size() && s.size <= bytes.size() - s.offset;
-    if (!inside || s.offset % kMapAlignment != 0 || s.size % kElement[i] != 0) {
+    if (!inside || s.offset % kMapAlignment != 0 || s.size % element != 0) {
       fail(bytes.size(),
            fmt::format("the section '{}' ({} bytes at {}) does not lie inside the file; it is cut "
                        "off or corrupt",
-                       kMapSectionNames[i],
+                       excerpt(section),
                        s.size,
                        s.offset));
+    }
+    for (std::size_t k = 0; k < i; ++k) {
+      if (name_of(sections_[k]) == section) {
+        fail(sizeof header, fmt::format("two sections are called '{}'", excerpt(section)));
+      }
     }
   }
   bool finite = std::isfinite(header.intensity_offset) && std::isfinite(header.intensity_step);
@@ -191,16 +261,16 @@ void SurfelMap::attach(std::span<const std::byte> bytes, const std::string& name
       !within(static_cast<double>(header.window), 0.01, 10.0)) {
     fail(16, "a parameter in the header is out of range");
   }
-  nodes_ = section_view<Bvh8Node>(bytes, header.sections[kNodes]);
-  words_ = section_view<SurfelWord>(bytes, header.sections[kWords]);
-  intensity_ = section_view<std::uint8_t>(bytes, header.sections[kIntensity]);
-  const auto text = section_view<char>(bytes, header.sections[kMetadata]);
+  bytes_ = bytes;
+  nodes_ = view_of<Bvh8Node>(section("nodes"));
+  words_ = view_of<SurfelWord>(section("words"));
+  intensity_ = view_of<std::uint8_t>(section("intensity"));
+  const auto text = view_of<char>(section("metadata"));
   metadata_ = {text.data(), text.size()};
   if (words_.size() < kLeafPadding || (!intensity_.empty() && intensity_.size() != words_.size())) {
     fail(kMapHeaderSize, "section lengths do not fit each other");
   }
   name_ = name;
-  bytes_ = bytes;
   file_size_ = bytes.size();
   resolution_ = header.resolution;
   scale_ = SurfelScale(static_cast<float>(resolution_));
@@ -215,24 +285,50 @@ void SurfelMap::attach(std::span<const std::byte> bytes, const std::string& name
   intensity_step_ = header.intensity_step;
 }
 
+std::span<const std::byte> SurfelMap::section(std::string_view name) const {
+  for (const MapSection& s : sections_) {
+    if (name_of(s) == name) return bytes_.subspan(s.offset, s.size);
+  }
+  return {};
+}
+
 std::string SurfelMap::hash() const {
-  MapHeader header{};
-  std::memcpy(&header, bytes_.data(), sizeof header);
-  header.sections[kMetadata] = {};  // names of files and options
-  return fmt::format("{:016x}", hash64(std::as_bytes(std::span(&header, 1))));
+  // of the header as version 1 would have it, so that a map has one hash whatever its version
+  struct {
+    MapHeader header;
+    MapSectionV1 sections[std::size(kMapSectionNames)];
+  } known{};
+  std::memcpy(&known.header, bytes_.data(), sizeof known.header);
+  known.header.version = 1;
+  known.header.section_count = std::size(kMapSectionNames);
+  std::size_t offset = kMapHeaderSize;
+  std::uint64_t others = 0;
+  for (std::size_t i = 0; i < std::size(kMapSectionNames); ++i) {
+    MapSectionV1& as_v1 = known.sections[i];
+    const std::string_view name = kMapSectionNames[i];
+    if (name == "metadata") continue;  // names of files and options
+    as_v1 = {offset, 0, hash64(std::span<const std::byte>{})};
+    for (const MapSection& s : sections_) {
+      if (name_of(s) == name) as_v1 = {offset, s.size, s.checksum};
+    }
+    offset = aligned(offset + as_v1.size);
+  }
+  for (const MapSection& s : sections_) {
+    if (is_known(name_of(s))) continue;
+    others += hash64(std::as_bytes(std::span(s.name))) ^ s.checksum;
+  }
+  const std::uint64_t hash = hash64(std::as_bytes(std::span(&known, 1)));
+  return fmt::format("{:016x}", others == 0 ? hash : hash ^ others);
 }
 
 void SurfelMap::verify() const {
-  const auto fail = [&](const char* section, const std::string& what) {
+  const auto fail = [&](std::string_view section, const std::string& what) {
     throw InputError(
-        fmt::format("{}: section '{}': {}; import the cloud again", name_, section, what));
+        fmt::format("{}: section '{}': {}; import the cloud again", name_, excerpt(section), what));
   };
-  MapHeader header{};
-  std::memcpy(&header, bytes_.data(), sizeof header);
-  for (std::size_t i = 0; i < kMapSections; ++i) {
-    const MapSection& s = header.sections[i];
+  for (const MapSection& s : sections_) {
     if (hash64(bytes_.subspan(s.offset, s.size)) != s.checksum) {
-      fail(kMapSectionNames[i],
+      fail(name_of(s),
            fmt::format("the checksum of its {} bytes at {} does not match", s.size, s.offset));
     }
   }

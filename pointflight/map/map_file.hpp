@@ -11,39 +11,41 @@
 /// @file
 /// The `.pfmap` file: little endian, sections aligned to 64 bytes, used in place through mmap.
 ///
-///   byte 0      header (below), 4096 bytes, zero-filled
+///   byte 0      header block, 4096 bytes, zero-filled: MapHeader, then a MapSection for each
+///               section, in its last 8 bytes the XXH3-64 of all before them
 ///   ...         section: nodes      Bvh8Node[]
 ///   ...         section: words      u64[]: leaf headers and surfel words, 8 words of padding
-///   ...         section: intensity  u8[], one a word (empty without intensities)
-///   ...         section: metadata   JSON: how the map was made, from what, with which version
+///   ...         section: intensity  u8[], one a word; optional
+///   ...         section: metadata   JSON: how the map was made, from what, with which version;
+///   optional
+///   ...         any others, which readers that do not know them leave alone
+///
+/// Version 1 had these four sections and no names for them: its table is four MapSectionV1.
 namespace pointflight {
 
 /// First bytes of every map; line ends and Ctrl-Z show text transfers that spoilt it.
 inline constexpr char kMapMagic[8] = {'P', 'F', 'M', 'A', 'P', '\r', '\n', '\x1a'};
-inline constexpr std::uint32_t kMapVersion = 1;      ///< Files of other versions are refused.
-inline constexpr std::size_t kMapHeaderSize = 4096;  ///< Bytes.
-inline constexpr std::size_t kMapAlignment = 64;     ///< Of sections, bytes.
-inline constexpr double kMinResolution = 1e-6;       ///< m
-inline constexpr double kMaxResolution = 1e6;        ///< m
+inline constexpr std::uint32_t kMapVersion = 2;        ///< Written.
+inline constexpr std::uint32_t kMapOldestVersion = 1;  ///< Read as well; newer ones are refused.
+inline constexpr std::size_t kMapHeaderSize = 4096;    ///< Bytes.
+inline constexpr std::size_t kMapAlignment = 64;       ///< Of sections, bytes.
+inline constexpr double kMinResolution = 1e-6;         ///< m
+inline constexpr double kMaxResolution = 1e6;          ///< m
 
-/// Sections in the order in which they lie; the last is their number.
-enum MapSectionId : std::uint32_t { kNodes, kWords, kIntensity, kMetadata, kMapSections };
-/// For messages of `SurfelMap::verify`.
-inline constexpr const char* kMapSectionNames[kMapSections] = {
-    "nodes", "words", "intensity", "metadata"};
-
-/// Where one section lies.
-struct MapSection {
-  std::uint64_t offset;    ///< Bytes from the file's start; a multiple of kMapAlignment.
-  std::uint64_t size;      ///< Bytes.
-  std::uint64_t checksum;  ///< XXH3-64 of the bytes.
+/// A MapSection of version 1: nodes, words, intensity, metadata.
+struct MapSectionV1 {
+  std::uint64_t offset;    ///< As above.
+  std::uint64_t size;      ///< Bytes; zero where there is none.
+  std::uint64_t checksum;  ///< As above.
 };
+/// The sections of version 1, in their order.
+inline constexpr const char* kMapSectionNames[] = {"nodes", "words", "intensity", "metadata"};
 
 /// First bytes of the file, as they lie there.
 struct MapHeader {
   char magic[8];                ///< kMapMagic.
   std::uint32_t version;        ///< kMapVersion.
-  std::uint32_t section_count;  ///< kMapSections.
+  std::uint32_t section_count;  ///< At most kMapSectionsMax.
   double resolution;            ///< m
   double origin[3];             ///< World position of the corner of voxel (0, 0, 0), m.
   double bounds_min[3];         ///< Of the surfel centres, world, m.
@@ -56,12 +58,19 @@ struct MapHeader {
   ///@{
   float intensity_offset, intensity_step;
   ///@}
-  std::uint32_t reserved;             ///< Zero.
-  std::uint64_t surfel_count;         ///< Leaf headers not counted.
-  MapSection sections[kMapSections];  ///< By MapSectionId.
+  std::uint32_t reserved;      ///< Zero.
+  std::uint64_t surfel_count;  ///< Leaf headers not counted.
 };
-static_assert(sizeof(MapHeader) <= kMapHeaderSize - 8);
-/// The last 8 bytes of the header block are the XXH3-64 of the bytes before them.
+static_assert(sizeof(MapHeader) == 128 && sizeof(MapSection) == 40 && sizeof(MapSectionV1) == 24);
+/// As many as fit into the header block.
+inline constexpr std::size_t kMapSectionsMax =
+    (kMapHeaderSize - 8 - sizeof(MapHeader)) / sizeof(MapSection);
+
+/// A section that this program does not know.
+struct ExtraSection {
+  std::string name;              ///< Up to 16 bytes, not one of `kMapSectionNames`.
+  std::vector<std::byte> bytes;  ///< Its content.
+};
 
 /// What `write_map` stores beside the hierarchy.
 struct MapDescription {
@@ -74,6 +83,7 @@ struct MapDescription {
   float intensity_step = 0.0f;               ///< From one byte's value to the next.
   std::uint64_t surfel_count = 0;            ///< For `map info`.
   std::string metadata;                      ///< JSON.
+  std::vector<ExtraSection> extra;           ///< Further sections, such as labels.
 };
 
 /// Writes and commits a map: it appears under its name only when complete. Throws InputError.

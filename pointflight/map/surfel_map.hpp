@@ -6,6 +6,8 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
+#include <vector>
 
 #include "pointflight/geometry/types.hpp"
 #include "pointflight/map/bvh8.hpp"
@@ -18,6 +20,14 @@ struct RenderModel {
   float support = kSupport;  ///< Standard deviations.
   float tau = 0.35f;         ///< Coverage from which there is a return.
   float window = 0.5f;       ///< Depth over which coverage adds up, in units of r.
+};
+
+/// A row of the table of sections in a map file (map_file.hpp).
+struct MapSection {
+  char name[16];           ///< "nodes", filled up with zeros.
+  std::uint64_t offset;    ///< Bytes from the file's start; a multiple of kMapAlignment.
+  std::uint64_t size;      ///< Bytes.
+  std::uint64_t checksum;  ///< XXH3-64 of the bytes.
 };
 
 /// The nearest thing to a point.
@@ -70,6 +80,9 @@ class SurfelMap {
   /// Sixteen hexadecimal digits of what is in the map, its metadata left out. Read from the header:
   /// it costs nothing.
   [[nodiscard]] std::string hash() const;
+
+  /// A section of the file by its name, empty without one: for what this class does not know.
+  [[nodiscard]] std::span<const std::byte> section(std::string_view name) const;
 
   /// How the map was made, as JSON text.
   [[nodiscard]] std::string_view metadata() const { return metadata_; }
@@ -124,6 +137,7 @@ class SurfelMap {
  private:
   std::string name_;
   std::span<const std::byte> bytes_;
+  std::vector<MapSection> sections_;
   std::span<const Bvh8Node> nodes_;
   std::span<const SurfelWord> words_;
   std::span<const std::uint8_t> intensity_;

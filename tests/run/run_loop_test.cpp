@@ -1,0 +1,250 @@
+// Runs: what links see and what they may ask for, without a clock that matters.
+#include "pointflight/run/run_loop.hpp"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <stdexcept>
+
+#include "pointflight/run/threaded_link.hpp"
+#include "tests/sim/runs.hpp"
+
+namespace pointflight {
+namespace {
+
+using testing::ByteSink;
+using testing::hall;
+using testing::hovering;
+
+Scenario short_run() {
+  Scenario scenario = hovering();
+  scenario.duration = 0.5;
+  scenario.vehicles[0].lidars = {LidarMount{}};
+  return scenario;
+}
+
+/// Notes what comes; asks for what it is told to at the steps it is told.
+class Probe : public Link {
+ public:
+  void open() override { calls += "open "; }
+  bool is_ready() override { return ready_after-- <= 0; }
+  void on_sample(const Sample& sample) override {
+    bytes.on_sample(sample);
+    scans += std::holds_alternative<ScanSample>(sample) ? 1 : 0;
+    if (failing) throw std::runtime_error("no room");
+  }
+  void on_step(const StepDone& step) override {
+    ++steps;
+    last = step.time;
+  }
+  void on_wait(SimTime now, Waiting why) override {
+    ++waits[static_cast<std::size_t>(why)];
+    if (why == Waiting::kPaused) paused_at = now;
+  }
+  std::vector<Order> take_orders() override {
+    std::vector<Order> taken;
+    while (!orders.empty() && orders.front().first <= steps + idle) {
+      taken.push_back(orders.front().second);
+      orders.erase(orders.begin());
+    }
+    ++idle;
+    return taken;
+  }
+  void on_rejected(const VehicleOrder& /*order*/, const std::string& why) override {
+    rejected = why;
+  }
+  void on_reset(SimTime reached) override {
+    calls += "reset ";
+    reset_at = reached;
+    bytes = ByteSink();
+  }
+  void close() override { calls += "close"; }
+  [[nodiscard]] bool is_in_use() const override { return used; }
+
+  ByteSink bytes;
+  std::string calls, rejected;
+  std::array<int, 3> waits{};
+  std::vector<std::pair<int, Order>> orders;  ///< After so many looks.
+  int ready_after = 0;
+  int steps = 0;
+  int idle = 0;
+  int scans = 0;
+  SimTime last, paused_at, reset_at;
+  bool used = true;
+  bool failing = false;
+};
+
+TEST(RunLoop, ALinkSeesWhatAProgramThatStepsSees) {
+  const Executor executor(2);
+  ByteSink stepped;
+  const RunEnd end = testing::run(short_run(), stepped, executor).end();
+  Simulation simulation(short_run(), hall(), executor);
+  Probe link;
+  link.ready_after = 2;
+  RunLoop loop(simulation, {});
+  loop.add(link);
+  EXPECT_EQ(loop.run(), end);
+  EXPECT_EQ(link.bytes.hash(), stepped.hash());
+  EXPECT_EQ(link.calls, "open close");
+  EXPECT_EQ(link.waits[static_cast<std::size_t>(Waiting::kForLinks)], 2);
+  EXPECT_EQ(link.steps, 501);
+  EXPECT_EQ(link.scans, 5);
+  EXPECT_TRUE(loop.has_started());
+}
+
+TEST(RunLoop, ObeysOrdersBetweenSteps) {
+  const Executor executor(2);
+  Simulation simulation(short_run(), hall(), executor);
+  Probe link;
+  VelocityCommand up;
+  up.v_world = {0, 0, 0.5};
+  // every look is a step, or one while it waits
+  link.orders = {{100, VehicleOrder{0, up}},
+                 {200, VehicleOrder{0, RotorSpeedCommand{{1.0}}}},
+                 {300, PauseOrder{true}},
+                 {340, StepOrder{}},
+                 {500, PauseOrder{false}},
+                 {700, ResetOrder{}}};
+  std::vector<std::string> lines;
+  RunOptions options;
+  options.log = [&](const std::string& line) { lines.push_back(line); };
+  RunLoop loop(simulation, options);
+  loop.add(link);
+  loop.run();
+  EXPECT_NE(link.rejected.find("1 rotor speeds for a vehicle with"), std::string::npos);
+  EXPECT_EQ(link.calls, "open reset close");
+  EXPECT_GT(link.waits[static_cast<std::size_t>(Waiting::kPaused)], 10);
+  EXPECT_GT(link.reset_at, link.paused_at);
+  ASSERT_GE(lines.size(), 4u);
+  EXPECT_NE(lines[0].find("rotor speeds"), std::string::npos);
+  EXPECT_EQ(lines[1], "paused");
+  EXPECT_EQ(lines[2], "going on");
+  // from the start again: as if nothing had been
+  ByteSink untouched;
+  testing::run(short_run(), untouched, executor);
+  EXPECT_EQ(link.bytes.hash(), untouched.hash());
+}
+
+TEST(RunLoop, LockstepWaitsForAnswers) {
+  const Executor executor(2);
+  RunOptions options;
+  options.lockstep = 0.002;
+  Simulation silent(short_run(), hall(), executor);
+  Probe nobody;
+  RunLoop alone(silent, options);
+  alone.add(nobody);
+  alone.run();
+  EXPECT_EQ(alone.unanswered_scans(), 5u);
+  // one that answers each scan is waited for no longer
+  class Planner : public Probe {
+   public:
+    std::vector<Order> take_orders() override {
+      if (scans == answered) return {};
+      answered = scans;
+      return {VehicleOrder{0, HoverCommand{}, true}};
+    }
+    int answered = 0;
+  } planner;
+  options.lockstep = 60.0;
+  Simulation flown(short_run(), hall(), executor);
+  RunLoop loop(flown, options);
+  loop.add(planner);
+  loop.run();
+  EXPECT_EQ(planner.answered, 5);
+  EXPECT_EQ(loop.unanswered_scans(), 0u);
+}
+
+TEST(RunLoop, EndsWhereNobodyIsLeftOrSomebodyWantsIt) {
+  const Executor executor(2);
+  Simulation unused(short_run(), hall(), executor);
+  Probe gone;
+  gone.used = false;
+  RunLoop loop(unused, {});
+  loop.add(gone);
+  EXPECT_EQ(loop.run(), RunEnd::kInterrupted);
+  EXPECT_FALSE(loop.has_started());
+  EXPECT_EQ(gone.calls, "open ");
+
+  Simulation ended(short_run(), hall(), executor);
+  Probe link;
+  link.orders = {{50, EndOrder{}}};
+  RunLoop other(ended, {});
+  other.add(link);
+  EXPECT_EQ(other.run(), RunEnd::kInterrupted);
+  EXPECT_LT(link.steps, 60);
+  EXPECT_EQ(link.calls, "open close");
+}
+
+TEST(ThreadedLink, HandsOverEverythingInOrder) {
+  const Executor executor(2);
+  ByteSink stepped;
+  testing::run(short_run(), stepped, executor);
+  Simulation simulation(short_run(), hall(), executor);
+  Probe slow;
+  ThreadedLink link(slow, 3, ThreadedLink::WhenFull::kWait);
+  RunLoop loop(simulation, {});
+  loop.add(link);
+  loop.run();
+  EXPECT_EQ(slow.bytes.hash(), stepped.hash());
+  EXPECT_EQ(slow.calls, "open close");
+  EXPECT_EQ(loop.dropped(), 0u);
+  EXPECT_THROW(ThreadedLink(slow, 0, ThreadedLink::WhenFull::kWait), std::invalid_argument);
+}
+
+TEST(ThreadedLink, DropsTheOldestForThoseWhoAreSlow) {
+  const Executor executor(2);
+  /// Stands still until the run has ended.
+  class Stuck : public Probe {
+   public:
+    void on_sample(const Sample& sample) override {
+      while (!go) std::this_thread::yield();
+      Probe::on_sample(sample);
+      ++taken;
+    }
+    std::atomic<bool> go = false;
+    int taken = 0;
+  } stuck;
+  ThreadedLink link(stuck, 10, ThreadedLink::WhenFull::kDropOldest);
+  class Release : public Probe {
+   public:
+    explicit Release(Stuck& stuck) : stuck_(stuck) {}
+    void close() override { stuck_.go = true; }
+    void on_sample(const Sample& /*sample*/) override { ++samples; }
+    int samples = 0;
+
+   private:
+    Stuck& stuck_;
+  } release(stuck);
+  Simulation simulation(short_run(), hall(), executor);
+  RunLoop loop(simulation, {});
+  loop.add(release);
+  loop.add(link);
+  loop.run();
+  EXPECT_LE(stuck.taken, 12);
+  EXPECT_EQ(loop.dropped() + static_cast<std::uint64_t>(stuck.taken),
+            static_cast<std::uint64_t>(release.samples));
+}
+
+TEST(ThreadedLink, WhatItsLinkThrowsEndsTheRun) {
+  const Executor executor(2);
+  Simulation simulation(short_run(), hall(), executor);
+  Probe failing;
+  failing.failing = true;
+  ThreadedLink link(failing, 4, ThreadedLink::WhenFull::kWait);
+  RunLoop loop(simulation, {});
+  loop.add(link);
+  EXPECT_THROW(loop.run(), std::runtime_error);
+}
+
+TEST(ScanDelays, AreCountedInBins) {
+  ScanDelays delays;
+  for (int i = 0; i < 100; ++i) delays.add(0.001 * i);
+  EXPECT_NEAR(delays.below(0.5), 0.050, 2e-4);
+  EXPECT_NEAR(delays.below(0.99), 0.099, 2e-4);
+  delays.add(1e9);
+  delays.add(-1.0);
+  EXPECT_EQ(delays.count(), 102u);
+}
+
+}  // namespace
+}  // namespace pointflight
