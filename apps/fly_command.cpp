@@ -247,7 +247,8 @@ int fly(const FlyFlags& flags) {
   check_ros_flags(flags.ros);
   RunOptions options;
   // others live on the wall clock
-  options.rate = parse_rate(flags.rate.empty() ? (flags.ros.is_live() ? "1.0" : "max") : flags.rate);
+  options.rate =
+      parse_rate(flags.rate.empty() ? (flags.ros.is_live() ? "1.0" : "max") : flags.rate);
   options.lockstep = flags.ros.lockstep;
   options.log = [](const std::string& line) { log(line); };
   options.progress = terminal_progress();

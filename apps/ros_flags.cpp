@@ -51,7 +51,7 @@ Duration epoch_of(const RosFlags& flags, const Scenario& scenario, const RosProf
   // living nodes must not see time jump back after a restart; recordings by themselves and runs in
   // lockstep are the same each time
   const bool live = flags.is_live() && flags.lockstep <= 0.0;
-  return live && profile.epoch == "now" ? epoch_from("now", "") : kFixedEpoch;
+  return live && profile.epoch == StampEpoch::kNow ? epoch_from("now", "") : kFixedEpoch;
 }
 
 /// The file that a scenario came from, or the scenario as a file.
@@ -110,8 +110,7 @@ void check_ros_flags(const RosFlags& flags) {
 void prepare_for_ros(const RosFlags& flags, double rate, Scenario& scenario) {
   if (!flags.any()) return;
   const RosProfile profile = profile_for(scenario, flags.profile);
-  scenario.output.odometry_rate =
-      std::max(scenario.output.odometry_rate, RosBridge::odometry_rate(profile));
+  scenario.output.odometry_rate = std::max(scenario.output.odometry_rate, odometry_rate(profile));
   const bool planned = std::any_of(
       scenario.vehicles.begin(), scenario.vehicles.end(), [](const VehicleSetup& vehicle) {
         return !vehicle.mission.waypoints.empty() || !vehicle.commands.empty();
@@ -176,7 +175,8 @@ std::unique_ptr<RosLink> make_ros_link(const RosFlags& flags, const Simulation& 
   options.log = [](const std::string& line) { log(line); };
   options.on_left_behind = leave_static_objects;
   const Duration epoch = options.epoch;
-  auto link = std::make_unique<RosLink>(simulation, profile, std::move(options));
+  const RunDescription run = describe_run(simulation);
+  auto link = std::make_unique<RosLink>(run, profile, std::move(options));
   for (const std::string& path : flags.records) {
     link->add(open_recording(flags, path, scenario, epoch));
   }
@@ -184,7 +184,7 @@ std::unique_ptr<RosLink> make_ros_link(const RosFlags& flags, const Simulation& 
   transport.node = flags.node;
   transport.log = [](const std::string& text) { log(text); };
   transport.localhost_only = flags.localhost;
-  if (flags.ros2) transport.large_rate = large_rate(simulation, profile);
+  if (flags.ros2) transport.large_rate = large_rate(run, profile);
   if (flags.ros1) link->add(ros1_module().transport(transport));
   if (flags.ros2) link->add(ros2_module().transport(transport));
   return link;

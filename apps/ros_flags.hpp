@@ -40,8 +40,8 @@ void check_ros_flags(const RosFlags& flags);
 /// real time (`rate` > 0) and not told to end (--no-stay, a duration, lockstep). Throws InputError.
 void prepare_for_ros(const RosFlags& flags, double rate, Scenario& scenario);
 
-/// ROS and recordings as a link, as the flags ask for, with everything open; null where they ask for
-/// none. Throws InputError.
+/// ROS and recordings as a link, as the flags ask for, with everything open; null where they ask
+/// for none. Throws InputError.
 std::unique_ptr<RosLink> make_ros_link(const RosFlags& flags, const Simulation& simulation);
 
 /// Says which recordings were made and how large they are.

@@ -46,9 +46,12 @@ void RunPicture::on_sample(const Sample& sample) {
                    if (s.entered) collisions.add(s.place_world);
                  },
                  [&](const ObstacleSample& s) {
-                   const auto* solid = std::get_if<Solid>(&s.shape);
-                   const Vector3d half = solid != nullptr ? half_extent(*solid) : Vector3d::Zero();
-                   add_obstacle(s.label, s.T_world_body.translation, std::max(half.x(), half.y()));
+                   for (const auto& [label, pose, shape] : s.obstacles) {
+                     const auto* solid = std::get_if<Solid>(&shape);
+                     const Vector3d half =
+                         solid != nullptr ? half_extent(*solid) : Vector3d::Zero();
+                     add_obstacle(label, pose.translation, std::max(half.x(), half.y()));
+                   }
                  },
                  [](const auto&) {}},
       sample);

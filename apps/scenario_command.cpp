@@ -23,7 +23,7 @@
 #include "pointflight/sim/start_check.hpp"
 #include "pointflight/world/clearance.hpp"
 #include "pointflight/world/free_space.hpp"
-#include "ros_common/outputs.hpp"
+#include "ros_common/output.hpp"
 #include "ros_common/profile.hpp"
 
 namespace pointflight::apps {
@@ -129,8 +129,8 @@ void check_scenario(const std::string& path, bool as_json) {
   const Executor executor;
   const Simulation simulation(scenario, map, executor);
   // whatever --ros1, --ros2 and --record will ask for
-  const RosProfile profile = profile_for(scenario);
-  output_streams(simulation, profile);
+  RosRun ros{.run = describe_run(simulation), .profile = profile_for(scenario)};
+  output_streams(ros);
   warn_about(scenario, *map);
   for (const std::string& warning : start_warnings(simulation, executor)) log(warning);
   for (std::size_t v = 0; v < simulation.vehicle_count(); ++v) {

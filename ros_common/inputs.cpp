@@ -8,9 +8,8 @@
 #include "pointflight/geometry/rotation.hpp"
 #include "ros_common/conversion.hpp"
 #include "ros_common/description.hpp"
-#include "ros_common/outputs.hpp"
+#include "ros_common/output.hpp"
 #include "ros_common/ros1_definition.hpp"
-#include "ros_common/services.hpp"
 
 namespace pointflight {
 namespace {
@@ -53,6 +52,10 @@ std::string unknown_frame(const std::string& frame, const OrderContext& context)
       context.world_frame);
 }
 
+std::optional<Order> told(const OrderContext& context, Command command) {
+  return VehicleOrder{context.vehicle, std::move(command), false};
+}
+
 template <class M>
 PositionCommand position_from(const M& m) {
   PositionCommand command;
@@ -65,33 +68,24 @@ PositionCommand position_from(const M& m) {
   return command;
 }
 
-/// A PositionCommand of any definition: by md5, else by the names of its fields.
-std::optional<PositionCommand> position_of(const InputStream& stream,
-                                           Wire wire,
-                                           const Received& received,
-                                           const OrderContext& context,
-                                           std::string& why) {
-  const auto taken = [&](const auto& m) -> std::optional<PositionCommand> {
-    if (!is_world(m.header.frame_id, context)) {
-      why = unknown_frame(m.header.frame_id, context);
-      return std::nullopt;
-    }
-    return position_from(m);
-  };
-  if (wire == Wire::kCdr) {
-    if (stream.topic.type.ros2_package == msg::PositionCommandLong::kType.ros2_package) {
-      const auto m = decoded<msg::PositionCommandLong>(wire, received);
-      return m ? taken(*m) : std::nullopt;
-    }
-    const auto m = decoded<msg::PositionCommandShort>(wire, received);
-    return m ? taken(*m) : std::nullopt;
-  }
-  if (const auto m = decoded<msg::PositionCommandLong>(wire, received)) return taken(*m);
-  if (const auto m = decoded<msg::PositionCommandShort>(wire, received)) return taken(*m);
-  if (const auto m = decoded<msg::PositionCommandOldest>(wire, received)) return taken(*m);
+/// A PositionCommand, and the frame that it is in.
+struct FramedPosition {
+  PositionCommand command;
+  std::string frame;
+};
+
+template <class M>
+std::optional<FramedPosition> position_as(Wire wire, const Received& received) {
+  const auto m = decoded<M>(wire, received);
+  return m ? std::optional(FramedPosition{position_from(*m), m->header.frame_id}) : std::nullopt;
+}
+
+/// By the names of its fields, in a definition that nobody here knows.
+std::optional<FramedPosition> position_by_names(const Received& received) {
   const auto numbers = numbers_of(received.definition, std::span(received.data, received.size));
   if (!numbers) return std::nullopt;
-  PositionCommand command;
+  FramedPosition position;
+  PositionCommand& command = position.command;
   const auto take = [&](const std::string& name, double& value) {
     const auto found = numbers->find(name);
     if (found != numbers->end()) value = found->second;
@@ -108,13 +102,44 @@ std::optional<PositionCommand> position_of(const InputStream& stream,
   vector("jerk", command.jerk_world, false);
   all = take("yaw", command.yaw) && all;
   take("yaw_dot", command.yaw_rate);
-  return all ? std::optional(command) : std::nullopt;
+  return all ? std::optional(position) : std::nullopt;
 }
 
-std::optional<Command> velocity_from(const msg::TwistStamped& m,
-                                     const InputStream& stream,
-                                     const OrderContext& context,
-                                     std::string& why) {
+/// A PositionCommand of any definition: by md5, else by the names of its fields.
+std::optional<FramedPosition> position_in(const RosInput& input,
+                                          Wire wire,
+                                          const Received& received) {
+  if (wire == Wire::kCdr) {
+    return input.package == CommandPackage::kQuadrotorMsgs
+               ? position_as<msg::PositionCommandShort>(wire, received)
+               : position_as<msg::PositionCommandLong>(wire, received);
+  }
+  if (auto p = position_as<msg::PositionCommandLong>(wire, received)) return p;
+  if (auto p = position_as<msg::PositionCommandShort>(wire, received)) return p;
+  if (auto p = position_as<msg::PositionCommandOldest>(wire, received)) return p;
+  return position_by_names(received);
+}
+
+OrderMaker read_position(const RosInput& input, Wire wire, const Received& received) {
+  const auto position = position_in(input, wire, received);
+  if (!position) return {};
+  return [position](const OrderContext& context, std::string& why) -> std::optional<Order> {
+    if (is_world(position->frame, context)) return told(context, position->command);
+    why = unknown_frame(position->frame, context);
+    return std::nullopt;
+  };
+}
+
+MessageType position_type(const RosInput& input) {
+  // ROS 1 names both "quadrotor_msgs" and reads each in its sender's own words
+  return input.package == CommandPackage::kQuadrotorMsgs ? message_type<msg::PositionCommandShort>()
+                                                         : message_type<msg::PositionCommandLong>();
+}
+
+std::optional<Order> velocity_order(const msg::TwistStamped& m,
+                                    const RosInput& input,
+                                    const OrderContext& context,
+                                    std::string& why) {
   VelocityCommand command;
   command.v_world = vector_of(m.twist.linear);
   command.yaw_rate = m.twist.angular.z;
@@ -123,13 +148,17 @@ std::optional<Command> velocity_from(const msg::TwistStamped& m,
     why = unknown_frame(frame, context);
     return std::nullopt;
   }
-  const bool in_world = frame.empty() ? stream.settings.frame == "world" : is_world(frame, context);
+  const bool in_world =
+      frame.empty() ? input.frame == VelocityFrame::kWorld : is_world(frame, context);
   command.in_body = !in_world;
   command.turn = true;
-  return command;
+  return told(context, command);
 }
 
-Command attitude_from_target(const msg::AttitudeTarget& m, const OrderContext& context) {
+std::optional<Order> attitude_order(const msg::AttitudeTarget& m,
+                                    const RosInput& /*input*/,
+                                    const OrderContext& context,
+                                    std::string& /*why*/) {
   const bool no_thrust = (m.type_mask & msg::AttitudeTarget::kIgnoreThrust) != 0;
   const double thrust =
       no_thrust ? context.mass * kGravity : static_cast<double>(m.thrust) * context.thrust_max;
@@ -138,20 +167,23 @@ Command attitude_from_target(const msg::AttitudeTarget& m, const OrderContext& c
   if ((m.type_mask & msg::AttitudeTarget::kIgnorePitchRate) != 0) omega.y() = 0.0;
   if ((m.type_mask & msg::AttitudeTarget::kIgnoreYawRate) != 0) omega.z() = 0.0;
   if ((m.type_mask & msg::AttitudeTarget::kIgnoreAttitude) != 0) {
-    return BodyRateCommand{omega, thrust};
+    return told(context, BodyRateCommand{omega, thrust});
   }
   // a quaternion with a NaN stays one: the autopilot refuses it
   const msg::Quaternion& q = m.orientation;
-  return AttitudeCommand{Quaterniond(q.w, q.x, q.y, q.z), thrust, omega};
+  return told(context, AttitudeCommand{Quaterniond(q.w, q.x, q.y, q.z), thrust, omega});
 }
 
 /// Sticks as most pads have them: left up and down climbs, left aside turns, right moves. Buttons:
 /// 0 takes off, 1 lands, 2 hovers.
-Command stick_command(const msg::Joy& m, const OrderContext& context) {
+std::optional<Order> stick_order(const msg::Joy& m,
+                                 const RosInput& /*input*/,
+                                 const OrderContext& context,
+                                 std::string& /*why*/) {
   const auto pressed = [&](std::size_t i) { return i < m.buttons.size() && m.buttons[i] != 0; };
-  if (pressed(0)) return TakeOffCommand{};
-  if (pressed(1)) return LandCommand{};
-  if (pressed(2)) return HoverCommand{};
+  if (pressed(0)) return told(context, TakeOffCommand{});
+  if (pressed(1)) return told(context, LandCommand{});
+  if (pressed(2)) return told(context, HoverCommand{});
   const auto axis = [&](std::size_t i) {
     return i < m.axes.size() ? static_cast<double>(m.axes[i]) : 0.0;
   };
@@ -160,12 +192,13 @@ Command stick_command(const msg::Joy& m, const OrderContext& context) {
   command.yaw_rate = axis(0);
   command.in_body = true;
   command.turn = true;
-  return command;
+  return told(context, command);
 }
 
-std::optional<Command> goal_from(const msg::PoseStamped& m,
-                                 const OrderContext& context,
-                                 std::string& why) {
+std::optional<Order> goal_order(const msg::PoseStamped& m,
+                                const RosInput& /*input*/,
+                                const OrderContext& context,
+                                std::string& why) {
   if (!is_world(m.header.frame_id, context)) {
     why = unknown_frame(m.header.frame_id, context);
     return std::nullopt;
@@ -178,278 +211,227 @@ std::optional<Command> goal_from(const msg::PoseStamped& m,
   // RViz' flat tool knows no height
   command.keep_height = p.z() == 0.0;
   command.mission.final_yaw = yaw_of(rotation_of(m.pose.orientation));
-  return command;
+  return told(context, command);
 }
 
-Command rotors_from(const msg::Float32MultiArray& m, const InputStream& stream) {
-  const double unit = stream.settings.unit == "rpm" ? kRadPerSecond : 1.0;
+std::optional<Order> rotors_order(const msg::Float32MultiArray& m,
+                                  const RosInput& input,
+                                  const OrderContext& context,
+                                  std::string& /*why*/) {
+  const double unit = input.unit == RotorUnit::kRpm ? kRadPerSecond : 1.0;
   RotorSpeedCommand rotors;
   for (const float w : m.data) rotors.speeds.push_back(unit * static_cast<double>(w));
-  return rotors;
+  return told(context, rotors);
 }
 
-/// How a kind of message becomes a command.
-struct Reader {
-  const char* kind;
-  bool is_answer;
-  /// `why`: in words, where it is refused for something else than its bytes.
-  std::optional<Command> (*read)(
-      const InputStream&, Wire, const Received&, const OrderContext&, std::string& why);
-};
+std::optional<Order> take_off_land_order(const msg::TakeoffLand& m,
+                                         const RosInput& /*input*/,
+                                         const OrderContext& context,
+                                         std::string& /*why*/) {
+  const bool up = m.takeoff_land_cmd == msg::TakeoffLand::kTakeoff;
+  return up ? told(context, TakeOffCommand{}) : told(context, LandCommand{});
+}
 
-constexpr Reader kReaders[] = {
-    {"position",
-     true,
-     [](const InputStream& stream,
-        Wire wire,
-        const Received& in,
-        const OrderContext& context,
-        std::string& why) {
-       const auto m = position_of(stream, wire, in, context, why);
-       return m ? std::optional<Command>(*m) : std::nullopt;
-     }},
-    {"goal",
-     false,
-     [](const InputStream&,
-        Wire wire,
-        const Received& in,
-        const OrderContext& context,
-        std::string& why) {
-       const auto m = decoded<msg::PoseStamped>(wire, in);
-       return m ? goal_from(*m, context, why) : std::nullopt;
-     }},
-    {"velocity",
-     true,
-     [](const InputStream& stream,
-        Wire wire,
-        const Received& in,
-        const OrderContext& context,
-        std::string& why) {
-       const auto m = decoded<msg::TwistStamped>(wire, in);
-       return m ? velocity_from(*m, stream, context, why) : std::nullopt;
-     }},
-    {"attitude",
-     true,
-     [](const InputStream&,
-        Wire wire,
-        const Received& in,
-        const OrderContext& context,
-        std::string&) {
-       const auto m = decoded<msg::AttitudeTarget>(wire, in);
-       return m ? std::optional(attitude_from_target(*m, context)) : std::nullopt;
-     }},
-    {"rotors",
-     true,
-     [](const InputStream& stream,
-        Wire wire,
-        const Received& in,
-        const OrderContext&,
-        std::string&) {
-       const auto m = decoded<msg::Float32MultiArray>(wire, in);
-       return m ? std::optional(rotors_from(*m, stream)) : std::nullopt;
-     }},
-    {"joy",
-     false,
-     [](const InputStream&,
-        Wire wire,
-        const Received& in,
-        const OrderContext& context,
-        std::string&) {
-       const auto m = decoded<msg::Joy>(wire, in);
-       return m ? std::optional(stick_command(*m, context)) : std::nullopt;
-     }},
-    {"take_off_land",
-     false,
-     [](const InputStream&, Wire wire, const Received& in, const OrderContext&, std::string&) {
-       const auto m = decoded<msg::TakeoffLand>(wire, in);
-       if (!m) return std::optional<Command>();
-       const bool up = m->takeoff_land_cmd == msg::TakeoffLand::kTakeoff;
-       return std::optional(up ? Command{TakeOffCommand{}} : Command{LandCommand{}});
-     }},
-    {"hover",
-     false,
-     [](const InputStream&, Wire wire, const Received& in, const OrderContext&, std::string&) {
-       const auto m = decoded<msg::Empty>(wire, in);
-       return m ? std::optional<Command>(HoverCommand{}) : std::nullopt;
-     }},
-    {"arm",
-     false,
-     [](const InputStream&, Wire wire, const Received& in, const OrderContext&, std::string&) {
-       const auto m = decoded<msg::Empty>(wire, in);
-       return m ? std::optional<Command>(ArmCommand{}) : std::nullopt;
-     }},
-};
+std::optional<Order> pause_order(const msg::Bool& m,
+                                 const RosInput& /*input*/,
+                                 const OrderContext& /*context*/,
+                                 std::string& /*why*/) {
+  return PauseOrder{m.data};
+}
 
-/// What is about the run and not about a vehicle.
-std::optional<Order> run_order_of(const std::string& kind, Wire wire, const Received& received) {
-  if (kind == "pause") {
-    const auto m = decoded<msg::Bool>(wire, received);
-    return m ? std::optional<Order>(PauseOrder{m->data}) : std::nullopt;
+/// Of a message that says nothing but that it came: a command for a vehicle, or an order.
+template <class O>
+std::optional<Order> plain_order(const msg::Empty& /*m*/,
+                                 const RosInput& /*input*/,
+                                 const OrderContext& context,
+                                 std::string& /*why*/) {
+  if constexpr (std::is_constructible_v<Command, O>) {
+    return told(context, O{});
+  } else {
+    return O{};
   }
-  if (!decoded<msg::Empty>(wire, received)) return std::nullopt;
-  if (kind == "step") return StepOrder{};
-  if (kind == "reset") return ResetOrder{};
-  return std::nullopt;
+}
+
+template <class Function>
+struct OrderFunction;
+template <class M>
+struct OrderFunction<std::optional<Order> (*)(
+    const M&, const RosInput&, const OrderContext&, std::string&)> {
+  using Message = M;
+};
+
+template <auto order>
+using MessageOf = typename OrderFunction<decltype(order)>::Message;
+
+/// Reads messages that a function makes orders of.
+template <auto order>
+OrderMaker read_by(const RosInput& input, Wire wire, const Received& received) {
+  auto message = decoded<MessageOf<order>>(wire, received);
+  if (!message) return {};
+  return [input, m = std::move(*message)](const OrderContext& context, std::string& why) {
+    return order(m, input, context, why);
+  };
+}
+
+/// A row for a function.
+template <auto order>
+InputType row(std::string name, std::string help) {
+  InputType type;
+  type.name = std::move(name);
+  type.help = std::move(help);
+  type.type = [](const RosInput&) { return message_type<MessageOf<order>>(); };
+  type.read = read_by<order>;
+  return type;
+}
+
+InputType answer(InputType type) {
+  type.answers = true;
+  return type;
+}
+
+InputType once(InputType type) {
+  type.one_shot = true;
+  return type;
+}
+
+InputType of_run(InputType type, const ServiceType& service) {
+  type.of_run = true;
+  type.one_shot = true;
+  type.service = &service;
+  return type;
 }
 
 }  // namespace
 
-std::optional<Order> order_of(const InputStream& stream,
-                              Wire wire,
-                              const Received& received,
-                              const OrderContext& context,
-                              std::string& reason) {
-  const std::string& kind = stream.settings.kind;
-  const auto reader = std::find_if(
-      std::begin(kReaders), std::end(kReaders), [&](const Reader& r) { return kind == r.kind; });
-  std::optional<Order> order;
-  std::string why;
-  if (reader == std::end(kReaders)) {
-    order = run_order_of(kind, wire, received);
-  } else if (const auto command = reader->read(stream, wire, received, context, why)) {
-    order = VehicleOrder{stream.vehicle, *command, reader->is_answer};
-  }
-  if (!order && !why.empty()) {
-    reason = fmt::format("{}: {}", stream.topic.name, why);
-  } else if (!order) {
-    reason = fmt::format("{}: a message of {} bytes that is no {}{}",
+Registry<InputType>& input_types() {
+  static Registry<InputType> types = {
+      {.name = "position",
+       .help = "position, velocity, acceleration, yaw at each instant",
+       .type = position_type,
+       .read = read_position,
+       .answers = true},
+      once(row<goal_order>("goal", "where to fly")),
+      answer(row<velocity_order>("velocity", "velocity and yaw rate")),
+      answer(row<attitude_order>("attitude", "attitude or body rates, and thrust")),
+      answer(row<rotors_order>("rotors", "speeds of the rotors")),
+      row<stick_order>("joy", "a gamepad"),
+      once(row<take_off_land_order>("take_off_land", "take off or land")),
+      once(row<plain_order<HoverCommand>>("hover", "hold the place")),
+      of_run(row<pause_order>("pause", "the run stands still, or goes on"), kPauseService),
+      of_run(row<plain_order<StepOrder>>("step", "while paused: until the next scan"),
+             kStepService),
+      of_run(row<plain_order<ResetOrder>>("reset", "back to the start"), kResetService),
+      once(row<plain_order<ArmCommand>>("arm", "rotors may turn")),
+  };
+  return types;
+}
+
+std::vector<Order> orders_of(const InputStream& stream,
+                             Wire wire,
+                             const Received& received,
+                             std::span<const OrderContext> contexts,
+                             std::string& reason) {
+  std::vector<Order> orders;
+  const OrderMaker order_for = stream.type->read(stream.settings, wire, received);
+  for (const OrderContext& context : contexts) {
+    std::string why;
+    auto order = order_for ? order_for(context, why) : std::nullopt;
+    if (!order) {
+      reason = !why.empty()
+                   ? fmt::format("{}: {}", stream.topic.name, why)
+                   : fmt::format(
+                         "{}: a message of {} bytes that is no {}{}",
                          stream.topic.name,
                          received.size,
                          stream.topic.type.ros1_name(),
                          wire == Wire::kRos1 ? fmt::format(" (its md5 is {})", received.md5) : "");
+      return orders;
+    }
+    if (auto* vehicle = std::get_if<VehicleOrder>(&*order)) {
+      vehicle->is_answer = stream.type->answers;
+    }
+    orders.push_back(std::move(*order));
   }
-  return order;
+  return orders;
 }
 
-namespace {
-
-/// The type that an input is read with. One topic has one type: ROS 2's tools take no other.
-MessageType type_for(const RosInput& input) {
-  const std::string& kind = input.kind;
-  if (kind == "position") {
-    // ROS 1 names both "quadrotor_msgs" and reads each in its sender's own words
-    return input.package == "quadrotor_msgs" ? message_type<msg::PositionCommandShort>()
-                                             : message_type<msg::PositionCommandLong>();
-  }
-  if (kind == "goal") return message_type<msg::PoseStamped>();
-  if (kind == "velocity") return message_type<msg::TwistStamped>();
-  if (kind == "attitude") return message_type<msg::AttitudeTarget>();
-  if (kind == "rotors") return message_type<msg::Float32MultiArray>();
-  if (kind == "joy") return message_type<msg::Joy>();
-  if (kind == "take_off_land") return message_type<msg::TakeoffLand>();
-  if (kind == "pause") return message_type<msg::Bool>();
-  return message_type<msg::Empty>();
-}
-
-bool is_of_run(const std::string& kind) {
-  return kind == "pause" || kind == "step" || kind == "reset";
-}
-
-/// What is sent once and counts; the others come in streams, whose next message makes up for a lost
-/// one.
-bool is_one_shot(const std::string& kind) {
-  return is_of_run(kind) || kind == "goal" || kind == "take_off_land" || kind == "hover" ||
-         kind == "arm";
-}
-
-}  // namespace
-
-namespace {
-
-/// True where lockstep takes such a message for a planner's answer to a scan.
-bool is_answer(const std::string& kind) {
-  return std::any_of(std::begin(kReaders), std::end(kReaders), [&](const Reader& r) {
-    return kind == r.kind && r.is_answer;
-  });
-}
-
-}  // namespace
-
-std::vector<InputStream> input_streams(const Simulation& simulation, const RosProfile& profile) {
+std::vector<InputStream> input_streams(const RunDescription& run, const RosProfile& profile) {
   std::vector<InputStream> streams;
   for (const RosInput& input : profile.inputs) {
-    if (input.topic.empty() || input.topic == "-") continue;
-    const bool once = is_of_run(input.kind) || !names_vehicle(input.topic);
-    const std::size_t vehicles = once ? 1 : simulation.vehicle_count();
+    const InputType* type = input_types().find(input.kind);
+    if (type == nullptr || !is_used(input.topic)) continue;
+    const bool once = type->of_run || !names_vehicle(input.topic);
+    const std::size_t vehicles = once ? 1 : run.vehicles.size();
     for (std::size_t v = 0; v < vehicles; ++v) {
-      const RosNames names{
-          simulation.vehicle(v).setup().name, profile.first_id + static_cast<std::int64_t>(v), ""};
-      InputStream stream;
+      const RosNames names = names_of(profile, run.vehicles[v].setup, v);
+      InputStream& stream = streams.emplace_back();
+      stream.type = type;
       stream.settings = input;
-      stream.settings.topic = with_names(input.topic, names);
-      if (stream.settings.topic.front() != '/') stream.settings.topic.insert(0, "/");
+      stream.settings.topic = absolute(with_names(input.topic, names));
       stream.topic.name = stream.settings.topic;
-      stream.topic.type = type_for(input);
-      stream.topic.depth = 10;
-      stream.topic.reliable = is_one_shot(input.kind);
-      stream.topic.answers = is_answer(input.kind);
+      stream.topic.type = type->type(input);
+      stream.topic.reliable = type->one_shot;
+      stream.topic.answers = type->answers;
       stream.vehicle = v;
-      stream.for_all = once && !is_of_run(input.kind);
-      streams.push_back(std::move(stream));
+      stream.for_all = once && !type->of_run;
     }
   }
   return streams;
 }
 
-Inbox::Inbox(const Simulation& simulation, const RosProfile& profile)
-    : simulation_(simulation), profile_(profile) {
-  for (std::size_t v = 0; v < simulation.vehicle_count(); ++v) {
-    const VehicleSettings& s = simulation.vehicle(v).settings();
-    OrderContext context;
+Inbox::Inbox(const RunDescription& run, const RosProfile& profile)
+    : streams_(input_streams(run, profile)), services_(run_services(profile)) {
+  for (std::size_t v = 0; v < run.vehicles.size(); ++v) {
+    const VehicleSettings& s = run.vehicles[v].settings;
+    OrderContext& context = contexts_.emplace_back();
+    context.vehicle = v;
     context.mass = s.mass;
     context.thrust_max = s.thrust_to_weight() * s.mass * kGravity;
-    context.motion = simulation.vehicle(v).setup().mission.motion;
+    context.motion = run.vehicles[v].setup.mission.motion;
     context.world_frame = bare(profile.world_frame);
     context.world_alias = bare(profile.world_alias);
-    context.body_frame = bare(body_frame_of(
-        profile,
-        {simulation.vehicle(v).setup().name, profile.first_id + static_cast<std::int64_t>(v), ""},
-        v));
-    contexts_.push_back(context);
+    context.body_frame =
+        bare(body_frame_of(profile, names_of(profile, run.vehicles[v].setup, v), v));
   }
 }
 
 void Inbox::connect(Transport& transport) {
   const Wire wire = transport.wire();
-  for (const InputStream& stream : input_streams(simulation_, profile_)) {
-    transport.subscribe(stream.topic, [this, stream, wire](const Received& received) {
+  for (const InputStream& stream : streams_) {
+    transport.subscribe(stream.topic, [this, &stream, wire](const Received& received) {
       receive(stream, wire, received);
     });
   }
-  for (const Service& service : run_services(profile_)) serve(service, transport);
+  for (const Service& service : services_) {
+    transport.serve(service, [this, &service, wire](const Received& request) {
+      const auto order = order_in(service, wire, request);
+      if (order) push({*order});
+      return answer_to(order.has_value(), wire);
+    });
+  }
 }
 
-void Inbox::serve(const Service& service, Transport& transport) {
-  const Wire wire = transport.wire();
-  transport.serve(service, [this, service, wire](const Received& request) {
-    const auto order = order_in(service, wire, request);
-    if (order) push(*order);
-    return answer_to(order.has_value(), wire);
-  });
-}
-
-void Inbox::push(Order order) {
+void Inbox::push(std::vector<Order> orders) {
   const std::lock_guard lock(mutex_);
-  if (orders_.size() >= kOrdersMax) orders_.erase(orders_.begin());
-  orders_.push_back(std::move(order));
+  for (Order& order : orders) {
+    if (orders_.size() >= kOrdersMax) orders_.erase(orders_.begin());
+    orders_.push_back(std::move(order));
+  }
 }
 
 void Inbox::receive(const InputStream& stream, Wire wire, const Received& received) {
-  const std::size_t last = stream.for_all ? contexts_.size() : stream.vehicle + 1;
-  for (std::size_t v = stream.vehicle; v < last; ++v) {
-    InputStream own = stream;
-    own.vehicle = v;
-    std::string reason;
-    auto order = order_of(own, wire, received, contexts_[v], reason);
-    if (!order) {
-      const std::lock_guard lock(mutex_);
-      ++refused_.count;
-      refused_.last = reason;
-      if (refused_topics_.insert(stream.topic.name).second) new_reasons_.push_back(reason);
-      return;
-    }
-    push(std::move(*order));
-  }
+  std::string reason;
+  const auto contexts = std::span<const OrderContext>(contexts_);
+  push(orders_of(stream,
+                 wire,
+                 received,
+                 stream.for_all ? contexts : contexts.subspan(stream.vehicle, 1),
+                 reason));
+  if (reason.empty()) return;
+  const std::lock_guard lock(mutex_);
+  ++refused_.count;
+  refused_.last = reason;
+  if (refused_topics_.insert(stream.topic.name).second) new_reasons_.push_back(reason);
 }
 
 std::vector<Order> Inbox::take() {

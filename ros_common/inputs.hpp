@@ -1,34 +1,28 @@
+// What can be told to a run from a ROS: the table of kinds, each with what reads its messages, and
+// the inbox that turns them into orders. To add a kind: `std::optional<Order> order(const M&, const
+// RosInput&, const OrderContext&, std::string& why)` for a message M and a row in `input_types()`.
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <mutex>
 #include <optional>
 #include <set>
-#include <span>
 #include <string>
-#include <variant>
 #include <vector>
 
+#include "pointflight/core/registry.hpp"
 #include "pointflight/run/order.hpp"
-#include "pointflight/sim/simulation.hpp"
+#include "pointflight/sim/run_description.hpp"
 #include "ros_common/profile.hpp"
+#include "ros_common/services.hpp"
 #include "ros_common/wire.hpp"
 
 namespace pointflight {
 
-/// One topic that is read, for one vehicle and one kind of message.
-struct InputStream {
-  RosInput settings;        ///< Names written out.
-  Topic topic;              ///< Where it is read, and its type.
-  std::size_t vehicle = 0;  ///< Number in the fleet; of a shared topic each has a stream.
-  bool for_all = false;     ///< A topic that all vehicles share.
-};
-
-/// The streams of a profile in a run.
-std::vector<InputStream> input_streams(const Simulation& simulation, const RosProfile& profile);
-
 /// What a vehicle's orders are made with.
 struct OrderContext {
+  std::size_t vehicle = 0;  ///< Number in the fleet.
   double mass = 1.0;        ///< kg
   double thrust_max = 0.0;  ///< Of all rotors, N: what a thrust of 1 stands for.
   MotionLimits motion;      ///< Of goals.
@@ -38,19 +32,53 @@ struct OrderContext {
   ///@}
 };
 
-/// The order that a message stands for. Nothing, and the reason, where it is malformed or in a
-/// frame that is not known.
-std::optional<Order> order_of(const InputStream& stream,
-                              Wire wire,
-                              const Received& received,
-                              const OrderContext& context,
-                              std::string& reason);
+/// A message that was read, as an order for any vehicle. Nothing, and `why` in words, where it
+/// cannot be one.
+using OrderMaker =
+    std::function<std::optional<Order>(const OrderContext& context, std::string& why)>;
+
+/// A row of the table of kinds.
+struct InputType {
+  std::string name;  ///< In profiles.
+  std::string help;  ///< For docs/ros.md; half a sentence.
+  /// The type that it is read with. One topic has one type: ROS 2's tools take no other.
+  MessageType (*type)(const RosInput& input) = nullptr;
+  /// Empty where the bytes are no such message.
+  OrderMaker (*read)(const RosInput& input, Wire wire, const Received& received) = nullptr;
+  bool of_run = false;    ///< About the run, not a vehicle.
+  bool answers = false;   ///< A planner's: what lockstep waits for.
+  bool one_shot = false;  ///< Sent once and counts; others come in streams, and the next one mends.
+  const ServiceType* service = nullptr;  ///< That does the same; null: none.
+};
+
+/// All kinds. Programs may add to it before they read a profile.
+Registry<InputType>& input_types();
+
+/// One topic that is read, for one vehicle and one kind of message.
+struct InputStream {
+  const InputType* type = nullptr;  ///< Its row of the table; never null.
+  RosInput settings;                ///< Names written out.
+  Topic topic;                      ///< Where it is read, and its type.
+  std::size_t vehicle = 0;          ///< Number in the fleet.
+  bool for_all = false;             ///< A topic that all vehicles share.
+};
+
+/// The streams of a profile in a run.
+std::vector<InputStream> input_streams(const RunDescription& run, const RosProfile& profile);
+
+/// The orders that a message stands for: one for each context. None, and the reason, where it is
+/// malformed or in a frame that is not known.
+std::vector<Order> orders_of(const InputStream& stream,
+                             Wire wire,
+                             const Received& received,
+                             std::span<const OrderContext> contexts,
+                             std::string& reason);
 
 /// Takes messages from the threads of transports and gives orders to the one that flies.
 class Inbox {
  public:
-  /// Both must outlive the inbox.
-  Inbox(const Simulation& simulation, const RosProfile& profile);
+  /// Both are copied as far as they are needed.
+  Inbox(const RunDescription& run, const RosProfile& profile);
 
   /// Subscribes to everything that the profile reads, and answers the services of the run.
   void connect(Transport& transport);
@@ -70,11 +98,10 @@ class Inbox {
 
  private:
   void receive(const InputStream& stream, Wire wire, const Received& received);
-  void serve(const Service& service, Transport& transport);
-  void push(Order order);
+  void push(std::vector<Order> orders);
 
-  const Simulation& simulation_;
-  RosProfile profile_;
+  std::vector<InputStream> streams_;
+  std::vector<Service> services_;
   std::vector<OrderContext> contexts_;  ///< Of each vehicle.
   mutable std::mutex mutex_;
   std::vector<Order> orders_;

@@ -43,6 +43,9 @@ struct PointLayout {
   bool timed;                     ///< Points have times: stamped with the first one.
 };
 
+/// In profiles: not a PointCloud2 but Livox' own message.
+inline constexpr const char* kLivoxCustom = "livox_custom";
+
 /// Layout of a name. Throws InputError with the names there are.
 const PointLayout& point_layout(const std::string& name);
 

@@ -9,29 +9,19 @@
 
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/core/resources.hpp"
-#include "ros_common/outputs.hpp"
+#include "ros_common/inputs.hpp"
+#include "ros_common/output.hpp"
 #include "ros_common/point_layout.hpp"
 #include "ros_common/ros_names.hpp"
 
 namespace pointflight {
 namespace {
 
-constexpr std::array<std::string_view, 12> kInputs = {"position",
-                                                      "goal",
-                                                      "velocity",
-                                                      "attitude",
-                                                      "rotors",
-                                                      "joy",
-                                                      "take_off_land",
-                                                      "hover",
-                                                      "pause",
-                                                      "step",
-                                                      "reset",
-                                                      "arm"};
-constexpr std::array<std::string_view, 2> kEpochs = {"fixed", "now"};
-constexpr std::array<std::string_view, 2> kTwists = {"body", "world"};
-constexpr std::array<std::string_view, 2> kImuUnits = {"mps2", "g"};
-constexpr std::array<std::string_view, 2> kGravities = {"up", "down"};
+constexpr Named<StampEpoch> kEpochs[] = {{StampEpoch::kFixed, "fixed"}, {StampEpoch::kNow, "now"}};
+constexpr Named<TwistFrame> kTwists[] = {{TwistFrame::kBody, "body"},
+                                         {TwistFrame::kWorld, "world"}};
+constexpr Named<ImuUnit> kImuUnits[] = {{ImuUnit::kMps2, "mps2"}, {ImuUnit::kG, "g"}};
+constexpr Named<ImuGravity> kGravities[] = {{ImuGravity::kUp, "up"}, {ImuGravity::kDown, "down"}};
 constexpr std::array<std::string_view, 2> kLivoxPackages = {"livox_ros_driver2",
                                                             "livox_ros_driver"};
 
@@ -60,9 +50,8 @@ void check_names(const std::vector<RosOutput>& outputs,
                  const std::vector<RosInput>& inputs,
                  const std::string& prefix,
                  const Place& place) {
-  const auto check = [&](const std::string& key,
-                         const std::string& value,
-                         const std::vector<std::string>& known) {
+  const auto check = [&](const std::string& key, const std::string& value, const auto& names) {
+    const std::vector<std::string> known(names.begin(), names.end());
     if (std::find(known.begin(), known.end(), value) != known.end()) return;
     const std::string close = closest_word(value, known);
     std::vector<std::string> named = known;
@@ -74,12 +63,10 @@ void check_names(const std::vector<RosOutput>& outputs,
                                  close.empty() ? fmt::format("one of: {}", fmt::join(named, ", "))
                                                : fmt::format("did you mean '{}'?", close)));
   };
-  std::vector<std::string> kinds;
-  for (const OutputType& type : output_types()) kinds.emplace_back(type.name);
-  std::vector<std::string> layouts = {"", "livox_custom"};
+  std::vector<std::string> layouts = {"", kLivoxCustom};
   for (const PointLayout& layout : point_layouts()) layouts.emplace_back(layout.name);
   for (std::size_t i = 0; i < outputs.size(); ++i) {
-    check(fmt::format("{}outputs[{}].kind", prefix, i), outputs[i].kind, kinds);
+    check(fmt::format("{}outputs[{}].kind", prefix, i), outputs[i].kind, output_types().names());
     check(fmt::format("{}outputs[{}].layout", prefix, i), outputs[i].layout, layouts);
     const auto key = [&](const char* name) {
       return fmt::format("{}outputs[{}].{}", prefix, i, name);
@@ -89,9 +76,7 @@ void check_names(const std::vector<RosOutput>& outputs,
     check_pattern(key("child_frame"), outputs[i].child_frame, false, place);
   }
   for (std::size_t i = 0; i < inputs.size(); ++i) {
-    check(fmt::format("{}inputs[{}].kind", prefix, i),
-          inputs[i].kind,
-          {kInputs.begin(), kInputs.end()});
+    check(fmt::format("{}inputs[{}].kind", prefix, i), inputs[i].kind, input_types().names());
     check_pattern(fmt::format("{}inputs[{}].topic", prefix, i), inputs[i].topic, true, place);
   }
 }
@@ -214,6 +199,23 @@ RosProfile profile_for(const Scenario& scenario, const std::string& name) {
         take(own.topic, base.topic);
       });
   return profile;
+}
+
+RosNames names_of(const RosProfile& profile, const VehicleSetup& setup, std::size_t vehicle) {
+  return {setup.name, profile.first_id + static_cast<std::int64_t>(vehicle), ""};
+}
+
+std::string body_frame_of(const RosProfile& profile, const RosNames& names, std::size_t vehicle) {
+  const bool apart = vehicle == 0 || names_vehicle(profile.body_frame);
+  return (apart ? "" : names.vehicle + "/") + with_names(profile.body_frame, names);
+}
+
+bool is_used(const std::string& topic) {
+  return !topic.empty() && topic != "-";
+}
+
+std::string absolute(const std::string& topic) {
+  return topic.starts_with('/') ? topic : "/" + topic;
 }
 
 bool names_vehicle(const std::string& pattern) {

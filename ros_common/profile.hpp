@@ -9,6 +9,27 @@
 
 namespace pointflight {
 
+/// What stamps count from.
+enum class StampEpoch {
+  kFixed,  ///< 1.7e9 s and the run's time.
+  kNow     ///< The wall clock's time at the start.
+};
+/// Of odometry's velocities.
+enum class TwistFrame {
+  kBody,  ///< REP 105: the child frame.
+  kWorld
+};
+/// Of accelerations.
+enum class ImuUnit {
+  kMps2,
+  kG  ///< 9.80665 m/s^2, as Livox' driver sends.
+};
+/// What an accelerometer shows at rest.
+enum class ImuGravity {
+  kUp,   ///< +9.81 on z (REP 145).
+  kDown  ///< MARSIM's a + g.
+};
+
 /// Names, frames and customs of a family of programs: `data/ros_profiles/<name>.yaml`.
 struct RosProfile {
   std::string path;                   ///< Of the file, for messages.
@@ -16,13 +37,13 @@ struct RosProfile {
   std::string source;                 ///< Where they were read.
   std::string world_frame = "world";  ///< ENU, the map's own origin.
   std::string world_alias;            ///< Another name of it that goals and commands may have.
-  std::string body_frame = "{vehicle}/base_link";  ///< The vehicle's, at its centre of mass.
-  std::string sensor_frame = "{vehicle}/{lidar}";  ///< A LiDAR's own axes.
-  std::int64_t first_id = 0;                       ///< `{id}` of the first vehicle.
-  std::string epoch = "fixed";  ///< Of stamps: "fixed" (1.7e9 s and the run's time) or "now".
-  std::string twist = "body";   ///< Odometry's velocities: "body" (REP 105's child frame), "world"
-  std::string imu_unit = "mps2";   ///< or "g", as Livox' driver sends
-  std::string imu_gravity = "up";  ///< At rest +9.81 on z (REP 145); "down": MARSIM's a + g
+  std::string body_frame = "{vehicle}/base_link";   ///< The vehicle's, at its centre of mass.
+  std::string sensor_frame = "{vehicle}/{lidar}";   ///< A LiDAR's own axes.
+  std::int64_t first_id = 0;                        ///< `{id}` of the first vehicle.
+  StampEpoch epoch = StampEpoch::kFixed;            ///< What stamps count from.
+  TwistFrame twist = TwistFrame::kBody;             ///< Odometry's velocities.
+  ImuUnit imu_unit = ImuUnit::kMps2;                ///< Of accelerations.
+  ImuGravity imu_gravity = ImuGravity::kUp;         ///< Its sign in them.
   std::string livox_package = "livox_ros_driver2";  ///< ROS 1: of CustomMsg.
   std::vector<RosOutput> outputs;  ///< Each is one kind of message; several may be of one kind.
   /// Topics that are read; a shipped profile names what its programs send.
@@ -49,6 +70,19 @@ struct RosNames {
   std::int64_t id = 0;  ///< first_id + number.
   std::string lidar;    ///< As `lidar_names` has it; empty where a name is of no LiDAR.
 };
+
+/// Of a vehicle, without a LiDAR's.
+RosNames names_of(const RosProfile& profile, const VehicleSetup& setup, std::size_t vehicle);
+
+/// A vehicle's frame. Where the profile's pattern does not tell vehicles apart, the first keeps the
+/// name; others have their own in front.
+std::string body_frame_of(const RosProfile& profile, const RosNames& names, std::size_t vehicle);
+
+/// False for a topic that is left open or switched off ("-").
+bool is_used(const std::string& topic);
+
+/// With a / in front.
+std::string absolute(const std::string& topic);
 
 /// True where a topic or frame is another for each vehicle.
 bool names_vehicle(const std::string& pattern);

@@ -16,10 +16,8 @@ constexpr int kSettledLooks = 25;
 
 }  // namespace
 
-RosLink::RosLink(const Simulation& simulation, const RosProfile& profile, RosLinkOptions options)
-    : options_(std::move(options)),
-      inbox_(simulation, profile),
-      bridge_(simulation, profile, options_.epoch) {
+RosLink::RosLink(const RunDescription& run, const RosProfile& profile, RosLinkOptions options)
+    : options_(std::move(options)), inbox_(run, profile), bridge_(run, profile, options_.epoch) {
   if (!options_.log) options_.log = [](const std::string&) {};
   if (options_.lockstep) bridge_.keep_scans();
 }
@@ -39,7 +37,7 @@ void RosLink::add(std::unique_ptr<Outlet> recording) {
   recordings_.push_back({std::move(recording), false});
 }
 
-void RosLink::open() {
+void RosLink::open(const RunDescription& /*run*/) {
   bridge_.start();
 }
 
@@ -75,10 +73,10 @@ void RosLink::on_step(const StepDone& step) {
   say_failed_recordings();
 }
 
-void RosLink::on_wait(SimTime /*now*/, Waiting why) {
+void RosLink::on_wait(SimTime now, Waiting why) {
   if (why == Waiting::kForAnswer) return bridge_.resend_scans();
   if (why == Waiting::kForLinks && !options_.lockstep) return;
-  bridge_.repeat();
+  bridge_.on_wait(now);
 }
 
 std::vector<Order> RosLink::take_orders() {

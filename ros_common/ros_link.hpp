@@ -14,9 +14,9 @@ namespace pointflight {
 
 /// How ROS takes part in a run.
 struct RosLinkOptions {
-  Duration epoch{0};       ///< Since the Unix epoch: what stamps count from.
-  bool waits = true;       ///< The run starts when all transports have found their ROS...
-  bool lockstep = false;   ///< ...and somebody reads scans and sends commands.
+  Duration epoch{0};      ///< Since the Unix epoch: what stamps count from.
+  bool waits = true;      ///< The run starts when all transports have found their ROS...
+  bool lockstep = false;  ///< ...and somebody reads scans and sends commands.
   std::function<void(const std::string& line)> log;  ///< Lines for users.
   /// A transport could not be ended (`Transport::has_ended`).
   std::function<void()> on_left_behind;
@@ -25,8 +25,8 @@ struct RosLinkOptions {
 /// ROS 1, ROS 2 and recordings of a run: messages out, orders in.
 class RosLink : public Link {
  public:
-  /// The simulation must outlive it. Throws InputError (a profile that cannot be).
-  RosLink(const Simulation& simulation, const RosProfile& profile, RosLinkOptions options);
+  /// Throws InputError (a profile that cannot be).
+  RosLink(const RunDescription& run, const RosProfile& profile, RosLinkOptions options);
   /// Ends the transports.
   ~RosLink() override;
 
@@ -35,7 +35,7 @@ class RosLink : public Link {
   /// Before `open`: a recording.
   void add(std::unique_ptr<Outlet> recording);
 
-  void open() override;
+  void open(const RunDescription& run) override;
   bool is_ready() override;
   void on_sample(const Sample& sample) override { bridge_.on_sample(sample); }
   void on_step(const StepDone& step) override;

@@ -1,14 +1,30 @@
 #pragma once
 
 #include <optional>
+#include <string>
 #include <vector>
 
-#include "ros_common/inputs.hpp"
+#include "pointflight/run/order.hpp"
+#include "ros_common/profile.hpp"
+#include "ros_common/wire.hpp"
 
 namespace pointflight {
 
-/// What the run answers: pause, step and reset, under the names of the topics that ask for the
-/// same. None where the profile has no such topics.
+/// A service of std_srvs that does what an input does, under the name of its topic.
+struct ServiceType {
+  const char* type;               ///< "Trigger"
+  const char* md5;                ///< Of the service as a whole, as ROS 1 compares it.
+  std::string (*request_hash)();  ///< For ROS 2.
+  /// Nothing where the request is malformed.
+  std::optional<Order> (*read)(Wire wire, const Received& request);
+};
+
+/// Pause, step and reset.
+///@{
+extern const ServiceType kPauseService, kStepService, kResetService;
+///@}
+
+/// What the run answers; none where the profile has no such topics.
 std::vector<Service> run_services(const RosProfile& profile);
 
 /// The order in a request of one of them; nothing where it is malformed.

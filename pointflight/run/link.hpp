@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "pointflight/run/order.hpp"
-#include "pointflight/sim/samples.hpp"
+#include "pointflight/sim/run_description.hpp"
 
 namespace pointflight {
 
@@ -24,13 +24,14 @@ enum class Waiting {
 };
 
 /// What somebody outside is to a run: a ROS, a recording, files, a page, a flight controller,
-/// another process. Samples come in, orders go out. All calls come from the thread of the run's loop
+/// another process. Samples come in, orders go out. All calls come from the thread of the run's
+/// loop
 /// (`RunLoop`), in this order: `open`, `is_ready` until it is, then for each step samples,
 /// `on_step` and `take_orders`, at last `close`. A link with a thread of its own: `ThreadedLink`.
 class Link : public SampleSink {
  public:
-  /// The run is about to start. May throw InputError.
-  virtual void open() {}
+  /// The run is about to start; `run` is valid until `close` has returned. May throw InputError.
+  virtual void open(const RunDescription& /*run*/) {}
   /// False while the run should not start yet. May throw InputError.
   virtual bool is_ready() { return true; }
 

@@ -10,7 +10,7 @@
 namespace pointflight {
 namespace {
 
-constexpr std::chrono::milliseconds kLook(20);         // while links are not ready, or the run paused
+constexpr std::chrono::milliseconds kLook(20);  // while links are not ready, or the run paused
 constexpr std::chrono::microseconds kAnswerLook(200);  // in lockstep
 constexpr Duration kProgressPeriod = std::chrono::milliseconds(100);
 
@@ -85,7 +85,8 @@ void RunLoop::add(Link& link) {
 }
 
 RunEnd RunLoop::run() {
-  for (Link* link : links_) link->open();
+  description_ = describe_run(simulation_);
+  for (Link* link : links_) link->open(description_);
   if (!wait_until_ready()) {
     simulation_.interrupt();
     return simulation_.end();
@@ -130,7 +131,8 @@ std::uint64_t RunLoop::dropped() const {
 /// False where the run is over before its first step.
 bool RunLoop::wait_until_ready() {
   for (;;) {
-    const bool ready = std::all_of(links_.begin(), links_.end(), [](Link* l) { return l->is_ready(); });
+    const bool ready =
+        std::all_of(links_.begin(), links_.end(), [](Link* l) { return l->is_ready(); });
     if (is_over()) return false;
     if (ready) return true;
     for (Link* link : links_) link->on_wait(simulation_.time(), Waiting::kForLinks);
@@ -140,7 +142,8 @@ bool RunLoop::wait_until_ready() {
 
 bool RunLoop::is_over() const {
   if (options_.interrupted && options_.interrupted()) return true;
-  const bool used = std::any_of(links_.begin(), links_.end(), [](Link* l) { return l->is_in_use(); });
+  const bool used =
+      std::any_of(links_.begin(), links_.end(), [](Link* l) { return l->is_in_use(); });
   return (!links_.empty() && !used) ||
          std::any_of(links_.begin(), links_.end(), [](Link* l) { return l->is_over(); });
 }
@@ -159,9 +162,10 @@ void RunLoop::wait_for_answer() {
   while (answers_ == before && !paused_ && !reset_ && !is_over()) {
     if (Clock::now() > until) {
       if (unanswered_++ > 0) return;
-      say(fmt::format("warning: no command within {} s of the scan at {:.1f} s; flying on (said once)",
-                      options_.lockstep,
-                      to_seconds(simulation_.time())));
+      say(fmt::format(
+          "warning: no command within {} s of the scan at {:.1f} s; flying on (said once)",
+          options_.lockstep,
+          to_seconds(simulation_.time())));
       return;
     }
     std::this_thread::sleep_for(kAnswerLook);
@@ -217,7 +221,8 @@ void RunLoop::reset() {
 void RunLoop::say_behind() {
   const auto behind = pace_.fallen_behind(simulation_.time());
   if (!behind) return;
-  say(fmt::format("warning: {:.1f} s behind: this machine manages a rate of {:.2f}, not {}; "
+  say(
+      fmt::format("warning: {:.1f} s behind: this machine manages a rate of {:.2f}, not {}; "
                   "use fewer LiDARs, a coarser map or --rate {:.1f}, or --lockstep",
                   behind->seconds,
                   behind->rate,

@@ -68,7 +68,7 @@ struct RunOptions {
   double lockstep = 0.0;  ///< After each scan wait so long for a planner's command, s; 0: do not.
   /// Lines for users: what the run fell behind, that it was paused.
   std::function<void(const std::string& line)> log;
-  Progress progress;                   ///< Of the run's length.
+  Progress progress;                  ///< Of the run's length.
   std::function<bool()> interrupted;  ///< True once the user wants it to end.
 };
 
@@ -117,6 +117,7 @@ class RunLoop {
   Simulation& simulation_;
   RunOptions options_;
   SimulationState at_start_;
+  RunDescription description_;
   Pace pace_;
   std::vector<Link*> links_;
   ScanDelays delays_;

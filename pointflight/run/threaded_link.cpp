@@ -16,8 +16,8 @@ ThreadedLink::~ThreadedLink() {
   stop();
 }
 
-void ThreadedLink::open() {
-  link_.open();
+void ThreadedLink::open(const RunDescription& run) {
+  link_.open(run);
 }
 
 bool ThreadedLink::is_ready() {
@@ -74,7 +74,8 @@ void ThreadedLink::push(Event event) {
     ++samples_;
   } else if (!queue_.empty() && queue_.back().index() == event.index() &&
              !std::holds_alternative<Rejected>(event)) {
-    queue_.pop_back();  // steps without samples, looks while the run waits: the last one says it all
+    queue_
+        .pop_back();  // steps without samples, looks while the run waits: the last one says it all
   }
   queue_.push_back(std::move(event));
   changed_.notify_all();

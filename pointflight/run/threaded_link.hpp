@@ -23,13 +23,13 @@ class ThreadedLink : public Link {
     kWait         ///< The run waits; for records.
   };
 
-  /// `link` must outlive it; `capacity` in samples, at least 1. After `open` all calls of `link` but
-  /// `is_over`, `is_in_use` and `dropped`, which must be callable from any thread, come from its
-  /// own thread.
+  /// `link` must outlive it; `capacity` in samples, at least 1. After `open` all calls of `link`
+  /// but `is_over`, `is_in_use` and `dropped`, which must be callable from any thread, come from
+  /// its own thread.
   ThreadedLink(Link& link, std::size_t capacity, WhenFull when_full);
   ~ThreadedLink() override;
 
-  void open() override;
+  void open(const RunDescription& run) override;
   bool is_ready() override;
   void on_sample(const Sample& sample) override;
   void on_step(const StepDone& step) override;

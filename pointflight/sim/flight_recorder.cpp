@@ -297,19 +297,18 @@ void FlightRecorder::write(const VehicleEvent& event) {
 
 void FlightRecorder::write(const ObstacleSample& sample) {
   if (!obstacles_) return;
-  const Pose& pose = sample.T_world_body;
-  const auto* solid = std::get_if<Solid>(&sample.shape);
-  const Vector3d half_extent =
-      solid != nullptr ? pointflight::half_extent(*solid) : Vector3d::Zero();
-  obstacles_->write(fmt::format("{},{},{},{},{},{},{},{}\n",
-                                seconds(sample.time),
-                                sample.label,
-                                csv(pose.translation),
-                                pose.rotation.w(),
-                                pose.rotation.x(),
-                                pose.rotation.y(),
-                                pose.rotation.z(),
-                                csv(half_extent)));
+  for (const auto& [label, pose, shape] : sample.obstacles) {
+    const auto* solid = std::get_if<Solid>(&shape);
+    obstacles_->write(fmt::format("{},{},{},{},{},{},{},{}\n",
+                                  seconds(sample.time),
+                                  label,
+                                  csv(pose.translation),
+                                  pose.rotation.w(),
+                                  pose.rotation.x(),
+                                  pose.rotation.y(),
+                                  pose.rotation.z(),
+                                  csv(solid != nullptr ? half_extent(*solid) : Vector3d::Zero())));
+  }
 }
 
 void FlightRecorder::finish(const Simulation& simulation) {

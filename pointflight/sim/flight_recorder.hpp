@@ -44,6 +44,7 @@ class FlightRecorder : public SampleSink {
   void write(const CollisionEvent& event);
   void write(const VehicleEvent& event);
   void write(const ObstacleSample& sample);
+  void write(const StatusSample& /*sample*/) {}
 
   RunFolder folder_;
   bool write_scans_;

@@ -1,14 +1,14 @@
 #include "pointflight/sim/ros_setup.hpp"
 
-#include <array>
-
 namespace pointflight {
 namespace {
 
-constexpr std::array<std::string_view, 2> kRotorUnits = {"si", "rpm"};
-constexpr std::array<std::string_view, 2> kFrames = {"world", "body"};
-constexpr std::array<std::string_view, 2> kCommandPackages = {"quadrotor_msgs",
-                                                              "mars_quadrotor_msgs"};
+constexpr Named<RotorUnit> kRotorUnits[] = {{RotorUnit::kSi, "si"}, {RotorUnit::kRpm, "rpm"}};
+constexpr Named<VelocityFrame> kFrames[] = {{VelocityFrame::kWorld, "world"},
+                                            {VelocityFrame::kBody, "body"}};
+constexpr Named<CommandPackage> kCommandPackages[] = {
+    {CommandPackage::kQuadrotorMsgs, "quadrotor_msgs"},
+    {CommandPackage::kMarsQuadrotorMsgs, "mars_quadrotor_msgs"}};
 
 }  // namespace
 

@@ -19,14 +19,21 @@ struct RosOutput {
   double resolution = 0.0;  ///< Of the map's cloud, m; 0: the map's own.
 };
 
+/// Of rotor speeds: rad/s or rpm.
+enum class RotorUnit { kSi, kRpm };
+/// Of velocities.
+enum class VelocityFrame { kWorld, kBody };
+/// That defines PositionCommand.
+enum class CommandPackage { kQuadrotorMsgs, kMarsQuadrotorMsgs };
+
 /// A message that comes in.
 struct RosInput {
-  std::string kind;             ///< What it is taken for: ros_common/profile.cpp has the list.
-  std::string topic;            ///< "-": not read.
-  std::string unit = "si";      ///< Of rotor speeds: "si" (rad/s) or "rpm".
-  std::string frame = "world";  ///< Of velocities that name no frame: "world" or "body".
+  std::string kind;                 ///< What it is taken for: ros_common/profile.cpp has the list.
+  std::string topic;                ///< "-": not read.
+  RotorUnit unit = RotorUnit::kSi;  ///< Of rotor speeds.
+  VelocityFrame frame = VelocityFrame::kWorld;  ///< Of velocities that name no frame.
   /// Of a PositionCommand on ROS 2, where readers of different types do not meet.
-  std::string package = "quadrotor_msgs";
+  CommandPackage package = CommandPackage::kQuadrotorMsgs;
 };
 
 /// The keys of one entry of `ros.outputs`.

@@ -70,13 +70,36 @@ struct VehicleEvent {
   Vector3d vehicle_world = Vector3d::Zero();  ///< The body's origin, m.
 };
 
-/// Where an obstacle is, at output.obstacle_rate, for each that is there.
-struct ObstacleSample {
-  SimTime time;  ///< A multiple of 1 / output.obstacle_rate.
+/// An obstacle at an instant.
+struct PlacedObstacle {
   /// `kFirstObstacle` + its number; what replaces an obstacle has the same.
   Label label = kMapLabel;
   Pose T_world_body;  ///< Of its own frame; a cloud's origin need not be its middle.
   BodyShape shape;    ///< In its own frame.
+};
+
+/// Where all obstacles are that are there, at output.obstacle_rate; none without any.
+struct ObstacleSample {
+  SimTime time;                           ///< A multiple of 1 / output.obstacle_rate.
+  std::vector<PlacedObstacle> obstacles;  ///< By label.
+};
+
+/// How a vehicle fares, at `Simulation::kStatusRate`, at the end of the step that comes to it.
+struct StatusSample {
+  std::uint32_t vehicle = 0;        ///< Number in the fleet, from 0.
+  SimTime time;                     ///< Of the state; a step's end.
+  RigidBodyState state;             ///< The true one.
+  bool crashed = false;             ///< Rotors off for good.
+  bool landed = false;              ///< The ground carries it.
+  bool touches = false;             ///< Its hull is in contact with something.
+  bool armed = true;                ///< Its rotors may turn.
+  std::string command;              ///< What it was told last, in a word.
+  std::optional<double> clearance;  ///< m; nothing within `Simulation::kClearanceReach`.
+  std::uint64_t collisions = 0;     ///< So far.
+  std::uint64_t scans = 0;          ///< Delivered so far.
+  std::uint64_t rejected = 0;       ///< Commands that it did not take.
+  std::string last_rejection;       ///< Why; empty where it took all.
+  std::uint64_t timeouts = 0;       ///< Times that commands stopped coming.
 };
 
 /// Anything that a run says.
@@ -87,7 +110,8 @@ using Sample = std::variant<StateSample,
                             ScanSample,
                             CollisionEvent,
                             VehicleEvent,
-                            ObstacleSample>;
+                            ObstacleSample,
+                            StatusSample>;
 
 /// Calls the one of several functions that takes what a variant holds; for `std::visit`.
 template <class... Functions>
@@ -99,7 +123,7 @@ Overloaded(Functions...) -> Overloaded<Functions...>;
 
 /// Where the samples of a run go. Called from one thread, by time: within a step first what
 /// happened, then truth and measurements as they arrive, then obstacles, then scans that have
-/// ended. Those who want one kind only ask for it: `if (auto* scan =
+/// ended, then statuses. Those who want one kind only ask for it: `if (auto* scan =
 /// std::get_if<ScanSample>(&sample))`.
 class SampleSink {
  public:

@@ -15,9 +15,9 @@
 namespace pointflight {
 namespace {
 
-constexpr double kGoalTolerance = 0.5;      // m
-constexpr double kStartRoom = 1.0;          // m that random obstacles keep from starts
-constexpr std::size_t kVehiclesAChunk = 4;  // that one thread steps
+constexpr double kGoalTolerance = 0.5;        // m
+constexpr double kStartRoom = 1.0;            // m that random obstacles keep from starts
+constexpr std::size_t kVehiclesPerChunk = 4;  // that one thread steps
 
 }  // namespace
 
@@ -210,7 +210,7 @@ void Simulation::sense(std::vector<StepSamples>& samples) {
                         pose});
   }
   executor_->parallel_for(
-      vehicle_count(), kVehiclesAChunk, [&](std::size_t begin, std::size_t end) {
+      vehicle_count(), kVehiclesPerChunk, [&](std::size_t begin, std::size_t end) {
         std::vector<PlacedBody> bodies = vehicles;
         for (std::size_t i = begin; i < end; ++i) {
           bodies.resize(vehicles.size());  // without the obstacles near the one before
@@ -288,7 +288,7 @@ bool Simulation::step(SampleSink& sink) {
   const bool last = now >= end_time() && !is_landing();
   const SimTime samples_end = stops || last ? now + Duration{1} : now + setup_->step;
   executor_->parallel_for(
-      vehicle_count(), kVehiclesAChunk, [&](std::size_t begin, std::size_t end) {
+      vehicle_count(), kVehiclesPerChunk, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
           VehicleStatus& status = state_.vehicles[i];
           status.history.record(now, status.state.body.T_world_body());
@@ -313,7 +313,7 @@ bool Simulation::step(SampleSink& sink) {
   }
   std::vector<char> fine(vehicle_count(), 1);
   executor_->parallel_for(
-      vehicle_count(), kVehiclesAChunk, [&](std::size_t begin, std::size_t end) {
+      vehicle_count(), kVehiclesPerChunk, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
           if (!sources_[i]) fine[i] = vehicle(i).integrate(state_.vehicles[i], dt) ? 1 : 0;
         }
@@ -336,6 +336,7 @@ bool Simulation::step(SampleSink& sink) {
   }
   state_.time = now + setup_->step;
   ++state_.step_number;
+  sample_status(sink);
   return true;
 }
 

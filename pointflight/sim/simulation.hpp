@@ -36,6 +36,7 @@ struct SimulationState {
   SimTime time;                           ///< Start of the next step.
   std::uint64_t step_number = 0;          ///< Steps that were done.
   std::int64_t next_obstacle_sample = 0;  ///< Index in the schedule of output.obstacle_rate.
+  std::int64_t next_status = 0;           ///< Index in the schedule of `kStatusRate`.
   RunEnd end = RunEnd::kRunning;          ///< How it ended; no step is done after that.
   SimTime busy_until;  ///< That commands from the program last and what is waited after them.
   std::vector<VehicleStatus> vehicles;  ///< By number.
@@ -52,6 +53,8 @@ class Simulation {
   static constexpr double kClearanceReach = 10.0;
   /// A run without a duration ends so long after all is done and the last command came, s.
   static constexpr double kIdleTime = 10.0;
+  /// Of `StatusSample`s, Hz.
+  static constexpr double kStatusRate = 10.0;
 
   /// Throws InputError where the scenario cannot be flown (unknown models, start inside the map,
   /// far outside of it or in each other, obstacles without room), std::invalid_argument without a
@@ -107,6 +110,8 @@ class Simulation {
   [[nodiscard]] const VehicleAgent& vehicle(std::size_t number) const;
   /// What changes of a vehicle, at `time`. Throws std::out_of_range.
   [[nodiscard]] const VehicleStatus& status(std::size_t number) const;
+  /// The same as a sample: what outsiders are told of it.
+  [[nodiscard]] StatusSample status_sample(std::size_t number) const;
   /// What happened to a vehicle so far. Throws std::out_of_range.
   [[nodiscard]] const VehicleSummary& summary(std::size_t number) const {
     return status(number).summary;
@@ -130,6 +135,7 @@ class Simulation {
   [[nodiscard]] bool react(std::vector<StepSamples>& samples);
   void deliver(std::vector<StepSamples>& samples, SampleSink& sink);
   void sample_obstacles(SimTime end, SampleSink& sink);
+  void sample_status(SampleSink& sink);
   void take_due_scans(SampleSink& sink);
   void finish_run();
   /// A measurement whose interval has ended.

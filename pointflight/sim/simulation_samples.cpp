@@ -32,16 +32,42 @@ void Simulation::sample_obstacles(SimTime end, SampleSink& sink) {
   for (;; ++state_.next_obstacle_sample) {
     const SimTime time = setup_->obstacle_schedule.at(state_.next_obstacle_sample);
     if (time >= end) return;
-    for (const Body& body : obstacles(time, time)) {
+    ObstacleSample sample;
+    sample.time = time;
+    for (Body& body : obstacles(time, time)) {
       if (time < body.from || time >= body.until) continue;
-      ObstacleSample sample;
-      sample.time = time;
-      sample.label = body.label;
-      sample.T_world_body = body.T_world_body(time);
-      sample.shape = body.shape;
-      sink.on_sample(sample);
+      sample.obstacles.push_back({body.label, body.T_world_body(time), std::move(body.shape)});
     }
+    if (!sample.obstacles.empty()) sink.on_sample(sample);
   }
+}
+
+StatusSample Simulation::status_sample(std::size_t number) const {
+  const VehicleStatus& status = this->status(number);
+  StatusSample sample;
+  sample.vehicle = vehicle(number).number();
+  sample.time = state_.time;
+  sample.state = status.state.body;
+  sample.crashed = status.crashed;
+  sample.landed = status.landed;
+  sample.touches = !status.proximity.touching.empty();
+  sample.armed = status.autopilot.armed;
+  sample.command = name_of(status.autopilot.command);
+  if (status.proximity.nearest) sample.clearance = status.proximity.nearest->distance;
+  sample.collisions = status.summary.collisions;
+  sample.scans = status.summary.scans;
+  sample.rejected = status.autopilot.rejected;
+  sample.last_rejection = status.autopilot.last_rejection;
+  sample.timeouts = status.autopilot.timeouts;
+  return sample;
+}
+
+/// After a step that came to an instant of the schedule.
+void Simulation::sample_status(SampleSink& sink) {
+  const Schedule schedule(kStatusRate);
+  if (schedule.at(state_.next_status) > state_.time) return;
+  while (schedule.at(state_.next_status) <= state_.time) ++state_.next_status;
+  for (std::size_t v = 0; v < vehicle_count(); ++v) sink.on_sample(status_sample(v));
 }
 
 /// What a sensor of a vehicle can meet: everybody else, and the obstacles that are near enough.

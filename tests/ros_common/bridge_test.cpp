@@ -81,7 +81,7 @@ Scenario flight(double duration = 1.0) {
 void fly(const Scenario& scenario, const RosProfile& profile, Outlet& outlet, int threads = 2) {
   const Executor executor(threads);
   Simulation simulation(scenario, hall(), executor);
-  RosBridge bridge(simulation, profile, kEpoch);
+  RosBridge bridge(describe_run(simulation), profile, kEpoch);
   bridge.add(outlet);
   bridge.start();
   while (simulation.step(bridge)) bridge.on_time(simulation.time());
@@ -173,7 +173,7 @@ TEST(RosBridge, BothWiresSayTheSame) {
   Keeper ros1(Wire::kRos1);
   const Executor executor(2);
   Simulation simulation(flight(0.5), hall(), executor);
-  RosBridge bridge(simulation, load_ros_profile("default"), kEpoch);
+  RosBridge bridge(describe_run(simulation), load_ros_profile("default"), kEpoch);
   bridge.add(cdr);
   bridge.add(ros1);
   bridge.start();
@@ -338,7 +338,7 @@ TEST(RosBridge, SeveralVehiclesShareNoFrame) {
 TEST(RosBridge, TheClockOfAPausedRunSaysWhereItStands) {
   const Executor executor(1);
   Simulation simulation(flight(), hall(), executor);
-  RosBridge bridge(simulation, load_ros_profile("default"), kEpoch);
+  RosBridge bridge(describe_run(simulation), load_ros_profile("default"), kEpoch);
   Keeper keeper;
   bridge.add(keeper);
   bridge.start();
@@ -347,7 +347,7 @@ TEST(RosBridge, TheClockOfAPausedRunSaysWhereItStands) {
     bridge.on_time(simulation.time());
   }
   EXPECT_NEAR(seconds_of(keeper.of<msg::Clock>("/clock").back().clock), 0.010, 1e-9);
-  bridge.repeat();
+  bridge.on_wait(simulation.time());
   EXPECT_NEAR(seconds_of(keeper.of<msg::Clock>("/clock").back().clock), 0.013, 1e-9);
 }
 
@@ -382,7 +382,8 @@ TEST(RosBridge, SettingsOfAProfile) {
   profile.outputs[1].topic = "/imu";
   const Executor executor(1);
   const Simulation simulation(flight(), hall(), executor);
-  expect_contains(error_of([&] { RosBridge(simulation, profile, kEpoch); }), "/imu would carry");
+  expect_contains(error_of([&] { RosBridge(describe_run(simulation), profile, kEpoch); }),
+                  "/imu would carry");
 }
 
 }  // namespace

@@ -26,7 +26,7 @@ Scenario short_run() {
 /// Notes what comes; asks for what it is told to at the steps it is told.
 class Probe : public Link {
  public:
-  void open() override { calls += "open "; }
+  void open(const RunDescription& /*run*/) override { calls += "open "; }
   bool is_ready() override { return ready_after-- <= 0; }
   void on_sample(const Sample& sample) override {
     bytes.on_sample(sample);

@@ -60,7 +60,10 @@ class ByteSink : public SampleSink {
     add(e.time.time_since_epoch().count());
     events.push_back(e);
   }
-  void take(const ObstacleSample& o) { add(o.T_world_body.translation.x()); }
+  void take(const ObstacleSample& o) {
+    for (const PlacedObstacle& obstacle : o.obstacles) add(obstacle.T_world_body.translation.x());
+  }
+  void take(const StatusSample& /*s*/) {}
 
   template <class T>
   void add(T value) {

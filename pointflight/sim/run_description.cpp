@@ -1,0 +1,25 @@
+#include "pointflight/sim/run_description.hpp"
+
+namespace pointflight {
+
+RunDescription describe_run(const Simulation& simulation) {
+  RunDescription run;
+  run.scenario = scenario_yaml(simulation.scenario());
+  run.seed = simulation.scenario().seed;
+  run.map = simulation.shared_map();
+  for (std::size_t v = 0; v < simulation.vehicle_count(); ++v) {
+    const VehicleAgent& agent = simulation.vehicle(v);
+    VehicleDescription& vehicle = run.vehicles.emplace_back();
+    vehicle.setup = agent.setup();
+    vehicle.settings = agent.settings();
+    vehicle.hull = agent.hull();
+    vehicle.shape = agent.shape();
+    for (const MountedLidar* mounted : agent.lidars()) {
+      vehicle.lidars.push_back({mounted->lidar().settings(), mounted->T_body_sensor()});
+    }
+    vehicle.at_start = simulation.status_sample(v);
+  }
+  return run;
+}
+
+}  // namespace pointflight
