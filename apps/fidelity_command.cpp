@@ -251,7 +251,7 @@ void add_fidelity_command(CLI::App& parent, int& /*exit_code*/) {
   app->add_option("--points-per-cell", flags->points_per_cell, "Points a square of the resolution")
       ->check(within(0.01, 1000.0))
       ->capture_default_str();
-  app->add_option("--density-min", flags->density_min, "At least so many points a square metre")
+  app->add_option("--density-min", flags->density_min, "At least so many points per square metre")
       ->check(within(0.0, 1e6))
       ->capture_default_str();
   app->add_flag("--thinned",

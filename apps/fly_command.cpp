@@ -292,9 +292,10 @@ void add_fly_command(CLI::App& parent, int& exit_code) {
   app->add_option("-o,--output", flags->output, "Folder for the results; needed without ROS");
   app->add_option("--seed", flags->seed, "Instead of the scenario's")
       ->check(CLI::Range(std::int64_t{0}, std::int64_t{9000000000000000}));
-  app->add_option("--rate",
-                  flags->rate,
-                  "Simulated seconds a second: 'max', or 1.0 for real time (the default with ROS)");
+  app->add_option(
+      "--rate",
+      flags->rate,
+      "Simulated seconds per second: 'max', or 1.0 for real time (the default with ROS)");
   app->add_option(
       "--map",
       flags->map,

@@ -69,13 +69,14 @@ void print_statistics(const LidarSettings& s, const ScanStatistics& scan) {
   const char* lines = s.pattern == ScanPattern::kRings  ? "rings"
                       : s.pattern == ScanPattern::kGrid ? "rows"
                                                         : "lines";
-  fmt::print("# scan: {} beams, {} {}, fired within {} ms; {:g} scans and {:.0f} beams a second\n",
-             scan.beams,
-             scan.rings,
-             lines,
-             fixed_text(scan.span * 1e3, 2),
-             s.rate,
-             scan.beams_a_second);
+  fmt::print(
+      "# scan: {} beams, {} {}, fired within {} ms; {:g} scans and {:.0f} beams per second\n",
+      scan.beams,
+      scan.rings,
+      lines,
+      fixed_text(scan.span * 1e3, 2),
+      s.rate,
+      scan.beams_a_second);
   fmt::print("# field of view: azimuth {} to {} deg, elevation {} to {} deg\n",
              fixed_text(scan.azimuth_min, 2),
              fixed_text(scan.azimuth_max, 2),

@@ -88,7 +88,7 @@ void print_report(const ImportReport& r, const ImportOptions& options) {
   if (r.grown_surfels > 0) {
     log(fmt::format("thin scan     {} surfels widened to close gaps", r.grown_surfels));
   }
-  log(fmt::format("coverage      {:.2f} makes a return ({:.0f} points a planar cell)",
+  log(fmt::format("coverage      {:.2f} makes a return ({:.0f} points per planar cell)",
                   r.tau,
                   r.points_per_cell));
   log(fmt::format("surfels       {}, {:.0f} % planar{}",
@@ -281,7 +281,7 @@ void print_info(const SurfelMap& map, const InfoFlags& flags) {
              b.size().y(),
              b.size().z(),
              point_text(b.min));
-  fmt::print("  size        {:.1f} MB, {:.1f} bytes a surfel\n",
+  fmt::print("  size        {:.1f} MB, {:.1f} bytes per surfel\n",
              static_cast<double>(map.file_size()) * 1e-6,
              bytes_each);
   print_findings(metadata, map.resolution());

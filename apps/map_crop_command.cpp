@@ -118,11 +118,11 @@ struct ThinFlags : EditFlags {
 
 void thin(const ThinFlags& flags) {
   if ((flags.spacing > 0.0) == (flags.every > 0)) {
-    throw InputError("give one of --spacing (a point a cell) and --every (each n-th point)");
+    throw InputError("give one of --spacing (a point per cell) and --every (each n-th point)");
   }
   if (check_edit(flags)) {
     throw InputError(fmt::format(
-        "{}: a map has one surfel a cell; import its cloud again with a coarser --resolution",
+        "{}: a map has one surfel per cell; import its cloud again with a coarser --resolution",
         flags.inputs.front()));
   }
   const Progress progress = interruptible_progress();
@@ -187,7 +187,7 @@ void add_crop(CLI::App& parent) {
 }
 
 void add_thin(CLI::App& parent) {
-  auto* app = parent.add_subcommand("thin", "Fewer points: one a cell, or each n-th");
+  auto* app = parent.add_subcommand("thin", "Fewer points: one per cell, or each n-th");
   auto flags = std::make_shared<ThinFlags>();
   add_input(*app, *flags);
   add_edit_flags(*app, *flags, "The cloud to write: .pcd, .ply, .las", true);

@@ -32,7 +32,7 @@ CloudColumns columns_of_map(const ExportFlags& flags, const SurfelMap& map) {
   columns.normal = what != "points";
   columns.ellipsoid = what == "surfels";
   if (columns.ellipsoid && flags.density > 0.0) {
-    throw InputError("--what surfels is one row a surfel; leave --density out");
+    throw InputError("--what surfels is one row per surfel; leave --density out");
   }
   return columns;
 }
@@ -153,6 +153,25 @@ nlohmann::ordered_json json_of(const std::vector<OneWay>& ways, double distance)
   return json;
 }
 
+void draw_diff(const DiffFlags& flags,
+               const std::vector<OneWay>& ways,
+               double distance,
+               const PointSample& all) {
+  draw_points(fmt::format("{} and {}", flags.inputs[0], flags.inputs[1]),
+              fmt::format("what lies farther than {:.3g} m from the other", distance),
+              {{"the first", {0.75, 0.75, 0.75}, false, &all},
+               {fmt::format("only in the first: {:.2f} %", 100.0 * ways[0].share()),
+                kOnlyFirst,
+                false,
+                &ways[0].sample},
+               {fmt::format("only in the second: {:.2f} %", 100.0 * ways[1].share()),
+                kOnlySecond,
+                false,
+                &ways[1].sample}},
+              flags.png);
+  log("picture: " + flags.png);
+}
+
 void diff(const DiffFlags& flags) {
   for (const std::string& output : {flags.output, flags.png}) {
     if (output.empty()) continue;
@@ -210,21 +229,7 @@ void diff(const DiffFlags& flags) {
                     writer->count(),
                     10.0 * distance));
   }
-  if (!flags.png.empty()) {
-    draw_points(fmt::format("{} and {}", flags.inputs[0], flags.inputs[1]),
-                fmt::format("what lies farther than {:.3g} m from the other", distance),
-                {{"the first", {0.75, 0.75, 0.75}, false, &all},
-                 {fmt::format("only in the first: {:.2f} %", 100.0 * ways[0].share()),
-                  kOnlyFirst,
-                  false,
-                  &ways[0].sample},
-                 {fmt::format("only in the second: {:.2f} %", 100.0 * ways[1].share()),
-                  kOnlySecond,
-                  false,
-                  &ways[1].sample}},
-                flags.png);
-    log("picture: " + flags.png);
-  }
+  if (!flags.png.empty()) draw_diff(flags, ways, distance, all);
   if (flags.json) {
     print_json(json_of(ways, distance));
   } else {
@@ -246,7 +251,7 @@ void add_export(CLI::App& parent) {
       ->check(CLI::IsMember({"points", "normals", "surfels"}));
   app->add_option("--density",
                   flags->density,
-                  "Points a square metre, spread over the surfels; without it one a surfel")
+                  "Points a square metre, spread over the surfels; without it one per surfel")
       ->check(within(0.01, 1e8));
   app->footer("  pointflight map export hall.pfmap -o hall.ply");
   app->callback([flags] { export_map(*flags); });

@@ -51,7 +51,7 @@ struct Page {
 /// A page for a box of the world, its titles and legends `header` pixels high.
 Page lay_out(const Aabb& shown, double header);
 
-/// The box with some room around and at least a metre a side.
+/// The box with some room around and at least a metre on a side.
 Aabb with_room(Aabb box);
 
 /// Calls `mark` for the pixels that a surfel covers in a raster.

@@ -45,9 +45,8 @@ Duration epoch_from(const std::string& text, const std::string& place) {
 
 Duration epoch_of(const RosFlags& flags, const Scenario& scenario, const RosProfile& profile) {
   if (!flags.epoch.empty()) return epoch_from(flags.epoch, "--epoch");
-  if (!scenario.ros.epoch.empty()) {
-    return epoch_from(scenario.ros.epoch, scenario.place("ros.epoch"));
-  }
+  const std::string& own = ros_setup_of(scenario).epoch;
+  if (!own.empty()) return epoch_from(own, scenario.place("ros.epoch"));
   // living nodes must not see time jump back after a restart; recordings by themselves and runs in
   // lockstep are the same each time
   const bool live = flags.is_live() && flags.lockstep <= 0.0;

@@ -74,6 +74,22 @@ void draw_pattern(Canvas& canvas,
 
 }  // namespace
 
+namespace {
+
+/// The ranges that occur, m, but for the hundredth that is nearest or farthest.
+std::pair<double, double> colored_ranges(const Scan& scan) {
+  if (scan.points.empty()) return {1.0, 10.0};
+  std::vector<float> sorted;
+  for (const ScanPoint& point : scan.points) sorted.push_back(point.range);
+  std::sort(sorted.begin(), sorted.end());
+  const std::size_t cut = sorted.size() / 100;
+  const double near_range = std::max(0.01, static_cast<double>(sorted[cut]));
+  const auto farthest = static_cast<double>(sorted[sorted.size() - 1 - cut]);
+  return {near_range, std::max(1.1 * near_range, farthest)};
+}
+
+}  // namespace
+
 void draw_scan(const std::vector<Beam>& beams,
                const Scan& scan,
                const LidarSettings& lidar,
@@ -95,17 +111,10 @@ void draw_scan(const std::vector<Beam>& beams,
       plot.width * plot.height / static_cast<double>(std::max<std::size_t>(1, beams.size()));
   const double size = std::clamp(0.6 * std::sqrt(area), 0.8, 4.0);
 
-  // colours over the ranges that occur, logarithmic: near things matter more
-  std::vector<float> sorted;
-  for (const ScanPoint& point : scan.points) sorted.push_back(point.range);
-  std::sort(sorted.begin(), sorted.end());
-  const std::size_t cut = sorted.size() / 100;
-  const double near_range = sorted.empty() ? 1.0 : std::max(0.01, static_cast<double>(sorted[cut]));
-  const double far_range =
-      sorted.empty()
-          ? 10.0
-          : std::max(1.1 * near_range, static_cast<double>(sorted[sorted.size() - 1 - cut]));
-  const double span = std::log(far_range / near_range);
+  const auto ranges = colored_ranges(scan);
+  const double near_range = ranges.first;
+  // logarithmic: near things matter more
+  const double span = std::log(ranges.second / near_range);
   const auto color_at = [](double share) { return ramp(1.0 - share); };
   const auto mark = [&](const ScanPoint& point, const auto& draw) {
     const auto [azimuth, elevation] = angles_deg(beams[point.beam]);
@@ -135,7 +144,7 @@ void draw_scan(const std::vector<Beam>& beams,
   }
   draw_axes(canvas, plot);
   draw_color_bar(canvas,
-                 {near_range, far_range, "range (m)", color_at, true},
+                 {near_range, ranges.second, "range (m)", color_at, true},
                  plot.right() + 14.0,
                  plot.top,
                  std::min(plot.height, 420.0));

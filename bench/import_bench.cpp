@@ -1,4 +1,4 @@
-// What each stage of an import costs, from points that lie in memory: points and cells a second,
+// What each stage of an import costs, from points that lie in memory: points and cells per second,
 // and the most memory that was resident. `./dev bench import`; see BENCHMARK.md.
 #include <fmt/format.h>
 #include <sys/resource.h>

@@ -1,7 +1,8 @@
-# Warnings are errors on our targets; no fused multiply-add anywhere: results must not depend on it.
+# The presets that we develop with make warnings errors; no fused multiply-add anywhere: results must not depend on it.
 function(pointflight_target_options target)
   target_compile_options(${target} PRIVATE
-    -Wall -Wextra -Wconversion -Wno-sign-conversion -Werror -ffp-contract=off)
+    -Wall -Wextra -Wconversion -Wno-sign-conversion -ffp-contract=off
+    $<$<BOOL:${POINTFLIGHT_WERROR}>:-Werror>)
   target_include_directories(${target} PUBLIC
     $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>
     $<BUILD_INTERFACE:${PROJECT_BINARY_DIR}/generated>

@@ -1,14 +1,19 @@
 // Parts of one's own, added by registration: a sensor that the scenario mounts by name, a
-// controller that its vehicle flies with, a link that prints poses while the run goes on. Run
+// controller that its vehicle flies with, a renderer that its LiDAR sees by, a link that prints
+// poses while the run goes on, and a ROS message of the sensor, recorded as own_parts.mcap. Run
 // scan_a_room first.
-#include <cmath>
 #include <cstdio>
 #include <exception>
+#include <filesystem>
 
 #include "pointflight/core/math.hpp"
 #include "pointflight/core/random.hpp"
+#include "pointflight/render/renderer.hpp"
 #include "pointflight/run/run_loop.hpp"
 #include "pointflight/vehicle/controller.hpp"
+#include "recording/mcap_writer.hpp"
+#include "recording/recording.hpp"
+#include "ros_common/ros_link.hpp"
 
 using namespace pointflight;
 
@@ -19,7 +24,7 @@ struct BarometerSettings {
 };
 
 void describe(SettingsVisitor& visitor, BarometerSettings& settings) {
-  visitor.value({"rate", "Hz", "measurements a second", 0.1, 1000}, settings.rate);
+  visitor.value({"rate", "Hz", "measurements per second", 0.1, 1000}, settings.rate);
   visitor.value({"noise", "Pa", "standard deviation", 0, 1000}, settings.noise);
 }
 
@@ -67,6 +72,40 @@ class Careful : public Controller {
   std::unique_ptr<Controller> cascade_;
 };
 
+/// Sees as the beam renderer does, but nothing beyond 3 m.
+class Fog : public Renderer {
+ public:
+  explicit Fog(const Scene& scene) : clear_(make_renderer("beam", scene)) {}
+
+  void render(const RayBatch& batch, std::span<Hit> hits, const Executor& executor) const override {
+    clear_->render(batch, hits, executor);
+    for (Hit& hit : hits) {
+      if (hit.range > 3.0f) hit = {};
+    }
+  }
+
+ private:
+  std::unique_ptr<Renderer> clear_;
+};
+
+/// sensor_msgs/FluidPressure
+struct FluidPressure {
+  static constexpr msg::TypeName kType{"sensor_msgs", "FluidPressure"};
+  msg::Header header;
+  double fluid_pressure = 0.0;  ///< Pa
+  double variance = 0.0;        ///< Pa^2; 0: unknown.
+  template <class M, class V>
+  static void fields(M& m, V& v) {
+    v("header", m.header);
+    v("fluid_pressure", m.fluid_pressure);
+    v("variance", m.variance);
+  }
+};
+
+FluidPressure pressure_message(const OutputStream& stream, const Measurement& measurement) {
+  return {stream.header(measurement.time), measurement.values.front(), 0.0};
+}
+
 /// Prints where vehicles are, twice a second, and what the barometer says.
 class PosePrinter : public Link {
  public:
@@ -98,11 +137,21 @@ int main() try {
        .make = [](const VehicleSettings& settings) { return std::make_unique<Careful>(settings); },
        .integrates_attitude = true,
        .tilt_max_deg = 85.0});
+  RendererKind::table().add(
+      {.name = "fog", .help = "nothing beyond 3 m", .make = [](const Scene& scene) {
+         return std::make_unique<Fog>(scene);
+       }});
+  output_types().add({.name = "pressure",
+                      .help = "what the barometer says",
+                      .make = per_sample<pressure_message>(),
+                      .frame = OutputType::Frame::kBody});
   const Scenario scenario = parse_scenario(R"(
 map: room.pfmap
 vehicle: {start: [2, 3, 1.5], controller: careful}
+lidars: [{model: mid360, renderer: fog}]
 sensors: [{kind: barometer, rate: 20}]
 mission: {speed: 1, waypoints: [[3.5, 3, 1.5], [3.5, 1.5, 2.5]]}
+ros: {outputs: [{kind: pressure, topic: "/{vehicle}/pressure"}]}
 )",
                                            "own_parts.yaml");
   const Executor executor;
@@ -110,6 +159,11 @@ mission: {speed: 1, waypoints: [[3.5, 3, 1.5], [3.5, 1.5, 2.5]]}
   RunLoop loop(simulation, {});
   PosePrinter printer;
   loop.add(printer);
+  RosLink ros(describe_run(simulation), profile_for(scenario), {});
+  std::filesystem::remove("own_parts.mcap");
+  ros.add(std::make_unique<Recording>("own_parts.mcap",
+                                      std::make_unique<McapWriter>("own_parts.mcap")));
+  loop.add(ros);
   return loop.run() == RunEnd::kCompleted ? 0 : 1;
 } catch (const std::exception& error) {
   std::fprintf(stderr, "%s\n", error.what());

@@ -35,7 +35,7 @@ struct RawSample {
 /// (a writer has gone) are passed over.
 bool take_raw(dds_entity_t reader, RawSample& sample);
 
-/// While one exists, what its thread writes leaves no faster than `rate` bytes a second, fragment
+/// While one exists, what its thread writes leaves no faster than `rate` bytes per second, fragment
 /// by fragment: a large message that leaves at once overruns the receive buffers of stock Linux
 /// (208 kB), and Cyclone DDS knows no pacing. It lets go of each fragment when that is sent, with
 /// no lock of the writer's held, so that is where the thread waits. Messages that are sent again

@@ -18,8 +18,8 @@
 namespace pointflight {
 namespace {
 
-// bytes a second that leave for readers with stock receive buffers, and where a message of 64 kB a
-// millisecond is not enough any more
+// bytes per second that leave for readers with stock receive buffers, and where a message of 64 kB
+// a millisecond is not enough any more
 constexpr double kPace = 64e6;
 constexpr double kFastPace = 128e6;
 constexpr double kSlowRate = 45e6;
@@ -84,7 +84,7 @@ class WriteQueue {
 
   ~WriteQueue() { close(); }
 
-  /// `pace`: bytes a second at which messages leave; 0: at once.
+  /// `pace`: bytes per second at which messages leave; 0: at once.
   void start(Write write, double pace) {
     worker_ = std::thread([this, write = std::move(write), pace] {
       std::optional<Pacing> pacing;

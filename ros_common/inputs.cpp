@@ -15,32 +15,16 @@ namespace pointflight {
 namespace {
 
 constexpr double kRadPerSecond = kPi / 30.0;  // of an rpm
-constexpr std::size_t kOrdersMax = 10000;     // that wait; older ones go
-
-/// The message in a received one's bytes, where it has our definition.
-template <class M>
-std::optional<M> decoded(Wire wire, const Received& received) {
-  const std::span bytes(received.data, received.size);
-  if (wire == Wire::kCdr) return decode<Wire::kCdr, M>(bytes);
-  static const std::string md5 = md5_of(describe_message<M>(1));
-  if (received.md5 != md5) return std::nullopt;
-  return decode<Wire::kRos1, M>(bytes);
-}
-
-/// As it is compared: tf of old wrote a leading /.
-std::string bare(const std::string& frame) {
-  return frame.starts_with('/') ? frame.substr(1) : frame;
-}
 
 /// Of a message's frame; none is the world's.
 bool is_world(const std::string& frame, const OrderContext& context) {
-  const std::string name = bare(frame);
+  const std::string name = bare_frame(frame);
   return name.empty() || name == context.world_frame ||
          (!context.world_alias.empty() && name == context.world_alias);
 }
 
 bool is_body(const std::string& frame, const OrderContext& context) {
-  const std::string name = bare(frame);
+  const std::string name = bare_frame(frame);
   return name == context.body_frame || name == "base_link";
 }
 
@@ -50,10 +34,6 @@ std::string unknown_frame(const std::string& frame, const OrderContext& context)
       "another name)",
       frame,
       context.world_frame);
-}
-
-std::optional<Order> told(const OrderContext& context, Command command) {
-  return VehicleOrder{context.vehicle, std::move(command), false};
 }
 
 template <class M>
@@ -76,7 +56,7 @@ struct FramedPosition {
 
 template <class M>
 std::optional<FramedPosition> position_as(Wire wire, const Received& received) {
-  const auto m = decoded<M>(wire, received);
+  const auto m = message_in<M>(wire, received);
   return m ? std::optional(FramedPosition{position_from(*m), m->header.frame_id}) : std::nullopt;
 }
 
@@ -252,76 +232,52 @@ std::optional<Order> plain_order(const msg::Empty& /*m*/,
   }
 }
 
-template <class Function>
-struct OrderFunction;
-template <class M>
-struct OrderFunction<std::optional<Order> (*)(
-    const M&, const RosInput&, const OrderContext&, std::string&)> {
-  using Message = M;
-};
-
-template <auto order>
-using MessageOf = typename OrderFunction<decltype(order)>::Message;
-
-/// Reads messages that a function makes orders of.
-template <auto order>
-OrderMaker read_by(const RosInput& input, Wire wire, const Received& received) {
-  auto message = decoded<MessageOf<order>>(wire, received);
-  if (!message) return {};
-  return [input, m = std::move(*message)](const OrderContext& context, std::string& why) {
-    return order(m, input, context, why);
-  };
-}
-
-/// A row for a function.
-template <auto order>
-InputType row(std::string name, std::string help) {
-  InputType type;
-  type.name = std::move(name);
-  type.help = std::move(help);
-  type.type = [](const RosInput&) { return message_type<MessageOf<order>>(); };
-  type.read = read_by<order>;
-  return type;
-}
-
-InputType answer(InputType type) {
-  type.answers = true;
-  return type;
-}
-
-InputType once(InputType type) {
-  type.one_shot = true;
-  return type;
-}
-
-InputType of_run(InputType type, const ServiceType& service) {
-  type.of_run = true;
-  type.one_shot = true;
-  type.service = &service;
-  return type;
-}
-
 }  // namespace
 
 Registry<InputType>& input_types() {
   static Registry<InputType> types = {
       {.name = "position",
        .help = "position, velocity, acceleration, yaw at each instant",
-       .type = position_type,
-       .read = read_position,
+       .make = {position_type, read_position},
        .answers = true},
-      once(row<goal_order>("goal", "where to fly")),
-      answer(row<velocity_order>("velocity", "velocity and yaw rate")),
-      answer(row<attitude_order>("attitude", "attitude or body rates, and thrust")),
-      answer(row<rotors_order>("rotors", "speeds of the rotors")),
-      row<stick_order>("joy", "a gamepad"),
-      once(row<take_off_land_order>("take_off_land", "take off or land")),
-      once(row<plain_order<HoverCommand>>("hover", "hold the place")),
-      of_run(row<pause_order>("pause", "the run stands still, or goes on"), kPauseService),
-      of_run(row<plain_order<StepOrder>>("step", "while paused: until the next scan"),
-             kStepService),
-      of_run(row<plain_order<ResetOrder>>("reset", "back to the start"), kResetService),
-      once(row<plain_order<ArmCommand>>("arm", "rotors may turn")),
+      {.name = "goal", .help = "where to fly", .make = ordered_by<goal_order>(), .one_shot = true},
+      {.name = "velocity",
+       .help = "velocity and yaw rate",
+       .make = ordered_by<velocity_order>(),
+       .answers = true},
+      {.name = "attitude",
+       .help = "attitude or body rates, and thrust",
+       .make = ordered_by<attitude_order>(),
+       .answers = true},
+      {.name = "rotors",
+       .help = "speeds of the rotors",
+       .make = ordered_by<rotors_order>(),
+       .answers = true},
+      {.name = "joy", .help = "a gamepad", .make = ordered_by<stick_order>()},
+      {.name = "take_off_land",
+       .help = "take off or land",
+       .make = ordered_by<take_off_land_order>(),
+       .one_shot = true},
+      {.name = "hover",
+       .help = "hold the place",
+       .make = ordered_by<plain_order<HoverCommand>>(),
+       .one_shot = true},
+      {.name = "pause",
+       .help = "the run stands still, or goes on",
+       .make = ordered_by<pause_order>(),
+       .service = &kPauseService},
+      {.name = "step",
+       .help = "while paused: until the next scan",
+       .make = ordered_by<plain_order<StepOrder>>(),
+       .service = &kStepService},
+      {.name = "reset",
+       .help = "back to the start",
+       .make = ordered_by<plain_order<ResetOrder>>(),
+       .service = &kResetService},
+      {.name = "arm",
+       .help = "rotors may turn",
+       .make = ordered_by<plain_order<ArmCommand>>(),
+       .one_shot = true},
   };
   return types;
 }
@@ -332,7 +288,7 @@ std::vector<Order> orders_of(const InputStream& stream,
                              std::span<const OrderContext> contexts,
                              std::string& reason) {
   std::vector<Order> orders;
-  const OrderMaker order_for = stream.type->read(stream.settings, wire, received);
+  const OrderMaker order_for = stream.type->make.read(stream.settings, wire, received);
   for (const OrderContext& context : contexts) {
     std::string why;
     auto order = order_for ? order_for(context, why) : std::nullopt;
@@ -360,7 +316,7 @@ std::vector<InputStream> input_streams(const RunDescription& run, const RosProfi
   for (const RosInput& input : profile.inputs) {
     const InputType* type = input_types().find(input.kind);
     if (type == nullptr || !is_used(input.topic)) continue;
-    const bool once = type->of_run || !names_vehicle(input.topic);
+    const bool once = type->is_of_run() || !names_vehicle(input.topic);
     const std::size_t vehicles = once ? 1 : run.vehicles.size();
     for (std::size_t v = 0; v < vehicles; ++v) {
       const RosNames names = names_of(profile, run.vehicles[v].setup, v);
@@ -369,84 +325,14 @@ std::vector<InputStream> input_streams(const RunDescription& run, const RosProfi
       stream.settings = input;
       stream.settings.topic = absolute(with_names(input.topic, names));
       stream.topic.name = stream.settings.topic;
-      stream.topic.type = type->type(input);
-      stream.topic.reliable = type->one_shot;
+      stream.topic.type = type->make.type(input);
+      stream.topic.reliable = type->one_shot || type->is_of_run();
       stream.topic.answers = type->answers;
       stream.vehicle = v;
-      stream.for_all = once && !type->of_run;
+      stream.for_all = once && !type->is_of_run();
     }
   }
   return streams;
-}
-
-Inbox::Inbox(const RunDescription& run, const RosProfile& profile)
-    : streams_(input_streams(run, profile)), services_(run_services(profile)) {
-  for (std::size_t v = 0; v < run.vehicles.size(); ++v) {
-    const VehicleSettings& s = run.vehicles[v].settings;
-    OrderContext& context = contexts_.emplace_back();
-    context.vehicle = v;
-    context.mass = s.mass;
-    context.thrust_max = s.thrust_to_weight() * s.mass * kGravity;
-    context.motion = run.vehicles[v].setup.mission.motion;
-    context.world_frame = bare(profile.world_frame);
-    context.world_alias = bare(profile.world_alias);
-    context.body_frame =
-        bare(body_frame_of(profile, names_of(profile, run.vehicles[v].setup, v), v));
-  }
-}
-
-void Inbox::connect(Transport& transport) {
-  const Wire wire = transport.wire();
-  for (const InputStream& stream : streams_) {
-    transport.subscribe(stream.topic, [this, &stream, wire](const Received& received) {
-      receive(stream, wire, received);
-    });
-  }
-  for (const Service& service : services_) {
-    transport.serve(service, [this, &service, wire](const Received& request) {
-      const auto order = order_in(service, wire, request);
-      if (order) push({*order});
-      return answer_to(order.has_value(), wire);
-    });
-  }
-}
-
-void Inbox::push(std::vector<Order> orders) {
-  const std::lock_guard lock(mutex_);
-  for (Order& order : orders) {
-    if (orders_.size() >= kOrdersMax) orders_.erase(orders_.begin());
-    orders_.push_back(std::move(order));
-  }
-}
-
-void Inbox::receive(const InputStream& stream, Wire wire, const Received& received) {
-  std::string reason;
-  const auto contexts = std::span<const OrderContext>(contexts_);
-  push(orders_of(stream,
-                 wire,
-                 received,
-                 stream.for_all ? contexts : contexts.subspan(stream.vehicle, 1),
-                 reason));
-  if (reason.empty()) return;
-  const std::lock_guard lock(mutex_);
-  ++refused_.count;
-  refused_.last = reason;
-  if (refused_topics_.insert(stream.topic.name).second) new_reasons_.push_back(reason);
-}
-
-std::vector<Order> Inbox::take() {
-  const std::lock_guard lock(mutex_);
-  return std::exchange(orders_, {});
-}
-
-Inbox::Refused Inbox::refused() const {
-  const std::lock_guard lock(mutex_);
-  return refused_;
-}
-
-std::vector<std::string> Inbox::take_new_reasons() {
-  const std::lock_guard lock(mutex_);
-  return std::exchange(new_reasons_, {});
 }
 
 }  // namespace pointflight

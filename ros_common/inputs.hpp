@@ -1,6 +1,6 @@
 // What can be told to a run from a ROS: the table of kinds, each with what reads its messages, and
-// the inbox that turns them into orders. To add a kind: `std::optional<Order> order(const M&, const
-// RosInput&, const OrderContext&, std::string& why)` for a message M and a row in `input_types()`.
+// the inbox that turns them into orders. To add a kind: a function for `ordered_by` and a row in
+// `input_types()`.
 #pragma once
 
 #include <cstdint>
@@ -14,6 +14,8 @@
 #include "pointflight/core/registry.hpp"
 #include "pointflight/run/order.hpp"
 #include "pointflight/sim/run_description.hpp"
+#include "ros_common/codec.hpp"
+#include "ros_common/description.hpp"
 #include "ros_common/profile.hpp"
 #include "ros_common/services.hpp"
 #include "ros_common/wire.hpp"
@@ -37,22 +39,70 @@ struct OrderContext {
 using OrderMaker =
     std::function<std::optional<Order>(const OrderContext& context, std::string& why)>;
 
-/// A row of the table of kinds.
-struct InputType {
-  std::string name;  ///< In profiles.
-  std::string help;  ///< For docs/ros.md; half a sentence.
+/// How the orders of a row come about: `ordered_by`.
+struct InputMaker {
   /// The type that it is read with. One topic has one type: ROS 2's tools take no other.
   MessageType (*type)(const RosInput& input) = nullptr;
   /// Empty where the bytes are no such message.
   OrderMaker (*read)(const RosInput& input, Wire wire, const Received& received) = nullptr;
-  bool of_run = false;    ///< About the run, not a vehicle.
+};
+
+/// A row of the table of kinds.
+struct InputType {
+  std::string name;       ///< In profiles.
+  std::string help;       ///< For docs/ros.md; half a sentence.
+  InputMaker make;        ///< Its orders.
   bool answers = false;   ///< A planner's: what lockstep waits for.
   bool one_shot = false;  ///< Sent once and counts; others come in streams, and the next one mends.
-  const ServiceType* service = nullptr;  ///< That does the same; null: none.
+  const ServiceType* service = nullptr;  ///< That does the same, of what is about the run.
+  /// Not about a vehicle.
+  [[nodiscard]] bool is_of_run() const { return service != nullptr; }
 };
 
 /// All kinds. Programs may add to it before they read a profile.
 Registry<InputType>& input_types();
+
+/// An order for the vehicle of a context.
+inline std::optional<Order> told(const OrderContext& context, Command command) {
+  return VehicleOrder{context.vehicle, std::move(command), false};
+}
+
+/// The message in a received one's bytes, where it has our definition.
+template <class M>
+std::optional<M> message_in(Wire wire, const Received& received) {
+  const std::span bytes(received.data, received.size);
+  if (wire == Wire::kCdr) return decode<Wire::kCdr, M>(bytes);
+  static const std::string md5 = md5_of(describe_message<M>(1));
+  if (received.md5 != md5) return std::nullopt;
+  return decode<Wire::kRos1, M>(bytes);
+}
+
+namespace detail {
+
+template <class Function>
+struct OrderFunction;
+template <class M>
+struct OrderFunction<std::optional<Order> (*)(
+    const M&, const RosInput&, const OrderContext&, std::string&)> {
+  using Message = M;
+};
+
+}  // namespace detail
+
+/// Orders by a function `std::optional<Order> (const M&, const RosInput&, const OrderContext&,
+/// std::string& why)` of a message `M`.
+template <auto order>
+InputMaker ordered_by() {
+  using M = typename detail::OrderFunction<decltype(order)>::Message;
+  return {[](const RosInput&) { return message_type<M>(); },
+          [](const RosInput& input, Wire wire, const Received& received) -> OrderMaker {
+            auto message = message_in<M>(wire, received);
+            if (!message) return {};
+            return [input, m = std::move(*message)](const OrderContext& context, std::string& why) {
+              return order(m, input, context, why);
+            };
+          }};
+}
 
 /// One topic that is read, for one vehicle and one kind of message.
 struct InputStream {

@@ -79,6 +79,7 @@ std::vector<OutputType> lidar_outputs() {
        .make = per_sample<sensor_transform>(),
        .per = kLidar,
        .child = Frame::kSensor,
+       .has_child = true,
        .is_transform = true,
        .depth = 100},
       {.name = "sensor_pose",

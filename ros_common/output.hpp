@@ -53,6 +53,7 @@ struct OutputType {
   Frame frame = Frame::kWorld;      ///< header.frame_id where the profile names none.
   Frame child = Frame::kBody;       ///< child_frame_id where the profile names none.
   Cameras cameras = Cameras::kNot;  ///< Of a LiDAR's.
+  bool has_child = false;           ///< Profiles may name its child_frame.
   bool is_transform = false;        ///< Names its frames: all vehicles may share a topic.
   bool latched = false;             ///< Whoever comes late gets the last message.
   bool large = false;               ///< Paced on ROS 2.
@@ -285,7 +286,7 @@ std::deque<OutputStream> output_streams(RosRun& run);
 /// The rate of odometry samples that a profile needs, Hz.
 double odometry_rate(const RosProfile& profile);
 
-/// Bytes a second of clouds and pictures if all are read and every beam returns.
+/// Bytes per second of clouds and pictures if all are read and every beam returns.
 double large_rate(const RunDescription& run, const RosProfile& profile);
 
 }  // namespace pointflight

@@ -38,7 +38,7 @@ struct PointLayout {
   };
   const char* name;               ///< In profiles.
   const char* help;               ///< Whose it is: for error messages and docs.
-  std::uint32_t step;             ///< Bytes a point.
+  std::uint32_t step;             ///< Bytes per point.
   std::span<const Field> fields;  ///< By rising offset; bytes between them are 0.
   bool timed;                     ///< Points have times: stamped with the first one.
 };

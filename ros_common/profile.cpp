@@ -172,21 +172,20 @@ RosProfile parse_ros_profile(std::string_view text, const std::string& path) {
 }
 
 RosProfile profile_for(const Scenario& scenario, const std::string& name) {
+  const RosSetup& ros = ros_setup_of(scenario);
   RosProfile profile =
-      name.empty()
-          ? scenario.at("ros.profile",
-                        [&] { return load_ros_profile(scenario.ros.profile, scenario.folder()); })
-          : load_ros_profile(name);
+      name.empty() ? scenario.at("ros.profile",
+                                 [&] { return load_ros_profile(ros.profile, scenario.folder()); })
+                   : load_ros_profile(name);
   check_vehicle_names(scenario);
-  check_names(scenario.ros.outputs, scenario.ros.inputs, "ros.", [&](const std::string& key) {
-    return scenario.place(key);
-  });
-  if (!scenario.ros.world_alias.empty()) profile.world_alias = scenario.ros.world_alias;
+  check_names(
+      ros.outputs, ros.inputs, "ros.", [&](const std::string& key) { return scenario.place(key); });
+  if (!ros.world_alias.empty()) profile.world_alias = ros.world_alias;
   const auto take = [](std::string& own, const std::string& base) {
     if (own.empty()) own = base;
   };
   profile.outputs =
-      merged(profile.outputs, scenario.ros.outputs, [&](RosOutput& own, const RosOutput& base) {
+      merged(profile.outputs, ros.outputs, [&](RosOutput& own, const RosOutput& base) {
         take(own.topic, base.topic);
         take(own.frame, base.frame);
         take(own.child_frame, base.child_frame);
@@ -194,10 +193,9 @@ RosProfile profile_for(const Scenario& scenario, const std::string& name) {
         if (own.rate < 0.0) own.rate = base.rate;
         if (own.resolution <= 0.0) own.resolution = base.resolution;
       });
-  profile.inputs =
-      merged(profile.inputs, scenario.ros.inputs, [&](RosInput& own, const RosInput& base) {
-        take(own.topic, base.topic);
-      });
+  profile.inputs = merged(profile.inputs, ros.inputs, [&](RosInput& own, const RosInput& base) {
+    take(own.topic, base.topic);
+  });
   return profile;
 }
 
@@ -212,6 +210,10 @@ std::string body_frame_of(const RosProfile& profile, const RosNames& names, std:
 
 bool is_used(const std::string& topic) {
   return !topic.empty() && topic != "-";
+}
+
+std::string bare_frame(const std::string& frame) {
+  return frame.starts_with('/') ? frame.substr(1) : frame;
 }
 
 std::string absolute(const std::string& topic) {

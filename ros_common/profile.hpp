@@ -6,6 +6,7 @@
 
 #include "pointflight/core/settings.hpp"
 #include "pointflight/sim/scenario.hpp"
+#include "ros_common/ros_setup.hpp"
 
 namespace pointflight {
 
@@ -80,6 +81,9 @@ std::string body_frame_of(const RosProfile& profile, const RosNames& names, std:
 
 /// False for a topic that is left open or switched off ("-").
 bool is_used(const std::string& topic);
+
+/// As frames are compared: tf of old wrote a leading /.
+std::string bare_frame(const std::string& frame);
 
 /// With a / in front.
 std::string absolute(const std::string& topic);

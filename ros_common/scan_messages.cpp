@@ -162,12 +162,7 @@ void append_surface(const BodyShape& shape,
     });
     return;
   }
-  constexpr double kGolden = 0.6180339887498949;  // spreads v evenly whatever the count
-  const auto count = static_cast<std::size_t>(surface_area(*solid) / (spacing * spacing)) + 16;
-  for (std::size_t i = 0; i < count; ++i) {
-    const auto k = static_cast<double>(i);
-    const double v = k * kGolden - std::floor(k * kGolden);
-    const Vector3d p = surface_point(*solid, (k + 0.5) / static_cast<double>(count), v);
+  for (const Vector3d& p : surface_points(*solid, spacing)) {
     points.emplace_back((T_world_body * p).cast<float>());
   }
 }

@@ -140,7 +140,7 @@ class Transport : public Outlet {
 struct TransportOptions {
   std::string node = "pointflight";  ///< Name of the node, without a slash.
   bool localhost_only = false;       ///< ROS 2.
-  double large_rate = 0.0;  ///< Bytes a second of clouds and pictures, all read: for ROS 2.
+  double large_rate = 0.0;  ///< Bytes per second of clouds and pictures, all read: for ROS 2.
   std::function<void(const std::string&)> log;  ///< Lines for the user, from any thread.
 };
 

@@ -50,6 +50,8 @@ done
 build/scan_a_room
 build/step_a_flight
 build/own_parts
+usr/bin/pointflight bag info own_parts.mcap | grep -q /drone0/pressure ||
+  fail "a message that a program has added was not recorded"
 usr/bin/pointflight map forest --size-x 24 --size-y 16 --trees 800 -o forest.pcd 2>/dev/null
 usr/bin/pointflight map import forest.pcd -o forest.pfmap --resolution 0.1 >/dev/null 2>&1
 build/fly_with_planner forest.pfmap -o planned --seed 1 --obstacles 8

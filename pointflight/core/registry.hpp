@@ -61,17 +61,20 @@ class Choice {
   /// The first row.
   Choice() : row_(&Row::table().rows().front()) {}
   /// By name. Throws InputError that lists the names.
+  ///@{
   Choice(std::string_view name) : row_(Row::table().find(name)) {  // NOLINT: as good as its name
     if (row_ == nullptr) throw_unknown(Row::kWhat, name, Row::table().names());
   }
   Choice(const char* name) : Choice(std::string_view(name)) {}         // NOLINT: the same
   Choice(const std::string& name) : Choice(std::string_view(name)) {}  // NOLINT: the same
+  ///@}
 
   /// The row.
   ///@{
   const Row* operator->() const { return row_; }
   const Row& operator*() const { return *row_; }
   ///@}
+  /// The same row.
   friend bool operator==(const Choice&, const Choice&) = default;
 
  private:

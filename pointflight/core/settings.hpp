@@ -85,6 +85,7 @@ class SettingsVisitor {
     choice(key, name, std::span<const std::string_view>(names));
     value = rows.find(name);
   }
+  /// The same, one of them in any case.
   template <class Row>
   void choice(const Key& key, Choice<Row>& value) {
     const std::vector<std::string_view> names = Row::table().names();
@@ -101,6 +102,9 @@ class SettingsVisitor {
     choice(key, name, std::span<const std::string_view>(names));
     value = name == none ? std::nullopt : std::optional<Choice<Row>>(name);
   }
+
+  /// A key that others read: whatever the file has there is no mistake.
+  virtual void leave_out(std::string_view /*name*/) {}
 
   /// Calls `describe_items(visitor, section)` one level down.
   template <class Describe>
@@ -174,6 +178,7 @@ class SettingsReader : public SettingsVisitor {
   /// "lidars[0].model"; for messages about values that only make sense together.
   [[nodiscard]] const std::map<std::string, int>& lines() const { return lines_; }
 
+  void leave_out(std::string_view name) override;
   void value(const Key& key, double& value) override;
   void value(const Key& key, std::int64_t& value) override;
   void value(const Key& key, bool& value) override;

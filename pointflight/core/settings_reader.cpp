@@ -197,6 +197,10 @@ bool SettingsReader::has(std::string_view name) const {
   return parent[std::string(name)].IsDefined();
 }
 
+void SettingsReader::leave_out(std::string_view name) {
+  document_->levels.back().asked.emplace(name);
+}
+
 void SettingsReader::finish() {
   while (!document_->levels.empty()) leave();
 }

@@ -112,11 +112,11 @@ ExactScene grazing_floor() {
 ExactScene thinning_wall() {
   ExactScene scene;
   double y = 0.0;
-  // points a cell where the rest of a cloud would have 8
+  // points per cell where the rest of a cloud would have 8
   for (const char* points : {"16", "8", "4", "2.5", "1.3", "0.6", "0.2"}) {
     const std::size_t first = scene.geometry.shapes.size();
     scene.geometry.add_rectangle({0, y, 0}, {0, 4, 0}, {0, 0, 3});
-    scene.tag_from(first, std::string(points) + " points a cell", std::stof(points) / 8.0f, true);
+    scene.tag_from(first, std::string(points) + " points per cell", std::stof(points) / 8.0f, true);
     y += 4.0;
   }
   set_free(scene, {-5, 2, 0.5}, {-2, y - 2, 2.5});
@@ -147,7 +147,7 @@ const std::vector<SmallScene>& small_scenes() {
       {"door_jamb", "edges of an opening 0.9 m wide", door_jamb},
       {"stairs", "treads of 28 cm, rises of 17 cm", stairs},
       {"grazing_floor", "a floor seen from 0.4 to 1.2 m above it, to 39 m", grazing_floor},
-      {"thinning_wall", "a wall of 16 to 0.2 points a cell", thinning_wall},
+      {"thinning_wall", "a wall of 16 to 0.2 points per cell", thinning_wall},
       {"corridor", "60 x 2 x 2.5 m: most beams nearly along its walls", corridor}};
   return scenes;
 }

@@ -26,7 +26,7 @@ inline std::uint32_t gather_bits3(std::uint64_t x) {
   return static_cast<std::uint32_t>(x);
 }
 
-/// Morton code of a cell, 21 bits an axis: x in bit 0, y in bit 1, z in bit 2 of each triple.
+/// Morton code of a cell, 21 bits per axis: x in bit 0, y in bit 1, z in bit 2 of each triple.
 inline std::uint64_t morton_encode(std::uint32_t x, std::uint32_t y, std::uint32_t z) {
   return spread_bits3(x) | spread_bits3(y) << 1 | spread_bits3(z) << 2;
 }

@@ -240,4 +240,17 @@ Vector3d surface_point(const Solid& solid, double u, double v) {
   return std::visit([&](const auto& s) { return point_of(s, u, v); }, solid);
 }
 
+std::vector<Vector3d> surface_points(const Solid& solid, double spacing) {
+  constexpr double kGolden = 0.6180339887498949;  // spreads v evenly whatever the count
+  const auto count = static_cast<std::size_t>(surface_area(solid) / (spacing * spacing)) + 16;
+  std::vector<Vector3d> points;
+  points.reserve(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto k = static_cast<double>(i);
+    const double v = k * kGolden - std::floor(k * kGolden);
+    points.push_back(surface_point(solid, (k + 0.5) / static_cast<double>(count), v));
+  }
+  return points;
+}
+
 }  // namespace pointflight

@@ -2,6 +2,7 @@
 
 #include <optional>
 #include <variant>
+#include <vector>
 
 #include "pointflight/geometry/types.hpp"
 
@@ -66,5 +67,8 @@ Vector3d surface_point(const Solid& solid, double u, double v);
 
 /// m^2
 double surface_area(const Solid& solid);
+
+/// Points all over the surface, about `spacing` (m) apart.
+std::vector<Vector3d> surface_points(const Solid& solid, double spacing);
 
 }  // namespace pointflight

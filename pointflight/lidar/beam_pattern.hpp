@@ -26,7 +26,7 @@ struct Beam {
 ///
 /// To add a scan principle: a file in lidar/patterns/ with a class derived from this and its keys
 /// in LidarSettings, one line in the table in beam_pattern.cpp, a test of its data-sheet figures
-/// (field of view, points a second, rings).
+/// (field of view, points per second, rings).
 class BeamPattern {
  public:
   virtual ~BeamPattern() = default;

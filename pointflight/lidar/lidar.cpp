@@ -51,6 +51,11 @@ double Lidar::reach() const {
   return 1.001 * settings_.range_max * std::sqrt(1.0 + u * u + v * v);
 }
 
+SimTime Lidar::middle_of(SimTime start, std::span<const Beam> beams, bool snapshot) const {
+  if (snapshot || beams.empty()) return start + period() / 2;
+  return start + (beams.front().time_offset + beams.back().time_offset) / 2;
+}
+
 Duration Lidar::period() const {
   return from_seconds(1.0 / settings_.rate);
 }
@@ -73,6 +78,35 @@ std::shared_ptr<const Lidar::OrderedBeams> Lidar::ordered_beams(std::uint64_t sc
   return made;
 }
 
+/// Beams in the world, each from the pose at its own time, those of a snapshot from the one in the
+/// middle. Fills `offsets` where there are as many.
+std::vector<Ray> Lidar::rays_of(std::span<const Beam> beams,
+                                SimTime start,
+                                const PoseTrack& T_world_sensor,
+                                bool snapshot,
+                                std::span<Duration> offsets,
+                                const Executor& executor) const {
+  const Pose middle = T_world_sensor.at(start + period() / 2);
+  std::vector<Ray> rays(beams.size());
+  const auto range_max = static_cast<float>(settings_.range_max);
+  executor.parallel_for(beams.size(), kChunk, [&](std::size_t begin, std::size_t end) {
+    Pose pose = middle;
+    Duration pose_time{-1};
+    for (std::size_t i = begin; i < end; ++i) {
+      if (!snapshot && beams[i].time_offset != pose_time) {
+        pose_time = beams[i].time_offset;
+        pose = T_world_sensor.at(start + pose_time);
+      }
+      rays[i].origin_world = pose * beams[i].origin_sensor.cast<double>();
+      rays[i].direction_world =
+          (pose.rotation * beams[i].direction_sensor.cast<double>()).cast<float>().normalized();
+      rays[i].range_max = range_max / depth_share(beams[i]);
+      if (!offsets.empty()) offsets[i] = beams[i].time_offset;
+    }
+  });
+  return rays;
+}
+
 Scan Lidar::take(const ScanRequest& request,
                  const PoseTrack& T_world_sensor,
                  const Renderer& renderer,
@@ -86,32 +120,13 @@ Scan Lidar::take(const ScanRequest& request,
   const std::vector<Beam>& beams = ordered->beams;
   scan.beams = beams.size();
 
-  // world rays, each from the pose at its own time
   const Pose middle = T_world_sensor.at(request.start + period() / 2);
   const bool snapshot = request.snapshot || renderer.is_snapshot();
   scan.snapshot = snapshot;
-  scan.middle = request.start + period() / 2;
-  if (!snapshot && !beams.empty()) {
-    scan.middle = request.start + (beams.front().time_offset + beams.back().time_offset) / 2;
-  }
-  std::vector<Ray> rays(beams.size());
+  scan.middle = middle_of(request.start, beams, snapshot);
   std::vector<Duration> offsets(request.bodies.empty() || snapshot ? 0 : beams.size());
-  const auto range_max = static_cast<float>(settings_.range_max);
-  executor.parallel_for(beams.size(), kChunk, [&](std::size_t begin, std::size_t end) {
-    Pose pose = middle;
-    Duration pose_time{-1};
-    for (std::size_t i = begin; i < end; ++i) {
-      if (!snapshot && beams[i].time_offset != pose_time) {
-        pose_time = beams[i].time_offset;
-        pose = T_world_sensor.at(request.start + pose_time);
-      }
-      rays[i].origin_world = pose * beams[i].origin_sensor.cast<double>();
-      rays[i].direction_world =
-          (pose.rotation * beams[i].direction_sensor.cast<double>()).cast<float>().normalized();
-      rays[i].range_max = range_max / depth_share(beams[i]);
-      if (!offsets.empty()) offsets[i] = beams[i].time_offset;
-    }
-  });
+  const std::vector<Ray> rays =
+      rays_of(beams, request.start, T_world_sensor, snapshot, offsets, executor);
 
   std::vector<Hit> hits(beams.size());
   RayBatch batch;

@@ -32,6 +32,8 @@ class Lidar {
   [[nodiscard]] const LidarSettings& settings() const { return settings_; }
   /// Duration of a scan: 1 / rate, rounded to a nanosecond.
   [[nodiscard]] Duration period() const;
+  /// `Scan::middle` of a scan that starts then.
+  [[nodiscard]] SimTime middle_of(SimTime start, std::span<const Beam> beams, bool snapshot) const;
   /// The longest ray that it can see something at, m from the sensor.
   [[nodiscard]] double reach() const;
 
@@ -56,6 +58,12 @@ class Lidar {
   [[nodiscard]] std::shared_ptr<const OrderedBeams> ordered_beams(std::uint64_t scan_index,
                                                                   const Executor& executor) const;
 
+  [[nodiscard]] std::vector<Ray> rays_of(std::span<const Beam> beams,
+                                         SimTime start,
+                                         const PoseTrack& T_world_sensor,
+                                         bool snapshot,
+                                         std::span<Duration> offsets,
+                                         const Executor& executor) const;
   [[nodiscard]] float depth_share(const Beam& beam) const;
 
   LidarSettings settings_;

@@ -45,7 +45,7 @@ void describe_prisms(SettingsVisitor& v, PrismsSettings& s) {
          [](SettingsVisitor& w, WedgeSettings& wedge) {
            w.value({"angle_deg", "deg", "between the faces", 0, 60, true}, wedge.angle_deg);
            w.value({"index", "", "refractive index", 1, 4, true}, wedge.index);
-           w.value({"rate", "1/s", "turns a second; the sign is the sense", -1e4, 1e4, true},
+           w.value({"rate", "1/s", "turns per second; the sign is the sense", -1e4, 1e4, true},
                    wedge.rate);
            w.value({"phase_deg", "deg", "at time zero", -360, 360}, wedge.phase_deg);
            w.value({"flat_first", "", "light meets the flat face first"}, wedge.flat_first);
@@ -217,7 +217,7 @@ LidarSettings read(SettingsReader& reader, const std::string& path) {
   }
   if (const double beams = beams_a_scan(settings); beams > kMostBeams) {
     fail(settings.pattern == ScanPattern::kGrid ? "grid.columns" : "rate",
-         fmt::format("{:.0f} beams a scan; {:.0f} at most", beams, kMostBeams));
+         fmt::format("{:.0f} beams per scan; {:.0f} at most", beams, kMostBeams));
   }
   return settings;
 }
@@ -227,7 +227,7 @@ LidarSettings read(SettingsReader& reader, const std::string& path) {
 void describe(SettingsVisitor& v, LidarSettings& s) {
   v.value({"title", "", "maker and model"}, s.title);
   v.value({"source", "", "where the figures come from"}, s.source);
-  v.value({"rate", "Hz", "scans a second", 0.01, 10000}, s.rate);
+  v.value({"rate", "Hz", "scans per second", 0.01, 10000}, s.rate);
   v.value({"range_min",
            "m",
            "shorter returns are dropped; of a pinhole grid: less depth along the axis",

@@ -74,7 +74,7 @@ struct RingsSettings {
   std::int64_t channels = 0;                ///< Instead of both: so many, from the lowest up.
   double elevation_min_deg = -15.0;         ///< Of evenly spaced channels: the lowest.
   double elevation_max_deg = 15.0;          ///< The highest.
-  RingConvention convention = RingConvention::kVelodyne;
+  RingConvention convention = RingConvention::kVelodyne;  ///< How a turn is fired.
   double cycle_us = 55.296;          ///< velodyne: from one firing of all channels to the next.
   double channel_interval_us = 0.0;  ///< velodyne: between channels, where the table has no times.
   std::int64_t columns = 1024;       ///< ouster: a turn.
@@ -84,9 +84,9 @@ struct RingsSettings {
 
 /// Depth cameras and dense angular grids: all beams at the scan's start.
 struct GridSettings {
-  GridProjection projection = GridProjection::kAngular;
-  std::int64_t columns = 385;        ///< Beams in a row.
-  std::int64_t rows = 350;           ///< Rows.
+  GridProjection projection = GridProjection::kAngular;  ///< Between beams.
+  std::int64_t columns = 385;                            ///< Beams in a row.
+  std::int64_t rows = 350;                               ///< Rows.
   double fov_horizontal_deg = 77.0;  ///< angular: beams at the centres of the grid's cells.
   double fov_vertical_deg = 70.0;    ///< angular: as above.
   double fx = 0.0;                   ///< pinhole: pixels.

@@ -1,7 +1,12 @@
 #include "pointflight/lidar/scan.hpp"
 
-#include <cstring>
+#include <fmt/format.h>
 
+#include <cstring>
+#include <string_view>
+
+#include "pointflight/core/input_error.hpp"
+#include "pointflight/core/mapped_file.hpp"
 #include "pointflight/io/pcd_writer.hpp"
 
 namespace pointflight {
@@ -34,6 +39,50 @@ void write_scan_pcd(const std::string& path, const Scan& scan) {
              {"label", 'U', 2}},
             scan.points.size(),
             rows);
+}
+
+std::vector<ScanPoint> read_scan_points(const std::string& path, std::span<const Beam> beams) {
+  constexpr std::size_t kRow = 6 * sizeof(float) + 2 * sizeof(std::uint16_t);
+  constexpr std::string_view kFields = "FIELDS x y z intensity range time ring label\n";
+  constexpr std::string_view kBody = "DATA binary\n";
+  const MappedFile file(path);
+  const std::string_view text(reinterpret_cast<const char*>(file.bytes().data()),
+                              file.bytes().size());
+  const std::size_t body = text.find(kBody);
+  const std::size_t size = body == std::string_view::npos ? 1 : text.size() - body - kBody.size();
+  const bool own = text.substr(0, body).find(kFields) != std::string_view::npos;
+  if (!own || size % kRow != 0) {
+    throw InputError(fmt::format("{}: is no scan of a run, or cut off", path));
+  }
+  std::vector<ScanPoint> points(size / kRow);
+  const char* at = text.data() + body + kBody.size();
+  std::size_t beam = 0;
+  for (ScanPoint& point : points) {
+    float values[6];
+    std::uint16_t integers[2];
+    std::memcpy(values, at, sizeof values);
+    std::memcpy(integers, at + sizeof values, sizeof integers);
+    at += kRow;
+    point.position_sensor = {values[0], values[1], values[2]};
+    point.intensity = values[3];
+    point.range = values[4];
+    point.ring = integers[0];
+    point.label = integers[1];
+    // in firing order: the next beam whose time and place are the point's
+    const auto fits = [&](const Beam& b) {
+      return static_cast<float>(to_seconds(b.time_offset)) == values[5] && b.ring == point.ring &&
+             (b.origin_sensor + point.range * b.direction_sensor - point.position_sensor).norm() <=
+                 1e-5f * (1.0f + point.range);
+    };
+    while (beam < beams.size() && !fits(beams[beam])) ++beam;
+    if (beam == beams.size()) {
+      throw InputError(
+          fmt::format("{}: its points are not the sensor's; was its file changed?", path));
+    }
+    point.time_offset = beams[beam].time_offset;
+    point.beam = static_cast<std::uint32_t>(beam++);
+  }
+  return points;
 }
 
 }  // namespace pointflight

@@ -1,12 +1,14 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "pointflight/core/time.hpp"
 #include "pointflight/geometry/types.hpp"
-#include "pointflight/map/scene.hpp"
+#include "pointflight/lidar/beam_pattern.hpp"
+#include "pointflight/map/body.hpp"
 
 namespace pointflight {
 
@@ -42,5 +44,9 @@ struct Scan {
 /// Writes x y z intensity range time (float32; time in seconds after the scan's start), ring
 /// (uint16) and label (uint16) as binary PCD. Throws InputError.
 void write_scan_pcd(const std::string& path, const Scan& scan);
+
+/// The points of such a file, taken with `beams`; their times and numbers are those of the beams,
+/// to the nanosecond. Throws InputError, also where the points are not those of the beams.
+std::vector<ScanPoint> read_scan_points(const std::string& path, std::span<const Beam> beams);
 
 }  // namespace pointflight

@@ -281,7 +281,7 @@ Box TreePart::append_leaf(const Range& range) {
     const Voxel voxel = surfels_.voxel(surfel(i));
     SurfelWord word = surfels_.word(surfel(i));
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      // 64 steps a voxel
+      // 64 steps per voxel
       word += static_cast<SurfelWord>(voxel[axis] - origin[axis]) << (6 + 10 * axis);
     }
     new_words_.push_back(word);

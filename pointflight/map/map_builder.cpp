@@ -27,8 +27,8 @@ constexpr double kDefaultMeshResolution = 0.05;
 // walls that coincide with cell faces would split into two layers of cells
 constexpr double kGridPhase = -0.37;
 
-/// Coverage that makes a return, by the median of points a planar cell: measured between 1 and 80
-/// points a cell, on exact scenes and on real scans (docs/fidelity.md).
+/// Coverage that makes a return, by the median of points per planar cell: measured between 1 and 80
+/// points per cell, on exact scenes and on real scans (docs/fidelity.md).
 double tau_for(double points_per_cell) {
   constexpr double kThin = 2.0;
   constexpr double kFair = 6.0;

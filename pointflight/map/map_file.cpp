@@ -164,6 +164,47 @@ class OwnedSurfelMap : public SurfelMap {
   std::vector<Line> storage_;
 };
 
+/// `fail(byte, what)` where sections are named twice, or lie elsewhere than in the file.
+template <class Fail>
+void check_sections(std::span<const MapSection> sections,
+                    std::span<const std::byte> bytes,
+                    const Fail& fail) {
+  for (std::size_t i = 0; i < sections.size(); ++i) {
+    const MapSection& s = sections[i];
+    const std::string_view section = name_of(s);
+    const std::size_t element = section == "nodes"   ? sizeof(Bvh8Node)
+                                : section == "words" ? sizeof(SurfelWord)
+                                                     : 1;
+    for (std::size_t k = 0; k < i; ++k) {
+      if (name_of(sections[k]) == section) {
+        fail(sizeof(MapHeader), fmt::format("two sections are called '{}'", excerpt(section)));
+      }
+    }
+    const bool inside = s.offset <= bytes.size() && s.size <= bytes.size() - s.offset;
+    if (!inside || s.offset % kMapAlignment != 0 || s.size % element != 0) {
+      fail(bytes.size(),
+           fmt::format("the section '{}' ({} bytes at {}) does not lie inside the file; it is cut "
+                       "off or corrupt",
+                       excerpt(section),
+                       s.size,
+                       s.offset));
+    }
+  }
+}
+
+/// False where a parameter is none.
+bool is_sane(const MapHeader& header) {
+  bool finite = std::isfinite(header.intensity_offset) && std::isfinite(header.intensity_step);
+  for (int axis = 0; axis < 3; ++axis) finite = finite && std::isfinite(header.origin[axis]);
+  const auto within = [](double value, double min, double max) {
+    return value >= min && value <= max;
+  };
+  return finite && within(header.resolution, kMinResolution, kMaxResolution) &&
+         within(static_cast<double>(header.support), 1.0, 10.0) &&
+         within(static_cast<double>(header.tau), 0.01, 1.0) &&
+         within(static_cast<double>(header.window), 0.01, 10.0);
+}
+
 }  // namespace
 
 void write_map(OutputFile file, const Bvh8& tree, const MapDescription& description) {
@@ -229,38 +270,8 @@ void SurfelMap::attach(std::span<const std::byte> bytes, const std::string& name
   if (sections_.empty() || (header.version == 1 && header.section_count != sections_.size())) {
     fail(12, "wrong number of sections");
   }
-  for (std::size_t i = 0; i < sections_.size(); ++i) {
-    const MapSection& s = sections_[i];
-    const std::string_view section = name_of(s);
-    const std::size_t element = section == "nodes"   ? sizeof(Bvh8Node)
-                                : section == "words" ? sizeof(SurfelWord)
-                                                     : 1;
-    const bool inside = s.offset <= bytes.size() && s.size <= bytes.size() - s.offset;
-    if (!inside || s.offset % kMapAlignment != 0 || s.size % element != 0) {
-      fail(bytes.size(),
-           fmt::format("the section '{}' ({} bytes at {}) does not lie inside the file; it is cut "
-                       "off or corrupt",
-                       excerpt(section),
-                       s.size,
-                       s.offset));
-    }
-    for (std::size_t k = 0; k < i; ++k) {
-      if (name_of(sections_[k]) == section) {
-        fail(sizeof header, fmt::format("two sections are called '{}'", excerpt(section)));
-      }
-    }
-  }
-  bool finite = std::isfinite(header.intensity_offset) && std::isfinite(header.intensity_step);
-  for (int axis = 0; axis < 3; ++axis) finite = finite && std::isfinite(header.origin[axis]);
-  const auto within = [](double value, double min, double max) {
-    return value >= min && value <= max;
-  };
-  if (!finite || !within(header.resolution, kMinResolution, kMaxResolution) ||
-      !within(static_cast<double>(header.support), 1.0, 10.0) ||
-      !within(static_cast<double>(header.tau), 0.01, 1.0) ||
-      !within(static_cast<double>(header.window), 0.01, 10.0)) {
-    fail(16, "a parameter in the header is out of range");
-  }
+  check_sections(sections_, bytes, fail);
+  if (!is_sane(header)) fail(16, "a parameter in the header is out of range");
   bytes_ = bytes;
   nodes_ = view_of<Bvh8Node>(section("nodes"));
   words_ = view_of<SurfelWord>(section("words"));

@@ -31,7 +31,7 @@ void for_each_row(const SurfelMap& map,
                   double points_per_square_metre,
                   const std::function<void(std::span<const CloudRow>)>& sink) {
   if (!(points_per_square_metre >= 0.0) || !(points_per_square_metre < 1e12)) {
-    throw InputError("a density of points is a number a square metre, 0 or more");
+    throw InputError("a density of points is a number per square metre, 0 or more");
   }
   std::vector<CloudRow> rows;
   const auto push = [&](const CloudRow& row) {

@@ -14,7 +14,7 @@ namespace pointflight {
 namespace {
 
 constexpr double kBlock = 3.0;   // m
-constexpr double kSparse = 4.0;  // points a cell
+constexpr double kSparse = 4.0;  // points per cell
 constexpr std::size_t kEnoughCells = 7;
 constexpr std::int32_t kWidest = 3;  // cells to each side: 7^3
 

@@ -167,7 +167,7 @@ class VoxelGrid {
   std::uint32_t last_brick_ = kNone;  ///< The one used last: neighbours follow each other.
 };
 
-/// Looks around cells of a grid that does not change. One a thread; fast where consecutive cells
+/// Looks around cells of a grid that does not change. One per thread; fast where consecutive cells
 /// lie near each other.
 class NeighbourWindow {
  public:

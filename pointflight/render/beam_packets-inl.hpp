@@ -89,7 +89,7 @@ struct PacketLeaf {
   double corner[3];  ///< The leaf's origin from the map's origin, m.
   std::uint32_t first_word;
   std::uint32_t count;
-  // one value a surfel
+  // one value per surfel
   alignas(32) float shape[10][8];
   alignas(32) float center[3][8];    ///< From the leaf's origin, m.
   alignas(32) float whitened[3][8];  ///< From the apex: what all beams share where origins agree.

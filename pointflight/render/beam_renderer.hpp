@@ -9,7 +9,7 @@
 
 namespace pointflight {
 
-/// One ray a beam through the map's hierarchy; a return is where the surfels met within half a
+/// One ray per beam through the map's hierarchy; a return is where the surfels met within half a
 /// voxel of depth cover at least the share tau of the beam (docs/architecture.md, "Hit rule").
 ///
 /// Rays longer than `range_max` end there. Uses + - * / and sqrt only: the same bytes everywhere.

@@ -1,5 +1,13 @@
 // Packets of beams: what they are, and which boxes they may touch.
 //
+// Neighbouring beams meet much the same nodes of the hierarchy, so up to 64 of them descend it
+// together. Eight beams make a group, whose lanes the arithmetic works on; eight groups make a
+// packet. Around a packet lies a frustum: four planes through an apex (the first beam's origin,
+// moved outwards by as far as other origins lie from it), with the mean direction w as its axis and
+// u, v across it. `test_node` holds the eight children of a node against the four planes, and
+// bounds their distance along the axis w is closest to. What passes is held against the groups'
+// own rectangles in (u, v), and its surfels against single beams (beam_packets-inl.hpp).
+//
 // Included once a target by Highway's foreach_target; see beam_kernel.cpp.
 #if defined(POINTFLIGHT_RENDER_PACKET_INL_HPP) == defined(HWY_TARGET_TOGGLE)
 #ifdef POINTFLIGHT_RENDER_PACKET_INL_HPP
@@ -128,6 +136,25 @@ POINTFLIGHT_INLINE float spread_of(const Packet& p) {
   return std::sqrt(greatest(squared)) * 1.001f;
 }
 
+/// The four planes around all groups, which lie within [low_u, high_u] x [low_v, high_v].
+POINTFLIGHT_INLINE void set_up_planes(Packet& p,
+                                      const Vector3f& mean,
+                                      const Vector3f& u,
+                                      const Vector3f& v) {
+  const Vector3f normals[4] = {
+      u - p.low_u * mean, p.high_u * mean - u, v - p.low_v * mean, p.high_v * mean - v};
+  p.norm = 0.0f;
+  for (int k = 0; k < 4; ++k) {
+    p.norm = std::max(p.norm, normals[k].norm() * 1.001f);
+    p.offset[k] = -p.spread * normals[k].norm() * 1.001f;  // origins lie up to the spread outside
+    for (int axis = 0; axis < 3; ++axis) {
+      p.plane[k][axis] = normals[k][axis];
+      p.plane_side[k][axis] =
+          static_cast<std::uint32_t>(axis) + (normals[k][axis] > 0.0f ? 3u : 0u);
+    }
+  }
+}
+
 /// Sets up a packet of the first `count` groups.
 POINTFLIGHT_INLINE void set_up(Packet& p, std::size_t count) {
   p.count = count;
@@ -138,6 +165,8 @@ POINTFLIGHT_INLINE void set_up(Packet& p, std::size_t count) {
   }
   p.spread = spread_of(p);
   p.one_origin = p.spread == 0.0f;
+
+  // the frame: w along the mean direction, u and v across it
   Vector3f mean = Vector3f::Zero();
   for (std::size_t g = 0; g < kGroups; ++g) {
     // what is not there meets nothing
@@ -157,6 +186,8 @@ POINTFLIGHT_INLINE void set_up(Packet& p, std::size_t count) {
   int main_axis = 0;
   mean.cwiseAbs().maxCoeff(&main_axis);
 
+  // where each group's beams cross the plane at distance 1 along w, and how fast they go along the
+  // main axis
   F8 steepest = splat(0.0f);
   alignas(32) float low[2][8];  // by group
   alignas(32) float high[2][8];
@@ -175,6 +206,8 @@ POINTFLIGHT_INLINE void set_up(Packet& p, std::size_t count) {
     high[1][g] = greatest(at_v);
     steepest = max(steepest, abs(main_axis == 0 ? dx : main_axis == 1 ? dy : dz));
   }
+
+  // a rectangle around each group, and one around all
   const float room = 1e-5f;  // for rounding
   const F8 half = splat(0.5f);
   const F8 half_u = (load(high[0]) - load(low[0])) * half;
@@ -188,18 +221,9 @@ POINTFLIGHT_INLINE void set_up(Packet& p, std::size_t count) {
   p.high_u = greatest(load(high[0])) + room;
   p.low_v = least(load(low[1])) - room;
   p.high_v = greatest(load(high[1])) + room;
-  const Vector3f normals[4] = {
-      u - p.low_u * mean, p.high_u * mean - u, v - p.low_v * mean, p.high_v * mean - v};
-  p.norm = 0.0f;
-  for (int k = 0; k < 4; ++k) {
-    p.norm = std::max(p.norm, normals[k].norm() * 1.001f);
-    p.offset[k] = -p.spread * normals[k].norm() * 1.001f;
-    for (int axis = 0; axis < 3; ++axis) {
-      p.plane[k][axis] = normals[k][axis];
-      p.plane_side[k][axis] =
-          static_cast<std::uint32_t>(axis) + (normals[k][axis] > 0.0f ? 3u : 0u);
-    }
-  }
+  set_up_planes(p, mean, u, v);
+
+  // along the axis that the mean direction is closest to, all beams go forward: a bound of t
   p.main_axis = main_axis;
   const bool forward = mean[main_axis] > 0.0f;
   p.main_side = static_cast<std::uint32_t>(main_axis) + (forward ? 0u : 3u);

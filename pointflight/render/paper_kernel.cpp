@@ -74,6 +74,33 @@ struct SplatLanes {
       column_at[8];
 };
 
+/// Point i + k of all, lane k of its eight.
+POINTFLIGHT_INLINE PaperSplat splat_of(const PaperImage& image,
+                                       const PaperPoints& points,
+                                       const SplatLanes& s,
+                                       std::size_t i,
+                                       std::size_t k) {
+  PaperSplat splat_k;  // NOLINT(cppcoreguidelines-pro-type-member-init): all is written
+  for (int axis = 0; axis < 3; ++axis) {
+    splat_k.p[axis] = s.p[axis][k];
+    splat_k.n[axis] = s.n[axis][k];
+  }
+  splat_k.distance = s.distance[k];
+  splat_k.cos_max = s.cos_max[k];
+  splat_k.theta_max = s.theta_max[k];
+  splat_k.row_at = s.row_at[k];
+  splat_k.column_at = s.column_at[k];
+  splat_k.planar = points.planar[i + k];
+  splat_k.intensity = points.intensity[i + k];
+  const float reach = s.theta_max[k] / image.step;
+  // a point smaller than a pixel has at least the row that it is nearest to
+  const float row = s.row_at[k];
+  const float nearest = std::floor(row + 0.5f);
+  splat_k.first_row = static_cast<int>(std::min(nearest, std::ceil(row - reach)));
+  splat_k.last_row = static_cast<int>(std::max(nearest, std::floor(row + reach)));
+  return splat_k;
+}
+
 static void project(const PaperImage& image,
                     const PaperPoints& points,
                     const float* corner,
@@ -125,24 +152,7 @@ static void project(const PaperImage& image,
     store(distance, s.distance);
     for (; left != 0; left &= left - 1) {
       const auto k = static_cast<std::size_t>(std::countr_zero(left));
-      PaperSplat splat_k;  // NOLINT(cppcoreguidelines-pro-type-member-init): all is written
-      for (int axis = 0; axis < 3; ++axis) {
-        splat_k.p[axis] = s.p[axis][k];
-        splat_k.n[axis] = s.n[axis][k];
-      }
-      splat_k.distance = s.distance[k];
-      splat_k.cos_max = s.cos_max[k];
-      splat_k.theta_max = s.theta_max[k];
-      splat_k.row_at = s.row_at[k];
-      splat_k.column_at = s.column_at[k];
-      splat_k.planar = points.planar[i + k];
-      splat_k.intensity = points.intensity[i + k];
-      const float reach = s.theta_max[k] / image.step;
-      // a point smaller than a pixel has at least the row that it is nearest to
-      const float row = s.row_at[k];
-      const float nearest = std::floor(row + 0.5f);
-      splat_k.first_row = static_cast<int>(std::min(nearest, std::ceil(row - reach)));
-      splat_k.last_row = static_cast<int>(std::max(nearest, std::floor(row + reach)));
+      const PaperSplat splat_k = splat_of(image, points, s, i, k);
       if (splat_k.last_row < 0 || splat_k.first_row >= image.rows) continue;
       splats.push_back(splat_k);
     }

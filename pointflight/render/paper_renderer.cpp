@@ -115,13 +115,8 @@ Hit look_up(const PaperImage& image, float azimuth, float elevation) {
 
 /// Points on the surface of a solid, about `spacing` apart (its frame). Their normals are not used.
 PaperPoints points_of(const Solid& solid, double spacing) {
-  const auto count = static_cast<std::size_t>(surface_area(solid) / (spacing * spacing)) + 16;
-  constexpr double kGolden = 0.6180339887498949;  // spreads v evenly whatever the count
   PaperPoints points;
-  for (std::size_t i = 0; i < count; ++i) {
-    const auto k = static_cast<double>(i);
-    const double v = k * kGolden - std::floor(k * kGolden);
-    const Vector3d p = surface_point(solid, (k + 0.5) / static_cast<double>(count), v);
+  for (const Vector3d& p : surface_points(solid, spacing)) {
     points.add(p.cast<float>(), Vector3f::UnitZ(), false, 0.0f);
   }
   return points;

@@ -10,7 +10,7 @@
 #include "pointflight/core/parallel.hpp"
 #include "pointflight/core/registry.hpp"
 #include "pointflight/geometry/types.hpp"
-#include "pointflight/map/scene.hpp"
+#include "pointflight/map/body.hpp"
 #include "pointflight/map/surfel_map.hpp"
 
 namespace pointflight {

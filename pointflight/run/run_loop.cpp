@@ -133,15 +133,20 @@ bool RunLoop::wait_until_ready() {
   for (;;) {
     const bool ready =
         std::all_of(links_.begin(), links_.end(), [](Link* l) { return l->is_ready(); });
+    if (is_deserted()) return false;
+    if (ready) return true;  // an interrupt now ends a run that has begun
     if (is_over()) return false;
-    if (ready) return true;
     for (Link* link : links_) link->on_wait(simulation_.time(), Waiting::kForLinks);
     std::this_thread::sleep_for(kLook);
   }
 }
 
 bool RunLoop::is_over() const {
-  if (options_.interrupted && options_.interrupted()) return true;
+  return (options_.interrupted && options_.interrupted()) || is_deserted();
+}
+
+/// Nobody gets anything of the run, or a link ends it.
+bool RunLoop::is_deserted() const {
   const bool used =
       std::any_of(links_.begin(), links_.end(), [](Link* l) { return l->is_in_use(); });
   return (!links_.empty() && !used) ||

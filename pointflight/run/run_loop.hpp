@@ -14,7 +14,7 @@
 
 namespace pointflight {
 
-/// Holds a run back to so many simulated seconds a second of the wall clock.
+/// Holds a run back to so many simulated seconds per second of the wall clock.
 class Pace {
  public:
   /// 0: as fast as it goes.
@@ -30,7 +30,7 @@ class Pace {
   /// rate that this machine manages.
   struct Behind {
     double seconds;  ///< s
-    double rate;     ///< Simulated seconds a second since the start or the last pause.
+    double rate;     ///< Simulated seconds per second since the start or the last pause.
   };
   /// Once for each time that it has doubled.
   std::optional<Behind> fallen_behind(SimTime time);
@@ -64,7 +64,7 @@ class ScanDelays {
 
 /// How a simulation is run.
 struct RunOptions {
-  double rate = 0.0;      ///< Simulated seconds a second; 0: as fast as it goes.
+  double rate = 0.0;      ///< Simulated seconds per second; 0: as fast as it goes.
   double lockstep = 0.0;  ///< After each scan wait so long for a planner's command, s; 0: do not.
   /// Lines for users: what the run fell behind, that it was paused.
   std::function<void(const std::string& line)> log;
@@ -105,6 +105,7 @@ class RunLoop {
 
   [[nodiscard]] bool wait_until_ready();
   [[nodiscard]] bool is_over() const;
+  [[nodiscard]] bool is_deserted() const;
   void after_step(double took);
   void wait_for_answer();
   void take_orders();

@@ -34,8 +34,8 @@ enum class CommandKind {
 /// One line of a scenario's `commands`: what a vehicle is told, and when. Levels that must be
 /// repeated are, until the next one.
 struct CommandSettings {
-  double time = 0.0;  ///< s
-  CommandKind kind = CommandKind::kHover;
+  double time = 0.0;                         ///< s
+  CommandKind kind = CommandKind::kHover;    ///< What it asks for.
   Vector3d vector = Vector3d::Zero();        ///< Acceleration, velocity or position.
   Vector3d rates_deg = Vector3d::Zero();     ///< Of body rates, deg/s.
   Vector3d feed_forward = Vector3d::Zero();  ///< Velocity of a position command, m/s.

@@ -31,11 +31,11 @@ enum class ImuAxis {
 
 /// One thing that goes wrong on a vehicle for a time.
 struct FaultSettings {
-  FaultKind kind = FaultKind::kRotor;
-  double from = 0.0;               ///< s
-  double until = 0.0;              ///< s; 0: for good
-  std::int64_t index = 0;          ///< Rotor or lidar.
-  ImuAxis axis = ImuAxis::kGyroX;  ///< Of an IMU that is stuck.
+  FaultKind kind = FaultKind::kRotor;  ///< What goes wrong.
+  double from = 0.0;                   ///< s
+  double until = 0.0;                  ///< s; 0: for good
+  std::int64_t index = 0;              ///< Rotor or lidar.
+  ImuAxis axis = ImuAxis::kGyroX;      ///< Of an IMU that is stuck.
   /// rotor: share of its commanded speed that is left; odometry_delay: s; scan_drop: share lost.
   double value = 0.0;
 };

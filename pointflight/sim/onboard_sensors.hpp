@@ -57,6 +57,9 @@ class MountedLidar : public IntervalSensor {
   /// From the sensor's axes to the body's.
   [[nodiscard]] const Pose& T_body_sensor() const { return T_body_sensor_; }
 
+  /// True where all beams of a scan leave from one pose.
+  [[nodiscard]] bool takes_snapshots() const { return snapshot_ || renderer_->is_snapshot(); }
+
   [[nodiscard]] double reach() const override;
   [[nodiscard]] bool loses(std::int64_t index) const override;
   [[nodiscard]] Sample measure(const IntervalInput& input) const override;

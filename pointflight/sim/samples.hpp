@@ -118,6 +118,7 @@ template <class... Functions>
 struct Overloaded : Functions... {
   using Functions::operator()...;
 };
+/// Of functions as they are given.
 template <class... Functions>
 Overloaded(Functions...) -> Overloaded<Functions...>;
 

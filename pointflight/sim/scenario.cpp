@@ -130,6 +130,11 @@ Scenario read(SettingsReader& reader, const std::string& path) {
 
 }  // namespace
 
+Registry<ScenarioSection>& scenario_sections() {
+  static Registry<ScenarioSection> sections;
+  return sections;
+}
+
 void describe(SettingsVisitor& v, Scenario& s) {
   v.value(required({"map", "", ".pfmap to fly in"}), s.map);
   v.value({"map_hash", "", "of the map; another one is refused; empty: any will do"}, s.map_hash);
@@ -159,8 +164,11 @@ void describe(SettingsVisitor& v, Scenario& s) {
   });
   v.section({"output", "", "what is written"},
             [&](SettingsVisitor& w) { describe_output(w, s.output); });
-  v.section({"ros", "", "names of messages, for --ros1, --ros2 and --record"},
-            [&](SettingsVisitor& w) { describe(w, s.ros); });
+  for (const ScenarioSection& row : scenario_sections().rows()) {
+    std::any& settings = s.sections.try_emplace(row.name, row.settings).first->second;
+    v.section({row.name, "", row.help}, [&](SettingsVisitor& w) { row.describe(w, settings); });
+  }
+  v.leave_out("ros");  // in a program without it
 }
 
 std::vector<VehicleSetup> Scenario::fleet() const {
@@ -188,7 +196,7 @@ std::vector<VehicleSetup> Scenario::fleet() const {
 
 std::string Scenario::vehicle_key(std::size_t number, const std::string& key) const {
   if (is_short) {
-    for (const char* section : {"lidars", "mission", "commands", "faults"}) {
+    for (const char* section : {"lidars", "sensors", "mission", "commands", "faults"}) {
       if (key.starts_with(section)) return key;
     }
     return "vehicle." + key;
@@ -246,8 +254,9 @@ std::string scenario_reference() {
   defaults.vehicles.front().commands.resize(1);
   defaults.vehicles.front().faults.resize(1);
   defaults.obstacles.resize(1);
-  defaults.ros.outputs.resize(1);
-  defaults.ros.inputs.resize(1);
+  for (const ScenarioSection& row : scenario_sections().rows()) {
+    defaults.sections[row.name] = row.example;
+  }
   SettingsTable table;
   describe(table, defaults);
   return table.text();

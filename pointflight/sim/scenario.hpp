@@ -1,5 +1,6 @@
 #pragma once
 
+#include <any>
 #include <cstdint>
 #include <map>
 #include <memory>
@@ -12,7 +13,7 @@
 #include "pointflight/map/surfel_map.hpp"
 #include "pointflight/sim/command_script.hpp"
 #include "pointflight/sim/faults.hpp"
-#include "pointflight/sim/ros_setup.hpp"
+#include "pointflight/sim/scenario_section.hpp"
 #include "pointflight/sim/sensor.hpp"
 #include "pointflight/vehicle/mission.hpp"
 #include "pointflight/world/obstacles.hpp"
@@ -26,7 +27,7 @@ struct LidarMount {
   Vector3d position = Vector3d(0.0, 0.0, 0.1);   ///< m, body frame.
   Vector3d rotation_rpy_deg = Vector3d::Zero();  ///< Of the sensor's axes in the body.
   Choice<RendererKind> renderer{};               ///< "beam", "paper" or an own one.
-  bool snapshot = false;                         ///< One pose a scan, as in the paper.
+  bool snapshot = false;                         ///< One pose per scan, as in the paper.
   bool noise = true;                             ///< Range noise of the sensor file.
 };
 
@@ -64,7 +65,7 @@ struct VehicleSetup {
   Vector3d copy_offset =
       Vector3d(0.0, 2.0, 0.0);  ///< Of start and waypoints, from copy to copy, m.
   std::int64_t seed = -1;       ///< Of its sensors and gusts; -1: the run's.
-  CollisionReaction on_collision = CollisionReaction::kReport;
+  CollisionReaction on_collision = CollisionReaction::kReport;    ///< What it does then.
   std::optional<Choice<ControllerKind>> controller;               ///< Instead of its file's.
   double command_timeout = 0.5;                                   ///< s; 0: commands hold for ever.
   bool battery = false;                                           ///< Fly on the vehicle's battery.
@@ -109,7 +110,8 @@ struct Scenario {
   std::vector<ObstacleSettings> obstacles;  ///< What moves by itself.
   AirSetup air;                             ///< Wind and ground effect.
   OutputSetup output;                       ///< What is written.
-  RosSetup ros;                             ///< Names of messages, for ROS and recordings.
+  /// What other floors and programs read (`scenario_sections`), by name.
+  std::map<std::string, std::any> sections;
 
   /// Of the file: what relative paths are taken from. Empty for a scenario made by a program, which
   /// stands for the working folder.

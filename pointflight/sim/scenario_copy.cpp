@@ -102,7 +102,11 @@ void take_files(Scenario& scenario, Inputs& inputs) {
     inputs.take(obstacle.file);
     inputs.take(obstacle.keyframes);
   }
-  inputs.take_model(scenario.ros.profile);
+  for (auto& [name, settings] : scenario.sections) {
+    const ScenarioSection* row = scenario_sections().find(name);
+    if (row == nullptr || !row->models) continue;
+    for (std::string* model : row->models(settings)) inputs.take_model(*model);
+  }
 }
 
 /// A link to the map in the folder, or its path where the file system has no links.

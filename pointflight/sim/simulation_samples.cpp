@@ -15,7 +15,8 @@ constexpr double kBeamOrigin = 1.0;  // m: beams start no farther from their sen
 void Simulation::deliver(std::vector<StepSamples>& samples, SampleSink& sink) {
   std::vector<StepSamples::Item*> due;
   for (StepSamples& s : samples) {
-    for (CollisionEvent& event : s.collisions) s.items.push_back({event.time, 0, event});
+    for (CollisionEvent& event : s.collisions)
+      s.items.push_back({event.time, kCollisionRank, event});
   }
   // vehicles in their order, which sorting keeps
   for (StepSamples& s : samples) {

@@ -80,14 +80,18 @@ struct VehicleStatus {
   VehicleSummary summary;              ///< What happened so far.
 };
 
+/// The order of a vehicle's samples at one instant.
+inline constexpr std::size_t kCollisionRank = 0, kEventRank = 1, kStateRank = 2;
+inline constexpr std::size_t kSensorRank = 3;  ///< Of the first sensor; the others follow.
+
 /// What one vehicle says within a step.
 struct StepSamples {
   /// A sample and its place among those of its instant: what happened first, then what happened on
   /// board, the truth, sensors in their order.
   struct Item {
-    SimTime time;  ///< When it arrives.
-    std::size_t rank = 0;
-    Sample sample;
+    SimTime time;          ///< When it arrives.
+    std::size_t rank = 0;  ///< Among those of its instant.
+    Sample sample;         ///< What is said.
   };
   std::vector<CollisionEvent> collisions;  ///< Entered or left in this step.
   std::vector<Item> items;                 ///< All else.

@@ -88,7 +88,7 @@ void describe_controller(SettingsVisitor& v, ControllerSettings& c) {
 }
 
 void describe_imu(SettingsVisitor& v, ImuSettings& i) {
-  v.value({"rate", "Hz", "samples a second", 1, 10000}, i.rate);
+  v.value({"rate", "Hz", "samples per second", 1, 10000}, i.rate);
   v.value({"position", "m", "in the body frame", -10, 10}, i.position);
   v.value({"rotation_rpy_deg", "deg", "roll, pitch, yaw of its axes in the body", -360, 360},
           i.rotation_rpy_deg);

@@ -66,7 +66,7 @@ struct ImuSettings {
   double accel_bias_walk = 0.0;                  ///< m/s^3/sqrt(Hz)
 };
 
-/// LiPo battery: 3.5 V a cell when empty to 4.2 V when full, less what the current takes.
+/// LiPo battery: 3.5 V per cell when empty to 4.2 V when full, less what the current takes.
 struct BatterySettings {
   double cells = 0.0;       ///< In series; 0: none, full power for ever.
   double capacity = 0.0;    ///< Ah

@@ -37,7 +37,7 @@ constexpr double kLargest =
 
 constexpr int kLooks = 64;  // at a trajectory
 
-/// False where a number of the command is not finite, or of no use.
+/// False where a number of the command is not finite or out of range.
 struct Finite {
   static bool all(const Vector3d& v) {
     return v.allFinite() && v.cwiseAbs().maxCoeff() <= kLargest;
@@ -182,7 +182,7 @@ AutopilotState Autopilot::start(const RigidBodyState& body, bool landed) const {
 
 std::optional<std::string> Autopilot::objection(const Command& command) const {
   if (!std::visit(Finite{}, command)) {
-    return fmt::format("a {} command with a number that is not finite or of no use",
+    return fmt::format("a {} command with a number that is not finite or out of range",
                        name_of(command));
   }
   if (const auto* rotors = std::get_if<RotorSpeedCommand>(&command)) {

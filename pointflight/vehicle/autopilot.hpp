@@ -16,7 +16,7 @@ namespace pointflight {
 struct AutopilotState {
   Command command = HoverCommand{};  ///< The last that was taken; hover after a timeout.
   SimTime since;                     ///< When the command was given.
-  std::shared_ptr<const Trajectory> trajectory;  ///< That it follows from `since` on, or none.
+  std::shared_ptr<const Trajectory> trajectory;  ///< Followed since `since`; null: none.
   bool armed = true;                    ///< False: rotors are off, whatever the command says.
   std::optional<PositionCommand> hold;  ///< Where it hovers, once it is slow.
   PositionCommand reference;            ///< What it last asked for; for records.

@@ -12,7 +12,7 @@ struct BatteryState {
   double current = 0.0;  ///< A
 };
 
-/// Charge and voltage of a LiPo: open circuit 3.5 to 4.2 V a cell, in proportion to the charge
+/// Charge and voltage of a LiPo: open circuit 3.5 to 4.2 V per cell, in proportion to the charge
 /// left; the current is the rotors' shaft power (sum of k_m w^3) by efficiency and voltage.
 class Battery {
  public:
@@ -20,7 +20,7 @@ class Battery {
   explicit Battery(const VehicleSettings& settings) : settings_(settings) {}
 
   /// Advances by `dt` seconds at the rotors' speeds. Returns the share of the rotors' greatest
-  /// speed that is left: they turn in proportion to the voltage, all of it at 4.2 V a cell.
+  /// speed that is left: they turn in proportion to the voltage, all of it at 4.2 V per cell.
   double step(BatteryState& state, const VehicleState& vehicle, double dt) const;
 
   /// Share of the capacity that is left, 0 to 1.

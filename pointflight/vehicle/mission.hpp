@@ -56,12 +56,12 @@ enum class YawMode {
 
 /// Waypoints and how to fly through them: a scenario's `mission`.
 struct MissionSettings {
-  MotionLimits motion;  ///< Of the straight legs.
-  YawMode yaw = YawMode::kAlongPath;
-  double yaw_rate_deg = 90.0;       ///< Limit while turning.
-  double hold = 0.0;                ///< Seconds at each waypoint.
-  std::vector<Vector3d> waypoints;  ///< World, m; empty: hover.
-  std::optional<double> final_yaw;  ///< Heading to turn to in the end, rad.
+  MotionLimits motion;                ///< Of the straight legs.
+  YawMode yaw = YawMode::kAlongPath;  ///< Where it looks.
+  double yaw_rate_deg = 90.0;         ///< Limit while turning.
+  double hold = 0.0;                  ///< Seconds at each waypoint.
+  std::vector<Vector3d> waypoints;    ///< World, m; empty: hover.
+  std::optional<double> final_yaw;    ///< Heading to turn to in the end, rad.
 
   /// Exact: for orders that are said again.
   bool operator==(const MissionSettings&) const = default;

@@ -18,10 +18,9 @@ struct Trial {
   const char* name;
   const char* unit;
   double size;
-  double duration;  ///< s
   LoopDesign design;
   bool first_order;
-  std::function<Setpoint(double value, const RigidBodyState& state)> command;
+  std::function<Setpoint(double value)> command;
   std::function<double(const RigidBodyState& state)> read;
 };
 
@@ -43,45 +42,40 @@ std::vector<Trial> trials_of(const VehicleSettings& v) {
   LoopDesign velocity = c.horizontal;
   velocity.natural_frequency *= kVelocityToPosition;
   velocity.integral = 0.0;
-  const auto long_enough = [](const LoopDesign& design) { return 12.0 / design.natural_frequency; };
   return {
       {"roll rate",
        "rad/s",
        0.2,
-       long_enough(rate),
        rate,
        true,
-       [=](double x, const RigidBodyState&) {
+       [=](double x) {
          return BodyRateCommand{{x, 0, 0}, weight};
        },
        [](const RigidBodyState& s) { return s.omega_body.x(); }},
       {"roll attitude",
        "rad",
        0.1,
-       long_enough(c.roll_pitch),
        c.roll_pitch,
        false,
-       [=](double x, const RigidBodyState&) {
+       [=](double x) {
          return AttitudeCommand{quaternion_from_rpy(x, 0, 0), weight, Vector3d::Zero()};
        },
        [](const RigidBodyState& s) { return roll_of(s); }},
       {"yaw",
        "rad",
        0.1,
-       long_enough(c.yaw),
        c.yaw,
        false,
-       [=](double x, const RigidBodyState&) {
+       [=](double x) {
          return position({0, 0, 0}, x);
        },
        [](const RigidBodyState& s) { return yaw_of(s.q_world_body); }},
       {"acceleration x",
        "m/s^2",
        0.5,
-       long_enough(c.roll_pitch),
        c.roll_pitch,
        false,
-       [=](double x, const RigidBodyState&) {
+       [=](double x) {
          return AccelerationCommand{{x, 0, 0}, 0.0, 0.0};
        },
        // what the tilt makes of the thrust; drag takes its part later
@@ -92,30 +86,27 @@ std::vector<Trial> trials_of(const VehicleSettings& v) {
       {"velocity x",
        "m/s",
        0.5,
-       long_enough(velocity),
        velocity,
        false,
-       [=](double x, const RigidBodyState&) {
+       [=](double x) {
          return VelocityCommand{{x, 0, 0}, 0.0, 0.0};
        },
        [](const RigidBodyState& s) { return s.v_world.x(); }},
       {"position x",
        "m",
        0.5,
-       long_enough(c.horizontal),
        c.horizontal,
        false,
-       [=](double x, const RigidBodyState&) {
+       [=](double x) {
          return position({x, 0, 0}, 0.0);
        },
        [](const RigidBodyState& s) { return s.p_world.x(); }},
       {"position z",
        "m",
        0.5,
-       long_enough(c.vertical),
        c.vertical,
        false,
-       [=](double x, const RigidBodyState&) {
+       [=](double x) {
          return position({0, 0, x}, 0.0);
        },
        [](const RigidBodyState& s) { return s.p_world.z(); }},
@@ -198,10 +189,10 @@ std::vector<StepResponse> step_responses(const VehicleSettings& settings) {
     r.first_order = trial.first_order;
     VehicleState state = vehicle.hover_at(Vector3d::Zero(), 0.0);
     ControllerMemory memory;
-    for (double t = 0.0; t < trial.duration; t += r.step) {
+    const double duration = 12.0 / trial.design.natural_frequency;
+    for (double t = 0.0; t < duration; t += r.step) {
       r.value.push_back(trial.read(state.body) / trial.size);
-      const auto speeds =
-          controller->update(state.body, trial.command(trial.size, state.body), r.step, memory);
+      const auto speeds = controller->update(state.body, trial.command(trial.size), r.step, memory);
       vehicle.step(state, speeds, r.step);
     }
     measure(r);

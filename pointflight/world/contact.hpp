@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <optional>
 
-#include "pointflight/map/scene.hpp"
+#include "pointflight/map/body.hpp"
 
 namespace pointflight {
 

@@ -12,7 +12,7 @@
 #include "pointflight/core/parallel.hpp"
 #include "pointflight/core/settings.hpp"
 #include "pointflight/geometry/ball_tree.hpp"
-#include "pointflight/map/scene.hpp"
+#include "pointflight/map/body.hpp"
 
 namespace pointflight {
 
@@ -47,27 +47,27 @@ enum class AtBorder {
 /// One entry of a scenario's `obstacles`: one or more bodies alike.
 struct ObstacleSettings {
   std::int64_t count = 1;  ///< So many alike; more than one only in random motion.
-  ObstacleShape shape = ObstacleShape::kSphere;
-  double radius = 0.3;                      ///< Of spheres and cylinders, m.
-  double radius_max = 0.0;                  ///< Above `radius`: drawn between the two.
-  double height = 1.7;                      ///< Of cylinders, m.
-  Vector3d size = Vector3d(0.5, 0.5, 0.5);  ///< Of boxes, m.
+  ObstacleShape shape = ObstacleShape::kSphere;  ///< What it looks like.
+  double radius = 0.3;                           ///< Of spheres and cylinders, m.
+  double radius_max = 0.0;                       ///< Above `radius`: drawn between the two.
+  double height = 1.7;                           ///< Of cylinders, m.
+  Vector3d size = Vector3d(0.5, 0.5, 0.5);       ///< Of boxes, m.
   std::string file;          ///< Of a cloud, mesh or .pfmap, in the body's own frame.
   double resolution = 0.03;  ///< Of its import, m.
   double intensity = 100.0;  ///< Of the returns of exact shapes.
 
-  ObstacleMotion motion = ObstacleMotion::kRandom;
-  double speed = 1.0;      ///< m/s
-  double speed_max = 0.0;  ///< Above `speed`: drawn between the two.
-  FlightDirections directions = FlightDirections::kAny;
-  AtBorder at_border = AtBorder::kReplace;
-  Vector3d bounds_min = Vector3d::Zero();  ///< Both zero: the map's bounds.
-  Vector3d bounds_max = Vector3d::Zero();  ///< As bounds_min: world, m.
-  Vector3d position = Vector3d::Zero();    ///< Where a still one stands.
-  double yaw_deg = 0.0;                    ///< Of a still one, from world x towards y.
-  std::vector<Vector3d> waypoints;         ///< Of a loop.
-  std::string keyframes;                   ///< CSV: `read_keyframes`.
-  bool repeat = true;                      ///< Keyframes start again after the last.
+  ObstacleMotion motion = ObstacleMotion::kRandom;       ///< How it moves.
+  double speed = 1.0;                                    ///< m/s
+  double speed_max = 0.0;                                ///< Above `speed`: drawn between the two.
+  FlightDirections directions = FlightDirections::kAny;  ///< Of random motion.
+  AtBorder at_border = AtBorder::kReplace;               ///< What it does there.
+  Vector3d bounds_min = Vector3d::Zero();                ///< Both zero: the map's bounds.
+  Vector3d bounds_max = Vector3d::Zero();                ///< As bounds_min: world, m.
+  Vector3d position = Vector3d::Zero();                  ///< Where a still one stands.
+  double yaw_deg = 0.0;             ///< Of a still one, from world x towards y.
+  std::vector<Vector3d> waypoints;  ///< Of a loop.
+  std::string keyframes;            ///< CSV: `read_keyframes`.
+  bool repeat = true;               ///< Keyframes start again after the last.
 };
 
 /// The keys of an entry.

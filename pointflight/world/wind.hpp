@@ -20,8 +20,8 @@ enum class Turbulence {
 
 /// How the air moves.
 struct WindSettings {
-  Vector3d mean = Vector3d::Zero();  ///< Where it blows to, world, m/s.
-  Turbulence turbulence = Turbulence::kNone;
+  Vector3d mean = Vector3d::Zero();             ///< Where it blows to, world, m/s.
+  Turbulence turbulence = Turbulence::kNone;    ///< How gusty.
   Vector3d gust_sigma = Vector3d::Zero();       ///< custom: along, across, up, m/s
   Vector3d gust_length = Vector3d(50, 50, 20);  ///< custom: scale lengths, m
 };

@@ -70,7 +70,7 @@ struct Marker {
   Duration lifetime;                         ///< After the last message; zero: for ever.
   bool frame_locked = false;                 ///< RViz moves it along with its frame.
   std::vector<Point> points;                 ///< Of lines, points and arrows, m.
-  std::vector<ColorRGBA> colors;             ///< One a point, or none.
+  std::vector<ColorRGBA> colors;             ///< One per point, or none.
   std::string texture_resource;              ///< ROS 2 only, as the next two.
   CompressedImage texture;                   ///< Empty here.
   std::vector<UVCoordinate> uv_coordinates;  ///< Empty here.

@@ -77,7 +77,7 @@ struct PointCloud2 {
   ///@}
   std::vector<PointField> point_fields;  ///< `fields` on the wire.
   bool is_bigendian = false;             ///< Always false.
-  /// Bytes a point; bytes in all.
+  /// Bytes per point; bytes in all.
   ///@{
   std::uint32_t point_step = 0, row_step = 0;
   ///@}
@@ -107,7 +107,7 @@ struct Image {
   ///@}
   std::string encoding;            ///< "32FC1": a float a pixel.
   std::uint8_t is_bigendian = 0;   ///< Always 0.
-  std::uint32_t step = 0;          ///< Bytes a row.
+  std::uint32_t step = 0;          ///< Bytes per row.
   std::vector<std::uint8_t> data;  ///< Row by row, the highest first.
   template <class M, class V>
   static void fields(M& m, V& v) {

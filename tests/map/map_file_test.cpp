@@ -27,8 +27,7 @@ const ImportedMap& ball() {
     });
     ImportOptions options;
     options.resolution = 0.1;
-    const auto open = [&](std::size_t) { return std::make_unique<testing::MemoryCloud>(points); };
-    return build_map({"memory"}, open, options, Executor(1));
+    return testing::import_points(points, options);
   }();
   return map;
 }

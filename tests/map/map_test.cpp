@@ -420,7 +420,7 @@ TEST(MapFile, DamageIsFoundAndNeverCrashes) {
   expect_contains(error_of([&] { open(wrong); }), "not a .pfmap file");
   wrong = good;
   wrong[8] = std::byte{99};
-  expect_contains(error_of([&] { open(wrong); }), "map version 99, this program reads 1");
+  expect_contains(error_of([&] { open(wrong); }), "map version 99, this program reads 1 to 2");
   wrong = good;
   wrong[20] ^= std::byte{1};
   expect_contains(error_of([&] { open(wrong); }), "header is corrupt");

@@ -29,11 +29,14 @@ template <Wire W, class M>
 std::optional<Order> order_for(const std::string& kind,
                                const M& message,
                                const std::string& definition = "",
-                               const std::string& unit = "si") {
+                               RotorUnit unit = RotorUnit::kSi) {
   const auto bytes = encode<W>(message);
   InputStream stream;
-  stream.settings.kind = kind;
+  stream.type = input_types().find(kind);
   stream.settings.unit = unit;
+  if constexpr (std::is_same_v<M, msg::PositionCommandLong>) {
+    stream.settings.package = CommandPackage::kMarsQuadrotorMsgs;
+  }
   stream.topic.name = "/in";
   stream.topic.type = message_type<M>();
   Received received;
@@ -42,9 +45,14 @@ std::optional<Order> order_for(const std::string& kind,
   received.md5 = definition.empty() ? stream.topic.type.md5 : "unknown";
   received.definition = definition.empty() ? stream.topic.type.definition : definition;
   std::string reason;
-  auto order = order_of(stream, W, received, context(), reason);
-  if (!order) expect_contains(reason, "/in: a message of");
-  return order;
+  const OrderContext contexts[] = {context()};
+  auto orders = orders_of(stream, W, received, contexts, reason);
+  if (orders.empty()) {
+    expect_contains(reason, "/in: a message of");
+    return std::nullopt;
+  }
+  EXPECT_EQ(reason, "");
+  return orders.front();
 }
 
 TEST(Inputs, FramesThatAreNotKnownAreRefused) {
@@ -52,13 +60,14 @@ TEST(Inputs, FramesThatAreNotKnownAreRefused) {
   stream.topic.name = "/in";
   const auto reason_for =
       [&](const std::string& kind, const auto& message, const OrderContext& c) -> std::string {
-    stream.settings.kind = kind;
+    stream.type = input_types().find(kind);
     const auto bytes = encode<Wire::kCdr>(message);
     Received received;
     received.data = bytes.data();
     received.size = bytes.size();
     std::string reason;
-    return order_of(stream, Wire::kCdr, received, c, reason) ? "taken" : reason;
+    const OrderContext contexts[] = {c};
+    return orders_of(stream, Wire::kCdr, received, contexts, reason).empty() ? reason : "taken";
   };
   OrderContext alias = context();
   alias.world_alias = "map";
@@ -186,7 +195,8 @@ TEST(Inputs, RotorsGoalsSticksAndTheRest) {
   msg::Float32MultiArray rotors;
   rotors.data = {60.0f, 120.0f};
   EXPECT_NEAR(
-      command_in<RotorSpeedCommand>(order_for<Wire::kRos1>("rotors", rotors, "", "rpm")).speeds[1],
+      command_in<RotorSpeedCommand>(order_for<Wire::kRos1>("rotors", rotors, "", RotorUnit::kRpm))
+          .speeds[1],
       4.0 * kPi,
       1e-9);
   msg::PoseStamped goal;

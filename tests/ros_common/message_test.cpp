@@ -198,7 +198,7 @@ TEST(Cdr, EqualsWhatRclpyWrites) {
 TEST(Ros1Wire, PacksWithoutGaps) {
   CustomMsg custom;
   custom.points.resize(2);
-  // seq, stamp, length of the frame; timebase, number, id, reserved; length and 19 bytes a point
+  // seq, stamp, length of the frame; timebase, number, id, reserved; length and 19 bytes per point
   EXPECT_EQ(encode<Wire::kRos1>(custom).size(), 16u + 8 + 4 + 1 + 3 + 4 + 2 * 19);
   EXPECT_EQ(encode<Wire::kRos1>(Empty{}).size(), 0u);
   Joy joy;

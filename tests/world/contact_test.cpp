@@ -186,7 +186,7 @@ TEST(Contact, WithBodiesIsTheSeparationOfSolids) {
 }
 
 TEST(Proximity, AWireOfSinglePointsIsMetAtTwentyMetresASecond) {
-  // 2 mm thick, a point every 5 cm: one surfel a cell
+  // 2 mm thick, a point every 5 cm: one surfel per cell
   std::vector<Vector3d> wire;
   for (int i = 0; i <= 80; ++i) {
     wire.emplace_back(5.0 + 0.001 * (i % 3 - 1), 0.05 * i - 2.0, 1.0 + 0.001 * (i % 2));

@@ -1,4 +1,6 @@
-#include "pointflight/sim/ros_setup.hpp"
+#include "ros_common/ros_setup.hpp"
+
+#include "ros_common/output.hpp"
 
 namespace pointflight {
 namespace {
@@ -10,18 +12,44 @@ constexpr Named<CommandPackage> kCommandPackages[] = {
     {CommandPackage::kQuadrotorMsgs, "quadrotor_msgs"},
     {CommandPackage::kMarsQuadrotorMsgs, "mars_quadrotor_msgs"}};
 
+ScenarioSection section() {
+  RosSetup example;
+  example.outputs.resize(1);
+  example.inputs.resize(1);
+  return {.name = "ros",
+          .help = "names of messages, for --ros1, --ros2 and --record",
+          .settings = RosSetup{},
+          .example = example,
+          .describe = [](SettingsVisitor& v,
+                         std::any& settings) { describe(v, *std::any_cast<RosSetup>(&settings)); },
+          .models =
+              [](std::any& settings) {
+                return std::vector<std::string*>{&std::any_cast<RosSetup>(&settings)->profile};
+              }};
+}
+
+// scenarios have it in every program that reads profiles
+[[maybe_unused]] const ScenarioSection& kSection = scenario_sections().add(section());
+
 }  // namespace
+
+const RosSetup& ros_setup_of(const Scenario& scenario) {
+  static const RosSetup defaults;
+  const auto found = scenario.sections.find("ros");
+  return found == scenario.sections.end() ? defaults : *std::any_cast<RosSetup>(&found->second);
+}
 
 void describe(SettingsVisitor& v, RosOutput& s) {
   v.value({"kind", "", "what it says: odometry, imu, cloud, ... (docs/ros.md)"}, s.kind);
   v.value({"topic", "", "{vehicle}, {id}, {lidar} are written out; '-': not sent"}, s.topic);
   v.value({"frame", "", "header.frame_id; empty: the profile's for its kind"}, s.frame);
-  const bool has_child = s.kind == "odometry" || s.kind == "tf" || s.kind == "tf_scan";
-  v.only_if(has_child, "kind: odometry, tf, tf_scan", [&](SettingsVisitor& w) {
-    w.value({"child_frame", "", "what is posed; '-': none"}, s.child_frame);
-  });
+  const OutputType* type = output_types().find(s.kind);
+  v.only_if(
+      type != nullptr && type->has_child, "kind: odometry, tf, tf_scan", [&](SettingsVisitor& w) {
+        w.value({"child_frame", "", "what is posed; '-': none"}, s.child_frame);
+      });
   v.value({"rate", "Hz", "at most; 0: each sample; -1: as the profile has it", -1, 10000}, s.rate);
-  const bool has_points = s.kind == "map" || s.kind.find("cloud") != std::string::npos;
+  const bool has_points = type != nullptr && type->make.type().name == "PointCloud2";
   v.only_if(has_points, "a kind of cloud, or map", [&](SettingsVisitor& w) {
     w.value({"layout", "", "livox, livox_custom, velodyne, ouster, xyzi, ..."}, s.layout);
   });

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "pointflight/core/settings.hpp"
+#include "pointflight/sim/scenario.hpp"
 
 namespace pointflight {
 
@@ -53,5 +53,8 @@ struct RosSetup {
 
 /// The keys of `ros`.
 void describe(SettingsVisitor& visitor, RosSetup& setup);
+
+/// What a scenario says of ROS; the defaults where it says nothing.
+const RosSetup& ros_setup_of(const Scenario& scenario);
 
 }  // namespace pointflight

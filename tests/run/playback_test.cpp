@@ -1,0 +1,157 @@
+// A run's folder, played through the link that published it: the same messages.
+#include "pointflight/run/playback.hpp"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <map>
+#include <set>
+
+#include "pointflight/map/map_builder.hpp"
+#include "pointflight/map/map_file.hpp"
+#include "pointflight/run/run_loop.hpp"
+#include "pointflight/sim/flight_recorder.hpp"
+#include "ros_common/ros_link.hpp"
+#include "tests/sim/runs.hpp"
+
+namespace pointflight {
+namespace {
+
+using testing::error_of;
+using testing::expect_contains;
+using testing::read_file;
+using testing::TemporaryFolder;
+using testing::write_file;
+
+/// A message and when it left.
+using Sent = std::pair<std::int64_t, std::vector<std::byte>>;
+using Messages = std::map<std::string, std::vector<Sent>>;
+
+/// Keeps all messages by topic.
+class Keeper : public Outlet {
+ public:
+  explicit Keeper(Messages& messages) : messages_(messages) {}
+  [[nodiscard]] Wire wire() const override { return Wire::kCdr; }
+  int advertise(const Topic& topic) override {
+    names_.push_back(topic.name);
+    return static_cast<int>(names_.size()) - 1;
+  }
+  [[nodiscard]] bool has_readers(int /*topic*/) const override { return true; }
+  void send(int topic, const Bytes& bytes, std::int64_t time) override {
+    messages_[names_[static_cast<std::size_t>(topic)]].emplace_back(time, *bytes);
+  }
+
+ private:
+  Messages& messages_;
+  std::vector<std::string> names_;
+};
+
+/// Writes the run's folder.
+class Recorder : public Link {
+ public:
+  Recorder(const std::string& folder, const Simulation& simulation)
+      : simulation_(simulation), recorder_(folder, simulation) {}
+  void on_sample(const Sample& sample) override { recorder_.on_sample(sample); }
+  void close() override { recorder_.finish(simulation_); }
+
+ private:
+  const Simulation& simulation_;
+  FlightRecorder recorder_;
+};
+
+std::unique_ptr<RosLink> keeping(const RunDescription& run, Messages& messages) {
+  auto link = std::make_unique<RosLink>(run, load_ros_profile("default"), RosLinkOptions{});
+  link->add(std::unique_ptr<Outlet>(std::make_unique<Keeper>(messages)));
+  return link;
+}
+
+/// Two vehicles among obstacles, one of which touches the floor, with late odometry and lost scans.
+void fly(const TemporaryFolder& folder, Messages& messages) {
+  ShapeScene scene;
+  scene.add_box({0, 0, 0}, {20, 12, 6});
+  std::vector<CloudPoint> points;
+  scene.sample(400.0, 0.003, 1, [&](const Vector3d& p) { points.push_back({p, 10.0f}); });
+  ImportOptions options;
+  options.resolution = 0.2;
+  const ImportedMap map = testing::import_points(points, options);
+  write_map(OutputFile(folder / "m.pfmap"), map.tree, map.description);
+  write_file(folder / "s.yaml",
+             "map: m.pfmap\nduration: 1.5\nvehicles:\n"
+             "  - name: one\n    start: [4, 6, 3]\n"
+             "    lidars: [{model: os1_32}, {model: d455, snapshot: true}]\n"
+             "    mission: {waypoints: [[10, 6, 3]]}\n"
+             "    faults: [{kind: odometry_delay, value: 0.05, from: 0.5, until: 1},\n"
+             "             {kind: scan_drop, from: 0.3, value: 0.4}]\n"
+             "  - {name: two, start: [12, 8, 0.45], lidars: [{model: mid360}],\n"
+             "     commands: [{time: 0.2, kind: velocity, vector: [0, 0, -0.6]}]}\n"
+             "obstacles: [{count: 5, radius: 0.2}]\noutput: {odometry: true}\n");
+  const Executor executor(2);
+  const Scenario scenario = load_scenario(folder / "s.yaml");
+  Simulation simulation(scenario, scenario.open_map(), executor);
+  RunLoop loop(simulation, {});
+  Recorder recorder(folder / "run", simulation);
+  const auto ros = keeping(describe_run(simulation), messages);
+  loop.add(recorder);
+  loop.add(*ros);
+  loop.run();
+}
+
+TEST(Playback, ARunsFolderGivesTheMessagesOfTheRun) {
+  const TemporaryFolder folder;
+  Messages flown;
+  fly(folder, flown);
+  ASSERT_GT(flown["/collisions"].size(), 0u) << "the test wants one";
+
+  const Executor executor(2);
+  RecordedRun run(folder / "run", executor);
+  EXPECT_EQ(run.end(), SimTime(from_seconds(1.5)));
+  Messages played;
+  const auto ros = keeping(run.description(), played);
+  Link* const links[] = {ros.get()};
+  play(run, links, {});
+
+  // statuses are not in the folder, and the way within a scan is known by 200 states per second
+  const std::set<std::string> differ = {"/diagnostics"};
+  for (const auto& [topic, messages] : flown) {
+    ASSERT_EQ(played[topic].size(), messages.size()) << topic;
+    if (differ.contains(topic) || topic.ends_with("points_world")) continue;
+    std::size_t same = 0;
+    for (std::size_t i = 0; i < messages.size(); ++i) same += messages[i] == played[topic][i];
+    EXPECT_EQ(same, messages.size()) << topic;
+  }
+  EXPECT_EQ(flown.size(), played.size());
+}
+
+TEST(Playback, FoldersThatAreNoRunsSayWhatIsMissing) {
+  const TemporaryFolder folder;
+  Messages messages;
+  fly(folder, messages);
+  const Executor executor(1);
+  const auto error = [&] {
+    return error_of([&] {
+      RecordedRun run(folder / "run", executor);
+      play(run, {}, {});
+    });
+  };
+  const std::string states = read_file(folder / "run/one/trajectory.csv");
+  write_file(folder / "run/one/trajectory.csv", states.substr(0, states.find('\n') + 1));
+  expect_contains(error(), "trajectory.csv: no rows");
+  std::string doubled = states;
+  doubled += states.substr(states.find('\n') + 1);
+  write_file(folder / "run/one/trajectory.csv", doubled);
+  expect_contains(error(), "times must ascend");
+  write_file(folder / "run/one/trajectory.csv", states);
+  const std::string scan = read_file(folder / "run/two/scans/0_000000.pcd");
+  write_file(folder / "run/two/scans/0_000000.pcd", scan.substr(0, scan.size() - 3));
+  expect_contains(error(), "is no scan of a run");
+  std::string other = scan;
+  other[other.size() - 28 + 3] ^= 0x40;  // the last x, by a power of two
+  write_file(folder / "run/two/scans/0_000000.pcd", other);
+  expect_contains(error(), "points are not the sensor's");
+  write_file(folder / "run/two/scans/0_000000.pcd", scan);
+  std::filesystem::remove(folder / "run/summary.json");
+  expect_contains(error(), "summary.json: is missing");
+}
+
+}  // namespace
+}  // namespace pointflight
