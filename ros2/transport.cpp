@@ -13,6 +13,7 @@
 #include <thread>
 
 #include "ros2/node.hpp"
+#include "ros2/write_queue.hpp"
 #include "ros_common/ros_names.hpp"
 
 namespace pointflight {
@@ -24,9 +25,8 @@ constexpr double kPace = 64e6;
 constexpr double kFastPace = 128e6;
 constexpr double kSlowRate = 45e6;
 constexpr double kFastRate = 90e6;
-constexpr std::size_t kQueueMax = 2000;  // messages that wait to be written
-constexpr std::size_t kRequests = 10;    // of a service that wait
-constexpr int kSaidMax = 3;              // of DDS' own warnings
+constexpr std::size_t kRequests = 10;  // of a service that wait
+constexpr int kSaidMax = 3;            // of DDS' own warnings
 
 /// The DDS name of "sensor_msgs/msg/Imu".
 std::string dds_type_name(const MessageType& type) {
@@ -75,86 +75,6 @@ class DdsLog {
   }
   std::function<void(const std::string&)> log_;
   std::atomic<int> said_{0};
-};
-
-/// Messages on their way to the network, and the thread that writes them.
-class WriteQueue {
- public:
-  using Write = std::function<void(std::size_t output, const Bytes& bytes)>;
-
-  ~WriteQueue() { close(); }
-
-  /// `pace`: bytes per second at which messages leave; 0: at once.
-  void start(Write write, double pace) {
-    worker_ = std::thread([this, write = std::move(write), pace] {
-      std::optional<Pacing> pacing;
-      if (pace > 0.0) pacing.emplace(pace);
-      work(write);
-    });
-  }
-
-  /// At most `own_max` of one output and kQueueMax in all wait. Returns how many older messages
-  /// had to go.
-  std::uint64_t push(std::size_t output, const Bytes& bytes, bool latched, std::size_t own_max) {
-    const std::lock_guard lock(mutex_);
-    const auto is_own = [&](const Entry& e) { return e.output == output; };
-    std::uint64_t dropped = 0;
-    const auto own = std::count_if(queue_.begin(), queue_.end(), is_own);
-    if (static_cast<std::size_t>(own) >= own_max) {
-      queue_.erase(std::find_if(queue_.begin(), queue_.end(), is_own));
-      ++dropped;
-    } else if (queue_.size() >= kQueueMax) {
-      // the oldest that is not all that a latecomer would ever get
-      const auto oldest =
-          std::find_if(queue_.begin(), queue_.end(), [](const Entry& e) { return !e.latched; });
-      if (oldest == queue_.end()) return 1;
-      queue_.erase(oldest);
-      ++dropped;
-    }
-    queue_.push_back({output, bytes, latched});
-    return dropped;
-  }
-
-  void wake() {
-    const std::lock_guard lock(mutex_);
-    if (!queue_.empty()) ready_.notify_one();
-  }
-
-  /// Writes what waits, then ends the thread.
-  void close() {
-    {
-      const std::lock_guard lock(mutex_);
-      stop_ = true;
-      ready_.notify_one();
-    }
-    if (worker_.joinable()) worker_.join();
-  }
-
- private:
-  struct Entry {
-    std::size_t output = 0;
-    Bytes bytes;
-    bool latched = false;
-  };
-
-  void work(const Write& write) {
-    std::unique_lock lock(mutex_);
-    for (;;) {
-      ready_.wait(lock, [&] { return stop_ || !queue_.empty(); });
-      if (queue_.empty()) return;
-      const Entry entry = std::move(queue_.front());
-      queue_.pop_front();
-      lock.unlock();
-      write(entry.output, entry.bytes);
-      lock.lock();
-    }
-  }
-
-  std::thread worker_;
-  std::mutex mutex_;
-  std::condition_variable ready_;
-  std::deque<Entry> queue_;
-  bool stop_ = false;
 };
 
 class Ros2Transport : public Transport {
@@ -245,7 +165,7 @@ class Ros2Transport : public Transport {
     const auto output = static_cast<std::size_t>(topic);
     const Topic& t = outputs_[output]->topic;
     dropped_ += t.large ? large_.push(output, bytes, t.latched, t.depth)
-                        : small_.push(output, bytes, t.latched, kQueueMax);
+                        : small_.push(output, bytes, t.latched, WriteQueue::kQueueMax);
   }
 
   void flush() override {
@@ -340,7 +260,7 @@ class Ros2Transport : public Transport {
       transport.small_.push(output,
                             std::make_shared<const std::vector<std::byte>>(std::move(reply)),
                             false,
-                            kQueueMax);
+                            WriteQueue::kQueueMax);
       transport.small_.wake();
     }
     Ros2Transport& transport;

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "pointflight/core/constants.hpp"
+#include "pointflight/core/input_error.hpp"
 
 namespace pointflight {
 namespace {
@@ -103,6 +104,21 @@ std::vector<std::string> import_warnings(const ImportReport& report,
     if (!level.empty()) warnings.push_back(level);
   }
   return warnings;
+}
+
+void check_options(const ImportOptions& options) {
+  const auto check = [](bool fine, const char* what) {
+    if (!fine) throw InputError(fmt::format("import: {}", what));
+  };
+  check(!options.resolution || (*options.resolution > 0.0 && std::isfinite(*options.resolution)),
+        "the resolution has to be a number of metres above 0");
+  check(options.scale > 0.0 && std::isfinite(options.scale), "the scale has to be above 0");
+  check(options.shift.allFinite(), "the shift has to be finite");
+  check(options.up == 'z' || options.up == 'y', "up is 'y' or 'z'");
+  check(!options.tau || (*options.tau >= 0.01f && *options.tau <= 1.0f),
+        "tau has to lie between 0.01 and 1");
+  check(options.outliers.neighbours > 0 && options.outliers.sigmas >= 0.0,
+        "outliers want a neighbour or more, and deviations of 0 or more");
 }
 
 }  // namespace pointflight

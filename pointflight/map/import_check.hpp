@@ -17,4 +17,7 @@ std::vector<std::string> import_warnings(const ImportReport& report,
 /// The same for the floor alone; empty where it is level or there is none.
 std::string floor_warning(const FloorPlane& floor);
 
+/// Throws InputError where an option is none: what the command line cannot give, a program may.
+void check_options(const ImportOptions& options);
+
 }  // namespace pointflight

@@ -6,14 +6,13 @@
 #include <cmath>
 #include <filesystem>
 #include <mutex>
-#include <nlohmann/json.hpp>
 #include <span>
 
 #include "pointflight/core/argument.hpp"
 #include "pointflight/core/input_error.hpp"
-#include "pointflight/core/version.hpp"
 #include "pointflight/io/read_ahead.hpp"
 #include "pointflight/map/import_check.hpp"
+#include "pointflight/map/import_metadata.hpp"
 #include "pointflight/map/noise_projection.hpp"
 #include "pointflight/map/spacing.hpp"
 #include "pointflight/map/sparse_growth.hpp"
@@ -38,22 +37,6 @@ double tau_for(double points_per_cell) {
     return std::clamp((points_per_cell - from) / (to - from), 0.0, 1.0);
   };
   return 0.23 + 0.13 * share(kThin, kFair) + 0.04 * share(kMany, kDense);
-}
-
-/// What the command line cannot give a library program may.
-void check_options(const ImportOptions& options) {
-  const auto check = [](bool fine, const char* what) {
-    if (!fine) throw InputError(fmt::format("import: {}", what));
-  };
-  check(!options.resolution || (*options.resolution > 0.0 && std::isfinite(*options.resolution)),
-        "the resolution has to be a number of metres above 0");
-  check(options.scale > 0.0 && std::isfinite(options.scale), "the scale has to be above 0");
-  check(options.shift.allFinite(), "the shift has to be finite");
-  check(options.up == 'z' || options.up == 'y', "up is 'y' or 'z'");
-  check(!options.tau || (*options.tau >= 0.01f && *options.tau <= 1.0f),
-        "tau has to lie between 0.01 and 1");
-  check(options.outliers.neighbours > 0 && options.outliers.sigmas >= 0.0,
-        "outliers want a neighbour or more, and deviations of 0 or more");
 }
 
 /// One import: the passes over the points in order.
@@ -359,39 +342,7 @@ class Import {
     d.model.tau = report.tau;
     d.has_intensity = report.has_intensity;
     d.surfel_count = report.surfels;
-    nlohmann::ordered_json json;
-    json["pointflight"] = kVersion;
-    json["sources"] = report.sources;
-    json["scale"] = options_.scale;
-    json["up"] = std::string(1, options_.up);
-    if (!options_.shift.isZero(0.0)) {
-      json["shift"] = {options_.shift.x(), options_.shift.y(), options_.shift.z()};
-    }
-    json["resolution"] = report.resolution;
-    json["resolution_was_chosen"] = report.resolution_was_chosen;
-    json["point_spacing"] = report.spacing;
-    json["supported_resolution"] = report.supported_resolution;
-    json["points_read"] = report.points_read;
-    json["points_not_finite"] = report.points_not_finite;
-    json["points_out_of_reach"] = report.points_out_of_reach;
-    json["cells"] = report.cells;
-    json["outlier_removal"] = {{"enabled", options_.outliers.enabled},
-                               {"neighbours", options_.outliers.neighbours},
-                               {"sigmas", options_.outliers.sigmas},
-                               {"cells_dropped", report.outlier_cells},
-                               {"points_dropped", report.outlier_points}};
-    json["noise"] = report.noise;
-    json["projection"] = {{"kept", report.projection.kept},
-                          {"projected", report.projection.projected},
-                          {"too_thick", report.projection.too_thick}};
-    json["surfels"] = report.surfels;
-    json["planar_surfels"] = report.planar_surfels;
-    json["points_per_planar_cell"] = report.points_per_cell;
-    json["tau"] = static_cast<double>(report.tau);
-    json["grown_surfels"] = report.grown_surfels;
-    json["has_intensity"] = report.has_intensity;
-    if (report.intensity_from_colors) json["intensity"] = "luminance of the colours";
-    d.metadata = json.dump(1, ' ', false, nlohmann::json::error_handler_t::replace);
+    d.metadata = import_metadata(report, options_);
   }
 
   const std::vector<std::string>& names_;

@@ -15,7 +15,7 @@
 ///               section, in its last 8 bytes the XXH3-64 of all before them
 ///   ...         section: nodes      Bvh8Node[]
 ///   ...         section: words      u64[]: leaf headers and surfel words, 8 words of padding
-///   ...         section: intensity  u8[], one a word; optional
+///   ...         section: intensity  u8[], one per word; optional
 ///   ...         section: metadata   JSON: how the map was made, from what, with which version;
 ///   optional
 ///   ...         any others, which readers that do not know them leave alone
