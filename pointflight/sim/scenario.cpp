@@ -91,7 +91,7 @@ void describe_equipment(SettingsVisitor& v, VehicleSetup& s) {
   });
   v.only_if(
       !sensor_kinds().rows().empty(), "kinds that a program has added", [&](SettingsVisitor& w) {
-        w.list({"sensors", "", "what else it measures with"},
+        w.list({"sensors", "", "what else it measures with: kinds that a program has added"},
                s.sensors,
                [](SettingsVisitor& x, SensorSetup& sensor) { describe(x, sensor); });
       });

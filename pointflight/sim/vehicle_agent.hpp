@@ -80,8 +80,10 @@ struct VehicleStatus {
   VehicleSummary summary;              ///< What happened so far.
 };
 
-/// The order of a vehicle's samples at one instant.
+/// The order of a vehicle's samples at one instant: what happened first.
+///@{
 inline constexpr std::size_t kCollisionRank = 0, kEventRank = 1, kStateRank = 2;
+///@}
 inline constexpr std::size_t kSensorRank = 3;  ///< Of the first sensor; the others follow.
 
 /// What one vehicle says within a step.

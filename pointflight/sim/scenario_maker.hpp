@@ -1,0 +1,31 @@
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "pointflight/core/parallel.hpp"
+#include "pointflight/sim/scenario.hpp"
+
+namespace pointflight {
+
+/// What a scenario is made up from.
+struct ScenarioWish {
+  std::string map_path;  ///< Is opened.
+  std::string map_key;   ///< What the scenario says.
+  std::string lidar = "mid360";
+  std::string vehicle = "quad_330";
+  double length = 60.0;           ///< Of the mission, where the map allows, m.
+  double speed = 2.0;             ///< m/s
+  std::optional<Vector3d> start;  ///< World, m; else a free place.
+  std::optional<Aabb> bounds;     ///< World, m: start and waypoints lie inside.
+  bool mission = true;            ///< Else nothing is looked for where there is a start.
+};
+
+/// A scenario for a map: a free start, waypoints and a heading along the first leg. Throws
+/// InputError where no free place is found.
+Scenario make_scenario(const ScenarioWish& wish, const Executor& executor);
+
+/// "1.0, 2.0, 3.0 and 4.0, 5.0, 6.0": the corners of a box, for messages.
+std::string box_text(const Aabb& box);
+
+}  // namespace pointflight
