@@ -277,11 +277,12 @@ int fly(const FlyFlags& flags) {
   if (ros) loop.add(*ros);
   const RunEnd end = loop.run();
   end_progress();
-  if (!loop.has_started()) return kInterrupted;
-  say_recordings(flags.ros);
+  const bool failed = ros && has_failed_recording(*ros);
+  if (!loop.has_started()) return failed ? kWrongInput : kInterrupted;
+  if (ros) say_recordings(flags.ros, *ros);
   say_waits(loop, flags.ros);
   print_result(flags, simulation, loop.wall_time());
-  return ros && ros->has_failed_recording() ? kWrongInput : exit_code_of(end);
+  return failed ? kWrongInput : exit_code_of(end);
 }
 
 }  // namespace

@@ -23,8 +23,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Some ROS programs misread times near zero: runs start here unless told otherwise.
-constexpr Duration kFixedEpoch = std::chrono::seconds(1'700'000'000);
 constexpr double kEndless = 1e6;  // s
 
 /// Of a flag or a scenario's key: "now", or seconds since 1970.
@@ -177,25 +175,33 @@ std::unique_ptr<RosLink> make_ros_link(const RosFlags& flags, const Simulation& 
   const RunDescription run = describe_run(simulation);
   auto link = std::make_unique<RosLink>(run, profile, std::move(options));
   for (const std::string& path : flags.records) {
-    link->add(open_recording(flags, path, scenario, epoch));
+    link->add_recording(open_recording(flags, path, scenario, epoch));
   }
   TransportOptions transport;
   transport.node = flags.node;
   transport.log = [](const std::string& text) { log(text); };
   transport.localhost_only = flags.localhost;
   if (flags.ros2) transport.large_rate = large_rate(run, profile);
-  if (flags.ros1) link->add(ros1_module().transport(transport));
-  if (flags.ros2) link->add(ros2_module().transport(transport));
+  if (flags.ros1) link->add_transport(ros1_module().transport(transport));
+  if (flags.ros2) link->add_transport(ros2_module().transport(transport));
   return link;
 }
 
-void say_recordings(const RosFlags& flags) {
-  for (const std::string& path : flags.records) {
+void say_recordings(const RosFlags& flags, const RosLink& link) {
+  for (std::size_t i = 0; i < flags.records.size(); ++i) {
     std::error_code error;
+    const std::string& path = flags.records[i];
     const auto size = fs::file_size(path, error);
-    if (error) continue;  // it has failed, and was said
+    if (error || link.has_failed(i)) continue;  // it was said
     log(fmt::format("recorded {}, {:.1f} MB", path, 1e-6 * static_cast<double>(size)));
   }
+}
+
+bool has_failed_recording(const RosLink& link) {
+  for (std::size_t i = 0; i < link.recordings(); ++i) {
+    if (link.has_failed(i)) return true;
+  }
+  return false;
 }
 
 }  // namespace pointflight::apps

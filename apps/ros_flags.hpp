@@ -45,6 +45,9 @@ void prepare_for_ros(const RosFlags& flags, double rate, Scenario& scenario);
 std::unique_ptr<RosLink> make_ros_link(const RosFlags& flags, const Simulation& simulation);
 
 /// Says which recordings were made and how large they are.
-void say_recordings(const RosFlags& flags);
+void say_recordings(const RosFlags& flags, const RosLink& link);
+
+/// True where some recording could not be written to its end; it was said.
+bool has_failed_recording(const RosLink& link);
 
 }  // namespace pointflight::apps

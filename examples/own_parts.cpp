@@ -144,7 +144,8 @@ int main() try {
   output_types().add({.name = "pressure",
                       .help = "what the barometer says",
                       .make = per_sample<pressure_message>(),
-                      .frame = OutputType::Frame::kBody});
+                      .frame = OutputType::Frame::kBody,
+                      .sensor = "barometer"});
   const Scenario scenario = parse_scenario(R"(
 map: room.pfmap
 vehicle: {start: [2, 3, 1.5], controller: careful}
@@ -161,8 +162,8 @@ ros: {outputs: [{kind: pressure, topic: "/{vehicle}/pressure"}]}
   loop.add(printer);
   RosLink ros(describe_run(simulation), profile_for(scenario), {});
   std::filesystem::remove("own_parts.mcap");
-  ros.add(std::make_unique<Recording>("own_parts.mcap",
-                                      std::make_unique<McapWriter>("own_parts.mcap")));
+  ros.add_recording(std::make_unique<Recording>("own_parts.mcap",
+                                                std::make_unique<McapWriter>("own_parts.mcap")));
   loop.add(ros);
   return loop.run() == RunEnd::kCompleted ? 0 : 1;
 } catch (const std::exception& error) {

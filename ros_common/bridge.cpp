@@ -14,9 +14,7 @@ constexpr Duration kLookPeriod = std::chrono::milliseconds(50);
 RosBridge::RosBridge(RunDescription run, const RosProfile& profile, Duration epoch)
     : ros_{.run = std::move(run), .profile = profile, .epoch = epoch},
       next_look_(SimTime{} + kLookPeriod) {
-  for (const VehicleDescription& vehicle : ros_.run.vehicles) {
-    ros_.status.push_back(vehicle.at_start);
-  }
+  note_start();
   streams_ = output_streams(ros_);
   ros_.streams = &streams_;
 }
@@ -80,7 +78,15 @@ void RosBridge::resend_scans() {
   for (OutputStream& stream : streams_) stream.resend(kCalls);
 }
 
+void RosBridge::note_start() {
+  ros_.status.clear();
+  for (const VehicleDescription& vehicle : ros_.run.vehicles) {
+    ros_.status.push_back(vehicle.at_start);
+  }
+}
+
 void RosBridge::shift_epoch(Duration by) {
+  note_start();
   ros_.epoch += by;
   ros_.latest = SimTime{};
   next_look_ = SimTime{} + kLookPeriod;

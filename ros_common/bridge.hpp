@@ -50,6 +50,7 @@ class RosBridge : public SampleSink {
   [[nodiscard]] bool has_scan_readers() const;
 
  private:
+  void note_start();
   void send_obstacles();
 
   RosRun ros_;

@@ -28,6 +28,7 @@ std::string pattern_of(const RosRun& ros, Frame frame, bool camera) {
     case Frame::kWorld:
       return ros.profile.world_frame;
     case Frame::kBody:
+    case Frame::kImu:
       return ros.profile.body_frame;
     case Frame::kSensor:
       return ros.profile.sensor_frame;
@@ -241,7 +242,7 @@ double odometry_rate(const RosProfile& profile) {
   double rate = 0.0;
   for (const RosOutput& output : profile.outputs) {
     const OutputType* type = output_types().find(output.kind);
-    if (type != nullptr && type->make.of_odometry) rate = std::max(rate, output.rate);
+    if (type != nullptr && type->sets_odometry_rate) rate = std::max(rate, output.rate);
   }
   return rate;
 }

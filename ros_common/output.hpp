@@ -31,15 +31,15 @@ struct OutputMaker {
   MessageType (*type)() = nullptr;  ///< In both ROSes.
   /// The stream outlives what makes its messages.
   std::unique_ptr<Output> (*make)(OutputStream& stream) = nullptr;
-  bool of_odometry = false;  ///< Its rate asks for odometry samples at that rate.
 };
 
 /// A row of the table of kinds.
 struct OutputType {
   /// One message stream for the run, each vehicle or each LiDAR.
   enum class Per { kRun, kVehicle, kLidar };
-  /// A frame of the profile.
-  enum class Frame { kWorld, kBody, kSensor, kOptical };
+  /// A frame of the profile; an IMU's is the body's unless the profile names one, which is then
+  /// among the static transforms.
+  enum class Frame { kWorld, kBody, kImu, kSensor, kOptical };
   /// Which sensors a stream of a LiDAR is for.
   enum class Cameras {
     kNot,     ///< The first that is no camera; all where the topic names the LiDAR.
@@ -53,12 +53,14 @@ struct OutputType {
   Frame frame = Frame::kWorld;      ///< header.frame_id where the profile names none.
   Frame child = Frame::kBody;       ///< child_frame_id where the profile names none.
   Cameras cameras = Cameras::kNot;  ///< Of a LiDAR's.
+  bool sets_odometry_rate = false;  ///< Odometry is sampled at its rate at least.
   bool has_child = false;           ///< Profiles may name its child_frame.
   bool is_transform = false;        ///< Names its frames: all vehicles may share a topic.
   bool latched = false;             ///< Whoever comes late gets the last message.
   bool large = false;               ///< Paced on ROS 2.
   std::size_t depth = 10;           ///< Messages that a reader's queue should hold.
-  std::string layout = "xyzi";      ///< Of clouds where the profile names none.
+  std::string sensor = {};  ///< Of measurements: the kind of sensor (`sensor_kinds`); empty: any.
+  std::string layout = "xyzi";  ///< Of clouds where the profile names none.
 };
 
 /// All kinds, in the order in which they are sent at one instant. Programs may add to it before
@@ -119,9 +121,15 @@ class OutputStream {
   [[nodiscard]] msg::Header header(SimTime time) const {
     return header_of(time, ros.epoch, settings.frame);
   }
-  /// True for samples of its vehicle, scans of its LiDAR.
+  /// True for samples of its vehicle, scans of its LiDAR, measurements of its kind of sensor.
   template <class S>
   [[nodiscard]] bool is_about(const S& sample) const {
+    if constexpr (std::is_same_v<S, Measurement>) {
+      if (!type.sensor.empty() &&
+          ros.run.vehicles[sample.vehicle].sensors[sample.sensor] != type.sensor) {
+        return false;
+      }
+    }
     if (type.per == OutputType::Per::kRun) return true;
     if constexpr (requires { sample.scan; }) {
       return sample.scan->vehicle == vehicle &&
@@ -189,9 +197,6 @@ class OutputStream {
 /// Makes the messages of one stream.
 class Output {
  public:
-  /// True for classes whose rate asks for odometry samples at that rate.
-  static constexpr bool kOfOdometry = false;
-
   /// The stream outlives it.
   explicit Output(OutputStream& stream) : stream_(stream) {}
   virtual ~Output() = default;
@@ -231,8 +236,7 @@ OutputMaker made_by() {
         static const MessageType type = message_type<M>();
         return type;
       },
-      [](OutputStream& stream) -> std::unique_ptr<Output> { return std::make_unique<O>(stream); },
-      O::kOfOdometry};
+      [](OutputStream& stream) -> std::unique_ptr<Output> { return std::make_unique<O>(stream); }};
 }
 
 namespace detail {
@@ -251,7 +255,6 @@ class MessagePerSample : public Output {
   using Input = typename MessageFunction<decltype(make)>::Sample;
 
  public:
-  static constexpr bool kOfOdometry = std::is_same_v<Input, OdometrySample>;
   using Output::Output;
 
   void on_sample(const Sample& sample) override {

@@ -26,19 +26,20 @@ RosLink::~RosLink() {
   close_transports();
 }
 
-void RosLink::add(std::unique_ptr<Transport> transport) {
+void RosLink::add_transport(std::unique_ptr<Transport> transport) {
   bridge_.add(*transport);
   inbox_.connect(*transport);
   transports_.push_back(std::move(transport));
 }
 
-void RosLink::add(std::unique_ptr<Outlet> recording) {
+void RosLink::add_recording(std::unique_ptr<Outlet> recording) {
   bridge_.add(*recording);
   recordings_.push_back({std::move(recording), false});
 }
 
 void RosLink::open(const RunDescription& /*run*/) {
   bridge_.start();
+  say_failed_recordings();  // of what is latched
 }
 
 bool RosLink::has_planner() const {
@@ -55,6 +56,7 @@ bool RosLink::is_ready() {
     return false;
   }
   if (!options_.lockstep || transports_.empty() || settled_ >= kSettledLooks) return true;
+  awaits_planner_ = true;
   settled_ = has_planner() ? settled_ + 1 : 0;
   if (settled_ == 0 && !std::exchange(said_waiting_, true)) {
     options_.log("lockstep: waiting for somebody who reads scans and sends commands");
@@ -75,7 +77,7 @@ void RosLink::on_step(const StepDone& step) {
 
 void RosLink::on_wait(SimTime now, Waiting why) {
   if (why == Waiting::kForAnswer) return bridge_.resend_scans();
-  if (why == Waiting::kForLinks && !options_.lockstep) return;
+  if (why == Waiting::kForLinks && !awaits_planner_) return;
   bridge_.on_wait(now);
 }
 
@@ -102,6 +104,10 @@ void RosLink::say_failed_recordings() {
     if (why.empty() || std::exchange(recording.told, true)) continue;
     options_.log(fmt::format("warning: the recording ends here: {}", why));
   }
+  in_use_ = !transports_.empty() ||
+            std::any_of(recordings_.begin(), recordings_.end(), [](const StoredOutlet& recording) {
+              return !recording.told;
+            });
 }
 
 void RosLink::on_reset(SimTime reached) {
@@ -138,17 +144,8 @@ bool RosLink::is_over() const {
   });
 }
 
-bool RosLink::is_in_use() const {
-  return !transports_.empty() ||
-         std::any_of(recordings_.begin(), recordings_.end(), [](const StoredOutlet& recording) {
-           return recording.outlet->failure().empty();
-         });
-}
-
-bool RosLink::has_failed_recording() const {
-  return std::any_of(recordings_.begin(), recordings_.end(), [](const StoredOutlet& recording) {
-    return !recording.outlet->failure().empty();
-  });
+bool RosLink::has_failed(std::size_t recording) const {
+  return !recordings_[recording].outlet->failure().empty();
 }
 
 std::uint64_t RosLink::dropped() const {

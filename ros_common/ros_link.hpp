@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <functional>
 #include <memory>
 #include <string>
@@ -12,11 +13,15 @@
 
 namespace pointflight {
 
+/// What stamps count from where nothing else is asked for: some ROS programs misread times near
+/// zero.
+inline constexpr Duration kFixedEpoch = std::chrono::seconds(1'700'000'000);
+
 /// How ROS takes part in a run.
 struct RosLinkOptions {
-  Duration epoch{0};      ///< Since the Unix epoch: what stamps count from.
-  bool waits = true;      ///< The run starts when all transports have found their ROS...
-  bool lockstep = false;  ///< ...and somebody reads scans and sends commands.
+  Duration epoch = kFixedEpoch;  ///< Since the Unix epoch: what stamps count from.
+  bool waits = true;             ///< The run starts when all transports have found their ROS...
+  bool lockstep = false;         ///< ...and somebody reads scans and sends commands.
   std::function<void(const std::string& line)> log;  ///< Lines for users.
   /// A transport could not be ended (`Transport::has_ended`).
   std::function<void()> on_left_behind;
@@ -31,9 +36,9 @@ class RosLink : public Link {
   ~RosLink() override;
 
   /// Before `open`: a ROS that is published to and listened to.
-  void add(std::unique_ptr<Transport> transport);
+  void add_transport(std::unique_ptr<Transport> transport);
   /// Before `open`: a recording.
-  void add(std::unique_ptr<Outlet> recording);
+  void add_recording(std::unique_ptr<Outlet> recording);
 
   void open(const RunDescription& run) override;
   bool is_ready() override;
@@ -44,11 +49,14 @@ class RosLink : public Link {
   void on_reset(SimTime reached) override;
   void close() override;
   [[nodiscard]] bool is_over() const override;
-  [[nodiscard]] bool is_in_use() const override;
+  [[nodiscard]] bool is_in_use() const override { return in_use_; }
   [[nodiscard]] std::uint64_t dropped() const override;
 
-  /// True where some recording could not be written to its end; it was said.
-  [[nodiscard]] bool has_failed_recording() const;
+  /// How many recordings it has.
+  [[nodiscard]] std::size_t recordings() const { return recordings_.size(); }
+  /// True where a recording, counted as they were added, could not be written to its end; it was
+  /// said.
+  [[nodiscard]] bool has_failed(std::size_t recording) const;
 
  private:
   struct StoredOutlet {
@@ -67,6 +75,8 @@ class RosLink : public Link {
   RosBridge bridge_;
   int settled_ = 0;  ///< Looks since a planner is there.
   bool said_waiting_ = false;
+  bool awaits_planner_ = false;      ///< In lockstep; all transports have found their ROS.
+  std::atomic<bool> in_use_ = true;  ///< Asked from any thread.
   std::uint64_t told_refused_ = 0;
 };
 

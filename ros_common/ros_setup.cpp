@@ -21,10 +21,10 @@ ScenarioSection section() {
           .settings = RosSetup{},
           .example = example,
           .describe = [](SettingsVisitor& v,
-                         std::any& settings) { describe(v, *std::any_cast<RosSetup>(&settings)); },
+                         std::any& settings) { describe(v, std::any_cast<RosSetup&>(settings)); },
           .models =
               [](std::any& settings) {
-                return std::vector<std::string*>{&std::any_cast<RosSetup>(&settings)->profile};
+                return std::vector<std::string*>{&std::any_cast<RosSetup&>(settings).profile};
               }};
 }
 
@@ -33,10 +33,15 @@ ScenarioSection section() {
 
 }  // namespace
 
+RosSetup& ros_setup_of(Scenario& scenario) {
+  return std::any_cast<RosSetup&>(scenario.sections.try_emplace("ros", RosSetup{}).first->second);
+}
+
 const RosSetup& ros_setup_of(const Scenario& scenario) {
   static const RosSetup defaults;
   const auto found = scenario.sections.find("ros");
-  return found == scenario.sections.end() ? defaults : *std::any_cast<RosSetup>(&found->second);
+  return found == scenario.sections.end() ? defaults
+                                          : std::any_cast<const RosSetup&>(found->second);
 }
 
 void describe(SettingsVisitor& v, RosOutput& s) {
@@ -45,11 +50,11 @@ void describe(SettingsVisitor& v, RosOutput& s) {
   v.value({"frame", "", "header.frame_id; empty: the profile's for its kind"}, s.frame);
   const OutputType* type = output_types().find(s.kind);
   v.only_if(
-      type != nullptr && type->has_child, "kind: odometry, tf, tf_scan", [&](SettingsVisitor& w) {
+      type == nullptr || type->has_child, "kind: odometry, tf, tf_scan", [&](SettingsVisitor& w) {
         w.value({"child_frame", "", "what is posed; '-': none"}, s.child_frame);
       });
   v.value({"rate", "Hz", "at most; 0: each sample; -1: as the profile has it", -1, 10000}, s.rate);
-  const bool has_points = type != nullptr && type->make.type().name == "PointCloud2";
+  const bool has_points = type == nullptr || type->make.type().name == "PointCloud2";
   v.only_if(has_points, "a kind of cloud, or map", [&](SettingsVisitor& w) {
     w.value({"layout", "", "livox, livox_custom, velodyne, ouster, xyzi, ..."}, s.layout);
   });

@@ -56,5 +56,7 @@ void describe(SettingsVisitor& visitor, RosSetup& setup);
 
 /// What a scenario says of ROS; the defaults where it says nothing.
 const RosSetup& ros_setup_of(const Scenario& scenario);
+/// The same, to be changed by a program.
+RosSetup& ros_setup_of(Scenario& scenario);
 
 }  // namespace pointflight

@@ -103,7 +103,7 @@ class StaticTransforms : public Output {
   }
   /// An IMU with a frame of its own.
   void add_own_frame(const OutputStream& other, msg::TFMessage& message) const {
-    if (other.type.frame != OutputType::Frame::kBody) return;
+    if (other.type.frame != OutputType::Frame::kImu) return;
     const std::string body = stream_.ros.body_frame(other.vehicle);
     if (other.settings.frame == body) return;
     const ImuSettings& imu = other.of_vehicle().settings.imu;
@@ -121,13 +121,12 @@ class Diagnostics : public Output {
     if (!stream_.is_due(time)) return;
     msg::DiagnosticArray message;
     message.header = header_of(time, stream_.ros.epoch, "");
-    for (const StatusSample& status : stream_.ros.status)
-      message.status.push_back(of(status, time));
+    for (const StatusSample& status : stream_.ros.status) message.status.push_back(of(status));
     stream_.send(std::move(message), time);
   }
 
  private:
-  [[nodiscard]] msg::DiagnosticStatus of(const StatusSample& s, SimTime time) const {
+  [[nodiscard]] msg::DiagnosticStatus of(const StatusSample& s) const {
     const VehicleSetup& setup = stream_.ros.run.vehicles[s.vehicle].setup;
     msg::DiagnosticStatus status;
     status.name = "pointflight: " + setup.name;
@@ -143,7 +142,7 @@ class Diagnostics : public Output {
     } else {
       status.message = s.landed ? "on the ground" : s.command;
     }
-    status.values = {{"time", fmt::format("{:.3f}", to_seconds(time))},
+    status.values = {{"time", fmt::format("{:.3f}", to_seconds(s.time))},
                      {"command", s.command},
                      {"armed", s.armed ? "true" : "false"},
                      {"clearance", s.clearance ? fmt::format("{:.2f}", *s.clearance) : ""},

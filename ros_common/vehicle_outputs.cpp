@@ -45,16 +45,9 @@ msg::Float32MultiArray rotor_speeds(const OutputStream& /*stream*/, const Odomet
   return speeds;
 }
 
-msg::PointCloud2 touched_message(const OutputStream& stream, const OdometrySample& sample) {
-  const auto points =
-      touched_points(*stream.ros.run.map, stream.of_vehicle().hull, sample.state.T_world_body());
-  return points_message(stream, points, sample.time);
-}
-
 /// The vehicle in the world; also for those who come while the run waits.
 class Transform : public Output {
  public:
-  static constexpr bool kOfOdometry = true;
   using Output::Output;
   void on_sample(const Sample& sample) override {
     const auto* odometry = std::get_if<OdometrySample>(&sample);
@@ -99,13 +92,26 @@ class VehicleCloud : public Output {
   }
 };
 
+/// Points of the map that the hull touches.
+class TouchedPoints : public Output {
+ public:
+  using Output::Output;
+  void on_sample(const Sample& sample) override {
+    const auto* odometry = std::get_if<OdometrySample>(&sample);
+    if (odometry == nullptr || !stream_.is_about(*odometry)) return;
+    if (!stream_.is_due(odometry->delivered)) return;
+    const auto points = touched_points(
+        *stream_.ros.run.map, stream_.of_vehicle().hull, odometry->state.T_world_body());
+    stream_.send(points_message(stream_, points, odometry->time), odometry->time);
+  }
+};
+
 using Poses = std::vector<msg::PoseStamped>;
 
 /// Where it flew, by `message(stream, sample, poses)`; a long path is thinned and stays small.
 template <auto message>
 class FlownPath : public Output {
  public:
-  static constexpr bool kOfOdometry = true;
   using Output::Output;
   void on_sample(const Sample& sample) override {
     const auto* odometry = std::get_if<OdometrySample>(&sample);
@@ -202,20 +208,25 @@ std::vector<OutputType> vehicle_outputs() {
       {.name = "imu",
        .help = "gyroscope and accelerometer, true attitude",
        .make = per_sample<imu_message>(),
-       .frame = OutputType::Frame::kBody,
+       .frame = OutputType::Frame::kImu,
        .depth = kImuDepth},
       {.name = "tf",
        .help = "the vehicle in the world",
        .make = made_by<Transform, msg::TFMessage>(),
+       .sets_odometry_rate = true,
        .has_child = true,
        .is_transform = true,
        .depth = 100},
       {.name = "odometry",
        .help = "true pose and velocities",
        .make = per_sample<odometry_message>(),
+       .sets_odometry_rate = true,
        .has_child = true,
        .depth = 100},
-      {.name = "pose", .help = "true pose", .make = per_sample<pose_message>()},
+      {.name = "pose",
+       .help = "true pose",
+       .make = per_sample<pose_message>(),
+       .sets_odometry_rate = true},
       {.name = "camera_pose",
        .help = "true pose with optical axes",
        .make = per_sample<camera_pose_message>()},
@@ -238,7 +249,7 @@ std::vector<OutputType> vehicle_outputs() {
        .depth = 5},
       {.name = "collision_cloud",
        .help = "points of the map that the vehicle's hull touches",
-       .make = per_sample<touched_message>()},
+       .make = made_by<TouchedPoints, msg::PointCloud2>()},
   };
 }
 

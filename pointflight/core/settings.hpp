@@ -103,8 +103,9 @@ class SettingsVisitor {
     value = name == none ? std::nullopt : std::optional<Choice<Row>>(name);
   }
 
-  /// A key that others read: whatever the file has there is no mistake.
-  virtual void leave_out(std::string_view /*name*/) {}
+  /// A key that other programs read: whatever the file has there is no mistake, and is kept as
+  /// YAML.
+  virtual void leave_as_is(std::string_view /*name*/, std::string& /*yaml*/) {}
 
   /// Calls `describe_items(visitor, section)` one level down.
   template <class Describe>
@@ -178,7 +179,7 @@ class SettingsReader : public SettingsVisitor {
   /// "lidars[0].model"; for messages about values that only make sense together.
   [[nodiscard]] const std::map<std::string, int>& lines() const { return lines_; }
 
-  void leave_out(std::string_view name) override;
+  void leave_as_is(std::string_view name, std::string& yaml) override;
   void value(const Key& key, double& value) override;
   void value(const Key& key, std::int64_t& value) override;
   void value(const Key& key, bool& value) override;
@@ -252,6 +253,7 @@ class SettingsWriter : public SettingsVisitor {
   /// The file so far.
   [[nodiscard]] const std::string& text() const { return text_; }
 
+  void leave_as_is(std::string_view name, std::string& yaml) override;
   void value(const Key& key, double& value) override;
   void value(const Key& key, std::int64_t& value) override;
   void value(const Key& key, bool& value) override;

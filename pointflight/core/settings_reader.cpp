@@ -197,8 +197,12 @@ bool SettingsReader::has(std::string_view name) const {
   return parent[std::string(name)].IsDefined();
 }
 
-void SettingsReader::leave_out(std::string_view name) {
-  document_->levels.back().asked.emplace(name);
+void SettingsReader::leave_as_is(std::string_view name, std::string& yaml) {
+  const auto node = document_->find({name, "", ""});
+  if (!node) return;
+  YAML::Node alone;
+  alone[std::string(name)] = *node;
+  yaml = YAML::Dump(alone);
 }
 
 void SettingsReader::finish() {

@@ -93,6 +93,10 @@ void SettingsWriter::choice(const Key& key,
   line(key, value, fmt::format(" ({})", fmt::join(choices, ", ")));
 }
 
+void SettingsWriter::leave_as_is(std::string_view /*name*/, std::string& yaml) {
+  if (!yaml.empty()) text_ += "\n" + yaml + "\n";
+}
+
 bool SettingsWriter::enter_condition(bool holds, std::string_view /*condition*/) {
   return holds;
 }

@@ -19,6 +19,9 @@ class CsvTable {
   /// Without the line of names and comments.
   [[nodiscard]] std::size_t rows() const { return rows_; }
 
+  /// Of each row.
+  [[nodiscard]] std::size_t columns() const { return names_.size(); }
+
   /// Index of the column of that name, else of the first whose name starts with it (lower case), or
   /// -1.
   [[nodiscard]] int find(std::string_view prefix) const;

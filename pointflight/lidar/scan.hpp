@@ -15,11 +15,11 @@ namespace pointflight {
 /// One measured point.
 struct ScanPoint {
   Vector3f position_sensor;  ///< In the sensor frame at the point's own firing time, m.
-  float range;               ///< Measured, noise included, m.
-  float intensity;           ///< Of the map, in its cloud's scale; 0 where it had none.
-  Duration time_offset;      ///< After the scan's start.
-  std::uint16_t ring;        ///< As the maker's driver numbers it.
-  std::uint32_t beam;        ///< Index of the beam in the scan's pattern.
+  float range = 0.0f;        ///< Measured, noise included, m.
+  float intensity = 0.0f;    ///< Of the map, in its cloud's scale; 0 where it had none.
+  Duration time_offset{0};   ///< After the scan's start.
+  std::uint16_t ring = 0;    ///< As the maker's driver numbers it.
+  std::uint32_t beam = 0;    ///< Index of the beam in the scan's pattern.
   Label label = kMapLabel;   ///< What it is of: the map, a vehicle, an obstacle.
 };
 

@@ -74,7 +74,10 @@ Layout lay_out(const Bvh8& tree, const MapDescription& d) {
   add("intensity", std::as_bytes(tree.intensity.span()));
   add("metadata", std::as_bytes(std::span<const char>(d.metadata.data(), d.metadata.size())));
   for (const ExtraSection& extra : d.extra) {
-    require_argument(!is_known(extra.name), "write_map: an extra section with the name of another");
+    const auto same = [&](const ExtraSection& e) { return e.name == extra.name; };
+    require_argument(
+        !is_known(extra.name) && std::count_if(d.extra.begin(), d.extra.end(), same) == 1,
+        "write_map: an extra section with the name of another");
     add(extra.name, extra.bytes);
   }
   require_argument(table.size() <= kMapSectionsMax, "write_map: too many sections");

@@ -83,7 +83,7 @@ struct MapDescription {
   float intensity_step = 0.0f;               ///< From one byte's value to the next.
   std::uint64_t surfel_count = 0;            ///< For `map info`.
   std::string metadata;                      ///< JSON.
-  std::vector<ExtraSection> extra;           ///< Further sections, such as labels.
+  std::vector<ExtraSection> extra;           ///< Further sections; edits drop them.
 };
 
 /// Writes and commits a map: it appears under its name only when complete. Throws InputError.

@@ -14,6 +14,7 @@
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/geometry/rotation.hpp"
 #include "pointflight/io/csv_table.hpp"
+#include "pointflight/run/run_files.hpp"
 #include "pointflight/run/run_loop.hpp"
 
 namespace pointflight {
@@ -21,75 +22,20 @@ namespace {
 
 namespace fs = std::filesystem;
 
-SimTime time_at(const CsvTable& table, std::size_t row, int column) {
-  return SimTime(from_seconds(table.at(row, column)));
-}
-
-Vector3d vector_at(const CsvTable& table, std::size_t row, int column) {
-  return {table.at(row, column), table.at(row, column + 1), table.at(row, column + 2)};
-}
-
-/// w, x, y, z from a column on.
-Quaterniond rotation_at(const CsvTable& table, std::size_t row, int column) {
-  return {table.at(row, column),
-          table.at(row, column + 1),
-          table.at(row, column + 2),
-          table.at(row, column + 3)};
-}
-
-/// px ... wz from a column on.
-RigidBodyState body_at(const CsvTable& table, std::size_t row, int column) {
-  RigidBodyState body;
-  body.p_world = vector_at(table, row, column);
-  body.q_world_body = rotation_at(table, row, column + 3);
-  body.v_world = vector_at(table, row, column + 7);
-  body.omega_body = vector_at(table, row, column + 10);
-  return body;
-}
-
-/// Lines of a file as words between commas, without the first line.
-std::vector<std::vector<std::string>> words_of(const std::string& path) {
-  std::ifstream file(path);
-  std::vector<std::vector<std::string>> rows;
-  std::string line;
-  for (std::getline(file, line); std::getline(file, line);) {
-    std::vector<std::string>& words = rows.emplace_back(1);
-    for (const char c : line) {
-      if (c == ',') {
-        words.emplace_back();
-      } else {
-        words.back() += c;
-      }
-    }
-  }
-  return rows;
-}
-
-/// What summary.json says.
-SimTime ended_at(const fs::path& path) {
-  std::ifstream file(path);
-  const auto json = nlohmann::json::parse(file, nullptr, false);
-  if (!json.is_object() || !json.contains("simulated_time") ||
-      !json["simulated_time"].is_number()) {
-    throw InputError(fmt::format("{}: is missing or no summary of a run", path.string()));
-  }
-  return SimTime(from_seconds(json["simulated_time"].get<double>()));
-}
-
-double number(const std::string& word) {
-  return word.empty() ? 0.0 : std::strtod(word.c_str(), nullptr);
-}
+constexpr std::size_t kStateColumns = 19;  // of trajectory.csv, before the rotors
 
 }  // namespace
 
 struct RecordedRun::Files {
+  /// What comes after what in a step.
+  enum class Phase { kSamples, kObstacles, kArrears };
   /// One sample of the run, made when its turn comes.
   struct Entry {
-    std::int64_t step;    ///< That it came in.
-    int phase;            ///< 0: vehicles' samples; 1: obstacles; 2: scans.
-    SimTime time;         ///< When it arrived.
-    std::size_t rank;     ///< Among those of one instant.
-    std::size_t vehicle;  ///< Number in the fleet.
+    std::int64_t step;   ///< That it came in.
+    Phase phase;         ///< Within the step.
+    SimTime time;        ///< When it arrived.
+    std::size_t first;   ///< Of one instant: the rank; of measurements in arrears: the vehicle.
+    std::size_t second;  ///< The other of the two.
     std::function<Sample()> make;
   };
 
@@ -105,30 +51,41 @@ struct RecordedRun::Files {
       add_vehicle(v, simulation.vehicle_count() == 1 ? fs::path(folder) : own);
     }
     add_events((fs::path(folder) / "events.csv").string());
-    const fs::path obstacles = fs::path(folder) / "obstacles.csv";
-    if (fs::exists(obstacles)) add_obstacles(obstacles.string());
+    add_obstacles((fs::path(folder) / "obstacles.csv").string());
+    // nothing of a run is silent for long: its truth comes at trajectory_rate
+    SimTime last;
+    for (const Entry& entry : entries) last = std::max(last, entry.time);
+    if (to_seconds(end - last) > 1.0 + 2.0 / scenario.output.trajectory_rate) {
+      throw InputError(fmt::format("{}: the run ended at {:.1f} s, its files at {:.1f} s",
+                                   folder,
+                                   to_seconds(end),
+                                   to_seconds(last)));
+    }
     std::stable_sort(entries.begin(), entries.end(), [](const Entry& a, const Entry& b) {
-      return std::tie(a.step, a.phase, a.time, a.rank, a.vehicle) <
-             std::tie(b.step, b.phase, b.time, b.rank, b.vehicle);
+      return std::tie(a.step, a.phase, a.time, a.first, a.second) <
+             std::tie(b.step, b.phase, b.time, b.first, b.second);
     });
   }
 
-  /// `early`: it came in the step that its time lies in; else in the first one after.
-  void add(int phase,
+  /// `late`: it came in the first step that starts at its time or after it; else in the step that
+  /// its time lies in.
+  void add(Phase phase,
            SimTime time,
            std::size_t rank,
            std::size_t vehicle,
-           bool early,
+           bool late,
            std::function<Sample()> make) {
     const Duration since = time.time_since_epoch();
-    const std::int64_t number = early ? since / step : (since + step - Duration{1}) / step;
-    entries.push_back({number, phase, time, rank, vehicle, std::move(make)});
+    const std::int64_t number = late ? (since + step - Duration{1}) / step : since / step;
+    const bool arrears = phase == Phase::kArrears;
+    entries.push_back(
+        {number, phase, time, arrears ? vehicle : rank, arrears ? rank : vehicle, std::move(make)});
   }
 
   void add_vehicle(std::size_t v, const fs::path& folder) {
     add_states(v, folder / "trajectory.csv");
-    if (fs::exists(folder / "odometry.csv")) add_odometry(v, folder / "odometry.csv");
-    if (fs::exists(folder / "imu.csv")) add_imu(v, folder / "imu.csv");
+    add_odometry(v, folder / "odometry.csv");
+    add_imu(v, folder / "imu.csv");
     const auto sensors = simulation.vehicle(v).sensors();
     std::map<std::string, int> alike;
     for (std::size_t i = 0; i < sensors.size(); ++i) {
@@ -141,72 +98,107 @@ struct RecordedRun::Files {
     add_scans(v, folder);
   }
 
-  const CsvTable& table(const fs::path& path) { return tables.emplace_back(path.string()); }
+  /// Null where the run wrote no such file, or nothing but its columns' names.
+  const CsvTable* table(const fs::path& path, std::size_t columns) {
+    if (!fs::exists(path) || words_of(path.string()).empty()) return nullptr;
+    const CsvTable& t = tables.emplace_back(path.string());
+    if (t.columns() >= columns) return &t;
+    throw InputError(
+        fmt::format("{}: {} columns where a run writes {}", path.string(), t.columns(), columns));
+  }
 
-  /// Samples of a vehicle, one per row, that came at the time in a column.
+  /// Samples of a vehicle, one per row of a table or none, that came at the time in a column.
   template <class Make>
-  void add_rows(const CsvTable& t, int column, std::size_t rank, std::size_t v, const Make& make) {
-    for (std::size_t row = 0; row < t.rows(); ++row) {
-      add(0, time_at(t, row, column), rank, v, true, [make, row] { return Sample(make(row)); });
+  void add_rows(const CsvTable* t,
+                int column,
+                std::size_t rank,
+                std::size_t v,
+                const Make& make,
+                Phase phase = Phase::kSamples) {
+    for (std::size_t row = 0; t != nullptr && row < t->rows(); ++row) {
+      add(phase, time_at(*t, row, column), rank, v, phase == Phase::kArrears, [make, t, row] {
+        return Sample(make(*t, row));
+      });
     }
   }
 
   void add_states(std::size_t v, const fs::path& path) {
-    const CsvTable& t = table(path);
-    const int clearance = t.require("clearance");
-    const int rotor = t.find("rotor0");
     const std::size_t rotors = simulation.status(v).state.rotors.size();
+    const CsvTable* t = table(path, kStateColumns + rotors);
+    if (t == nullptr) throw InputError(fmt::format("{}: has no states", path.string()));
     std::vector<TimedPose> poses;
-    for (std::size_t row = 0; row < t.rows(); ++row) {
-      const SimTime time = time_at(t, row, 0);
+    for (std::size_t row = 0; row < t->rows(); ++row) {
+      const SimTime time = time_at(*t, row, 0);
       if (!poses.empty() && time <= poses.back().time) {
-        throw InputError(fmt::format("{}: times must ascend", t.place(row)));
+        throw InputError(fmt::format("{}: times must ascend", t->place(row)));
       }
-      poses.push_back({time, body_at(t, row, 1).T_world_body()});
+      poses.push_back({time, body_at(*t, row, 1).T_world_body()});
     }
     tracks.emplace_back(std::move(poses));
-    add_rows(t, 0, kStateRank, v, [&t, v, clearance, rotor, rotors](std::size_t row) {
+    add_rows(t, 0, kStateRank, v, [v, rotors](const CsvTable& table, std::size_t row) {
       StateSample sample;
       sample.vehicle = static_cast<std::uint32_t>(v);
-      sample.time = time_at(t, row, 0);
-      sample.state.body = body_at(t, row, 1);
-      sample.command.p_world = vector_at(t, row, 14);
-      if (const double distance = t.at(row, clearance); !std::isnan(distance)) {
-        sample.nearest = Contact{distance, {}, static_cast<Label>(t.at(row, clearance + 1))};
+      sample.time = time_at(table, row, 0);
+      sample.state.body = body_at(table, row, 1);
+      sample.command.p_world = vector_at(table, row, 14);
+      if (const double distance = table.at(row, 17); !std::isnan(distance)) {
+        sample.nearest = Contact{distance, Vector3d::Zero(), label_at(table, row, 18)};
       }
       sample.state.rotors.resize(rotors);
-      for (std::size_t i = 0; i < rotors && rotor >= 0; ++i) {
-        sample.state.rotors[i].speed = t.at(row, rotor + static_cast<int>(i));
+      for (std::size_t i = 0; i < rotors; ++i) {
+        sample.state.rotors[i].speed = table.at(row, static_cast<int>(kStateColumns + i));
       }
       return sample;
     });
   }
 
   void add_odometry(std::size_t v, const fs::path& path) {
-    const CsvTable& t = table(path);
-    add_rows(t, 1, kSensorRank, v, [&t, v](std::size_t row) {
+    add_rows(table(path, 15), 1, kSensorRank, v, [v](const CsvTable& table, std::size_t row) {
       OdometrySample sample;
       sample.vehicle = static_cast<std::uint32_t>(v);
-      sample.time = time_at(t, row, 0);
-      sample.delivered = time_at(t, row, 1);
-      sample.state = body_at(t, row, 2);
+      sample.time = time_at(table, row, 0);
+      sample.delivered = time_at(table, row, 1);
+      sample.state = body_at(table, row, 2);
       return sample;
     });
   }
 
   void add_imu(std::size_t v, const fs::path& path) {
-    const CsvTable& t = table(path);
     const Vector3d rpy = description.vehicles[v].settings.imu.rotation_rpy_deg * kDegree;
     const Quaterniond q_body_imu = quaternion_from_rpy(rpy.x(), rpy.y(), rpy.z());
-    add_rows(t, 0, kSensorRank + 1, v, [this, &t, v, q_body_imu](std::size_t row) {
+    const auto make = [this, v, q_body_imu](const CsvTable& table, std::size_t row) {
       ImuSample sample;
       sample.vehicle = static_cast<std::uint32_t>(v);
-      sample.time = time_at(t, row, 0);
-      sample.gyro = vector_at(t, row, 1);
-      sample.accel = vector_at(t, row, 4);
+      sample.time = time_at(table, row, 0);
+      sample.gyro = vector_at(table, row, 1);
+      sample.accel = vector_at(table, row, 4);
       sample.q_world_imu = rotation_of(v, sample.time) * q_body_imu;
       return sample;
-    });
+    };
+    add_rows(table(path, 7), 0, kSensorRank + 1, v, make);
+  }
+
+  void add_sensor(std::size_t v, std::size_t number, const fs::path& path) {
+    const MountedSensor& sensor = simulation.vehicle(v).sensors()[number];
+    const std::size_t values = sensor.kind->columns.size();
+    const auto make = [v, number, values](const CsvTable& table, std::size_t row) {
+      Measurement sample;
+      sample.vehicle = static_cast<std::uint32_t>(v);
+      sample.sensor = static_cast<std::uint32_t>(number);
+      sample.time = time_at(table, row, 0);
+      sample.delivered = time_at(table, row, 1);
+      for (std::size_t i = 0; i < values; ++i) {
+        sample.values.push_back(table.at(row, 2 + static_cast<int>(i)));
+      }
+      return sample;
+    };
+    const bool arrears = sensor.interval != nullptr;
+    add_rows(table(path, 2 + values),
+             1,
+             arrears ? number : kSensorRank + number,
+             v,
+             make,
+             arrears ? Phase::kArrears : Phase::kSamples);
   }
 
   /// As it was written, where a state was.
@@ -220,45 +212,31 @@ struct RecordedRun::Files {
     return written ? at->pose.rotation : tracks[v].at(time).rotation;
   }
 
-  void add_sensor(std::size_t v, std::size_t sensor, const fs::path& path) {
-    const CsvTable& t = table(path);
-    const std::size_t values = simulation.vehicle(v).sensors()[sensor].kind->columns.size();
-    add_rows(t, 1, kSensorRank + sensor, v, [&t, v, sensor, values](std::size_t row) {
-      Measurement sample;
-      sample.vehicle = static_cast<std::uint32_t>(v);
-      sample.sensor = static_cast<std::uint32_t>(sensor);
-      sample.time = time_at(t, row, 0);
-      sample.delivered = time_at(t, row, 1);
-      for (std::size_t i = 0; i < values; ++i) {
-        sample.values.push_back(t.at(row, 2 + static_cast<int>(i)));
-      }
-      return sample;
-    });
-  }
-
   void add_scans(std::size_t v, const fs::path& folder) {
-    for (const auto& words : words_of((folder / "scans.csv").string())) {
-      if (words.size() < 14) continue;
+    const VehicleAgent& agent = simulation.vehicle(v);
+    const std::size_t before = agent.sensors().size() - agent.lidars().size();
+    const std::string table = (folder / "scans.csv").string();
+    for (const auto& words : words_of(table)) {
+      if (words.size() < 6) throw InputError(fmt::format("{}: a row is cut off", table));
       Scan scan;
       scan.vehicle = static_cast<std::uint32_t>(v);
-      scan.sensor = static_cast<std::uint32_t>(number(words[1]));
-      scan.index = static_cast<std::uint64_t>(number(words[2]));
-      scan.start = SimTime(from_seconds(number(words[3])));
-      scan.end = SimTime(from_seconds(number(words[4])));
-      scan.beams = static_cast<std::size_t>(number(words[5]));
+      scan.sensor = static_cast<std::uint32_t>(count_in(words[1], table));
+      scan.index = count_in(words[2], table);
+      scan.start = time_in(words[3], table);
+      scan.end = time_in(words[4], table);
+      scan.beams = count_in(words[5], table);
+      if (scan.sensor >= agent.lidars().size()) {
+        throw InputError(fmt::format("{}: the scenario has no lidar {}", table, scan.sensor));
+      }
       const std::string path = (folder / words[0]).string();
-      add(2, scan.end, scan.sensor, v, false, [this, scan, path] {
+      add(Phase::kArrears, scan.end, before + scan.sensor, v, true, [this, scan, path] {
         return with_points(scan, path);
       });
     }
   }
 
   [[nodiscard]] Sample with_points(Scan scan, const std::string& path) const {
-    const VehicleAgent& agent = simulation.vehicle(scan.vehicle);
-    if (scan.sensor >= agent.lidars().size()) {
-      throw InputError(fmt::format("{}: the scenario has no such lidar", path));
-    }
-    const MountedLidar& mounted = *agent.lidars()[scan.sensor];
+    const MountedLidar& mounted = *simulation.vehicle(scan.vehicle).lidars()[scan.sensor];
     const std::vector<Beam> beams = mounted.lidar().beams(scan.index, executor);
     scan.snapshot = mounted.takes_snapshots();
     scan.middle = mounted.lidar().middle_of(scan.start, beams, scan.snapshot);
@@ -268,49 +246,53 @@ struct RecordedRun::Files {
   }
 
   void add_events(const std::string& path) {
-    std::map<std::string, Label> labels = {{"map", kMapLabel}};
+    std::map<std::string, std::uint32_t> numbers;
     for (std::size_t v = 0; v < simulation.vehicle_count(); ++v) {
-      labels[description.vehicles[v].setup.name] = simulation.vehicle(v).label();
+      numbers[description.vehicles[v].setup.name] = static_cast<std::uint32_t>(v);
     }
     for (const auto& words : words_of(path)) {
-      if (words.size() < 11 || !labels.contains(words[2])) continue;
-      const SimTime time(from_seconds(number(words[0])));
-      const std::size_t v = labels[words[2]] - kFirstVehicle;
-      const Vector3d here(number(words[4]), number(words[5]), number(words[6]));
+      if (words.size() < 11 || !numbers.contains(words[2])) {
+        throw InputError(fmt::format("{}: a row is cut off, or of an unknown vehicle", path));
+      }
+      const auto value = [&](std::size_t i) { return number_in(words[i], path); };
+      const SimTime time = time_in(words[0], path);
+      const std::uint32_t v = numbers[words[2]];
+      const Vector3d here(value(4), value(5), value(6));
       if (!words[1].starts_with("collision")) {
-        add(0, time, kEventRank, v, false, [=, kind = words[1]] {
-          return Sample(VehicleEvent{static_cast<std::uint32_t>(v), time, kind, "", here});
-        });
+        const VehicleEvent event{v, time, words[1], "", here};
+        add(Phase::kSamples, time, kEventRank, v, true, [event] { return Sample(event); });
         continue;
       }
       CollisionEvent event;
-      event.vehicle = static_cast<std::uint32_t>(v);
-      event.partner = words[3].starts_with("obstacle ")
-                          ? kFirstObstacle + static_cast<Label>(number(words[3].substr(9)))
-                          : labels[words[3]];
+      event.vehicle = v;
+      if (words[3].starts_with("obstacle ")) {
+        event.partner = kFirstObstacle + static_cast<Label>(count_in(words[3].substr(9), path));
+      } else if (numbers.contains(words[3])) {
+        event.partner = kFirstVehicle + numbers[words[3]];
+      }
       event.time = time;
       event.entered = words[1] == "collision";
       event.vehicle_world = here;
-      event.place_world = {number(words[7]), number(words[8]), number(words[9])};
-      event.penetration = number(words[10]);
-      add(0, time, kCollisionRank, v, false, [event] { return Sample(event); });
+      event.place_world = {value(7), value(8), value(9)};
+      event.penetration = value(10);
+      add(Phase::kSamples, time, kCollisionRank, v, true, [event] { return Sample(event); });
     }
   }
 
   void add_obstacles(const std::string& path) {
-    const CsvTable& t = table(path);
-    for (std::size_t row = 0; row < t.rows();) {
-      const SimTime time = time_at(t, row, 0);
+    const CsvTable* t = table(path, 9);
+    for (std::size_t row = 0; t != nullptr && row < t->rows();) {
+      const SimTime time = time_at(*t, row, 0);
       std::size_t last = row;
-      while (last < t.rows() && time_at(t, last, 0) == time) ++last;
-      add(1, time, 0, 0, true, [this, &t, time, row, last] {
+      while (last < t->rows() && time_at(*t, last, 0) == time) ++last;
+      add(Phase::kObstacles, time, 0, 0, false, [this, t, time, row, last] {
         std::map<Label, BodyShape> shapes;
         for (Body& body : simulation.obstacles(time, time)) shapes[body.label] = body.shape;
         ObstacleSample sample;
         sample.time = time;
         for (std::size_t i = row; i < last; ++i) {
-          const auto label = static_cast<Label>(t.at(i, 1));
-          const Pose pose{rotation_at(t, i, 5), vector_at(t, i, 2)};
+          const Label label = label_at(*t, i, 1);
+          const Pose pose{rotation_at(*t, i, 5), vector_at(*t, i, 2)};
           sample.obstacles.push_back({label, pose, shapes[label]});
         }
         return Sample(sample);
@@ -348,6 +330,10 @@ Duration RecordedRun::step() const {
   return files_->step;
 }
 
+void RecordedRun::rewind() {
+  files_->next = 0;
+}
+
 void RecordedRun::play_step(SimTime time, SampleSink& sink) {
   const std::int64_t step = time.time_since_epoch() / files_->step;
   auto& next = files_->next;
@@ -357,30 +343,34 @@ void RecordedRun::play_step(SimTime time, SampleSink& sink) {
 }
 
 void play(RecordedRun& run, std::span<Link* const> links, const PlaybackOptions& options) {
-  SampleSplitter sink;
-  for (Link* link : links) sink.add(*link);
+  std::uint64_t scans = 0;
+  SampleFunction sink([&](const Sample& sample) {
+    for (Link* link : links) link->on_sample(sample);
+    scans += std::holds_alternative<ScanSample>(sample) ? 1 : 0;
+  });
   for (Link* link : links) link->open(run.description());
-  const auto is_over = [&] {
-    return (options.interrupted && options.interrupted()) ||
-           std::any_of(links.begin(), links.end(), [](Link* l) { return l->is_over(); });
-  };
+  const auto interrupted = [&] { return options.interrupted && options.interrupted(); };
+  if (!wait_until_ready(links, SimTime{}, interrupted)) return;
+  run.rewind();
   Pace pace(options.rate);
   pace.restart_at(SimTime{});
   bool ends = false;
-  for (SimTime time; !ends && !is_over(); time += run.step()) {
+  for (SimTime time; !ends; time += run.step()) {
     run.play_step(time, sink);
-    ends = time >= run.end();
+    ends = time >= run.end() || interrupted() || is_deserted(links);
     const SimTime reached = ends ? time : time + run.step();
-    for (Link* link : links) link->on_step({reached, 0.0, 0});
+    for (Link* link : links) link->on_step({reached, 0.0, scans});
+    scans = 0;
     for (Link* link : links) {
       for (const Order& order : link->take_orders()) {
         ends = ends || std::holds_alternative<EndOrder>(order);
       }
     }
     pace.wait_for(reached);
-    report(options.progress, "playing", to_seconds(reached) / to_seconds(run.end()));
+    report(
+        options.progress, "playing", to_seconds(reached) / std::max(1e-9, to_seconds(run.end())));
   }
-  for (Link* link : links) link->close();
+  close_links(links);
 }
 
 }  // namespace pointflight

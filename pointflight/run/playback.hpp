@@ -31,6 +31,8 @@ class RecordedRun {
   /// Between two instants that samples come at.
   [[nodiscard]] Duration step() const;
 
+  /// To be played from its start again.
+  void rewind();
   /// Samples that came in the step that starts at `time`, in the order in which they came. Steps
   /// are asked for one after the other. Throws InputError.
   void play_step(SimTime time, SampleSink& sink);

@@ -64,6 +64,9 @@ class RunLoop::Splitter : public SampleSink {
 
   void on_sample(const Sample& sample) override {
     for (Link* link : loop_.links_) link->on_sample(sample);
+    if (const auto* status = std::get_if<StatusSample>(&sample)) {
+      if (status->rejected > 0) loop_.say_rejected(status->vehicle, status->last_rejection);
+    }
     const auto* scanned = std::get_if<ScanSample>(&sample);
     if (scanned == nullptr) return;
     ++loop_.scans_;
@@ -84,10 +87,42 @@ void RunLoop::add(Link& link) {
   links_.push_back(&link);
 }
 
+bool is_deserted(std::span<Link* const> links) {
+  const bool used = std::any_of(links.begin(), links.end(), [](Link* l) { return l->is_in_use(); });
+  return (!links.empty() && !used) ||
+         std::any_of(links.begin(), links.end(), [](Link* l) { return l->is_over(); });
+}
+
+bool wait_until_ready(std::span<Link* const> links,
+                      SimTime now,
+                      const std::function<bool()>& is_over) {
+  for (;;) {
+    const bool ready =
+        std::all_of(links.begin(), links.end(), [](Link* l) { return l->is_ready(); });
+    if (is_deserted(links)) return false;
+    if (ready) return true;  // an interrupt now ends a run that has begun
+    if (is_over()) return false;
+    for (Link* link : links) link->on_wait(now, Waiting::kForLinks);
+    std::this_thread::sleep_for(kLook);
+  }
+}
+
+void close_links(std::span<Link* const> links) {
+  std::exception_ptr failure;
+  for (Link* link : links) {
+    try {
+      link->close();
+    } catch (...) {  // the others have what they took
+      if (!failure) failure = std::current_exception();
+    }
+  }
+  if (failure) std::rethrow_exception(failure);
+}
+
 RunEnd RunLoop::run() {
   description_ = describe_run(simulation_);
   for (Link* link : links_) link->open(description_);
-  if (!wait_until_ready()) {
+  if (!wait_until_ready(links_, simulation_.time(), [this] { return is_over(); })) {
     simulation_.interrupt();
     return simulation_.end();
   }
@@ -100,7 +135,7 @@ RunEnd RunLoop::run() {
     running = simulation_.step(sink);
     after_step(std::chrono::duration<double>(Clock::now() - began).count());
     wait_while_paused();
-    if (std::exchange(reset_, false)) {
+    if (std::exchange(reset_, false) && !ended_) {
       reset();
       running = true;
     }
@@ -114,7 +149,7 @@ RunEnd RunLoop::run() {
     }
   }
   wall_time_ = wall_time();
-  for (Link* link : links_) link->close();
+  close_links(links_);
   return simulation_.end();
 }
 
@@ -128,29 +163,8 @@ std::uint64_t RunLoop::dropped() const {
   return dropped;
 }
 
-/// False where the run is over before its first step.
-bool RunLoop::wait_until_ready() {
-  for (;;) {
-    const bool ready =
-        std::all_of(links_.begin(), links_.end(), [](Link* l) { return l->is_ready(); });
-    if (is_deserted()) return false;
-    if (ready) return true;  // an interrupt now ends a run that has begun
-    if (is_over()) return false;
-    for (Link* link : links_) link->on_wait(simulation_.time(), Waiting::kForLinks);
-    std::this_thread::sleep_for(kLook);
-  }
-}
-
 bool RunLoop::is_over() const {
-  return (options_.interrupted && options_.interrupted()) || is_deserted();
-}
-
-/// Nobody gets anything of the run, or a link ends it.
-bool RunLoop::is_deserted() const {
-  const bool used =
-      std::any_of(links_.begin(), links_.end(), [](Link* l) { return l->is_in_use(); });
-  return (!links_.empty() && !used) ||
-         std::any_of(links_.begin(), links_.end(), [](Link* l) { return l->is_over(); });
+  return ended_ || (options_.interrupted && options_.interrupted()) || is_deserted(links_);
 }
 
 void RunLoop::after_step(double took) {
@@ -191,20 +205,25 @@ void RunLoop::obey(Link& link, const Order& order) {
     const auto why = simulation_.command(vehicle->vehicle, vehicle->command);
     if (!why) return;
     link.on_rejected(*vehicle, *why);
-    if (std::exchange(said_rejected_, true)) return;
-    say(fmt::format("warning: {}: {}; not taken (said once, counted)",
-                    simulation_.vehicle(vehicle->vehicle).setup().name,
-                    *why));
+    say_rejected(vehicle->vehicle, *why);
   } else if (const auto* pause = std::get_if<PauseOrder>(&order)) {
     if (paused_ != pause->pause) say(pause->pause ? "paused" : "going on");
     paused_ = pause->pause;
+    step_once_ = false;
   } else if (std::holds_alternative<StepOrder>(order)) {
     step_once_ = paused_;
   } else if (std::holds_alternative<ResetOrder>(order)) {
     reset_ = true;
   } else {
-    simulation_.interrupt();
+    ended_ = true;
   }
+}
+
+void RunLoop::say_rejected(std::size_t vehicle, const std::string& why) {
+  if (std::exchange(said_rejected_, true)) return;
+  say(fmt::format("warning: {}: {}; not taken (said once, counted)",
+                  simulation_.vehicle(vehicle).setup().name,
+                  why));
 }
 
 void RunLoop::wait_while_paused() {

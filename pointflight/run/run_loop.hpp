@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -103,13 +104,12 @@ class RunLoop {
   class Splitter;
   using Clock = std::chrono::steady_clock;
 
-  [[nodiscard]] bool wait_until_ready();
   [[nodiscard]] bool is_over() const;
-  [[nodiscard]] bool is_deserted() const;
   void after_step(double took);
   void wait_for_answer();
   void take_orders();
   void obey(Link& link, const Order& order);
+  void say_rejected(std::size_t vehicle, const std::string& why);
   void wait_while_paused();
   void reset();
   void say_behind();
@@ -128,10 +128,23 @@ class RunLoop {
   bool paused_ = false;
   bool step_once_ = false;  ///< While paused: until a scan has come.
   bool reset_ = false;
+  bool ended_ = false;       ///< By an order.
   std::uint64_t scans_ = 0;  ///< In the step under way.
   std::uint64_t answers_ = 0;
   std::uint64_t unanswered_ = 0;
   bool said_rejected_ = false;
 };
+
+/// True where nobody gets anything of a run, or a link ends it.
+[[nodiscard]] bool is_deserted(std::span<Link* const> links);
+
+/// Waits for links that were opened, at time `now` of the run. False where the run is over before
+/// its first step: deserted, or `is_over` while somebody was not ready.
+[[nodiscard]] bool wait_until_ready(std::span<Link* const> links,
+                                    SimTime now,
+                                    const std::function<bool()>& is_over);
+
+/// Closes all; then throws what the first threw that failed.
+void close_links(std::span<Link* const> links);
 
 }  // namespace pointflight

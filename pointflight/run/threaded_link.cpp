@@ -59,6 +59,33 @@ std::uint64_t ThreadedLink::dropped() const {
   return dropped_ + link_.dropped();
 }
 
+/// Steps without samples between them, looks while the run waits: the later one says it all, but
+/// for the scans of the earlier. False where both have to stay.
+bool ThreadedLink::merge(const Event& earlier, Event& later) {
+  if (earlier.index() != later.index()) return false;
+  if (auto* step = std::get_if<StepDone>(&later)) {
+    const auto& before = std::get<StepDone>(earlier);
+    if (step->scans == 0) step->took = before.took;
+    step->scans += before.scans;
+    return true;
+  }
+  return std::holds_alternative<Waited>(later) || std::holds_alternative<Reset>(later);
+}
+
+/// The oldest sample goes.
+void ThreadedLink::drop_sample() {
+  const auto oldest = std::find_if(queue_.begin(), queue_.end(), [](const Event& e) {
+    return std::holds_alternative<Sample>(e);
+  });
+  const auto next = queue_.erase(oldest);
+  // what stood around it may be one now, so that the queue stays as short as it is bounded
+  if (next != queue_.begin() && next != queue_.end() && merge(*std::prev(next), *next)) {
+    queue_.erase(std::prev(next));
+  }
+  --samples_;
+  ++dropped_;
+}
+
 void ThreadedLink::push(Event event) {
   std::unique_lock lock(mutex_);
   if (!thread_.joinable() || failure_) return;
@@ -66,16 +93,11 @@ void ThreadedLink::push(Event event) {
     if (when_full_ == WhenFull::kWait) {
       changed_.wait(lock, [this] { return samples_ < capacity_ || failure_; });
     } else if (samples_ >= capacity_) {
-      const auto is_sample = [](const Event& e) { return std::holds_alternative<Sample>(e); };
-      queue_.erase(std::find_if(queue_.begin(), queue_.end(), is_sample));
-      --samples_;
-      ++dropped_;
+      drop_sample();
     }
     ++samples_;
-  } else if (!queue_.empty() && queue_.back().index() == event.index() &&
-             !std::holds_alternative<Rejected>(event)) {
-    queue_
-        .pop_back();  // steps without samples, looks while the run waits: the last one says it all
+  } else if (!queue_.empty() && merge(queue_.back(), event)) {
+    queue_.pop_back();
   }
   queue_.push_back(std::move(event));
   changed_.notify_all();

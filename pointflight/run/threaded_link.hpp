@@ -23,9 +23,9 @@ class ThreadedLink : public Link {
     kWait         ///< The run waits; for records.
   };
 
-  /// `link` must outlive it; `capacity` in samples, at least 1. After `open` all calls of `link`
-  /// but `is_over`, `is_in_use` and `dropped`, which must be callable from any thread, come from
-  /// its own thread.
+  /// `link` must outlive it; `capacity` in samples, at least 1. Between the first step and `close`
+  /// all calls of `link` but `is_over`, `is_in_use` and `dropped`, which must be callable from any
+  /// thread, come from its own thread.
   ThreadedLink(Link& link, std::size_t capacity, WhenFull when_full);
   ~ThreadedLink() override;
 
@@ -57,6 +57,8 @@ class ThreadedLink : public Link {
   };
   using Event = std::variant<Sample, StepDone, Waited, Rejected, Reset>;
 
+  static bool merge(const Event& earlier, Event& later);
+  void drop_sample();
   void push(Event event);
   void work();
   void hand_over(const Event& event);

@@ -242,7 +242,13 @@ void FlightRecorder::write(const ImuSample& sample) {
 void FlightRecorder::write(const Measurement& sample) {
   std::string row = fmt::format("{},{}", seconds(sample.time), seconds(sample.delivered));
   for (const double value : sample.values) row += fmt::format(",{}", value);
-  vehicles_[sample.vehicle]->sensors.at(sample.sensor).write(row + "\n");
+  auto& files = vehicles_[sample.vehicle]->sensors;
+  const auto file = files.find(sample.sensor);
+  if (file == files.end()) {
+    throw std::invalid_argument(fmt::format(
+        "a measurement of sensor {}; a sensor's number is that of its SensorSite", sample.sensor));
+  }
+  file->second.write(row + "\n");
 }
 
 void FlightRecorder::write(const ScanSample& sample) {

@@ -17,6 +17,9 @@ RunDescription describe_run(const Simulation& simulation) {
     for (const MountedLidar* mounted : agent.lidars()) {
       vehicle.lidars.push_back({mounted->lidar().settings(), mounted->T_body_sensor()});
     }
+    for (const MountedSensor& sensor : agent.sensors()) {
+      vehicle.sensors.push_back(sensor.kind != nullptr ? sensor.kind->name : "");
+    }
     vehicle.at_start = simulation.status_sample(v);
   }
   return run;

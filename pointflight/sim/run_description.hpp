@@ -24,7 +24,9 @@ struct VehicleDescription {
   Solid hull;                            ///< What must not touch anything, body frame.
   BodyShape shape;                       ///< As LiDARs of others see it.
   std::vector<LidarDescription> lidars;  ///< In the order of the scenario.
-  StatusSample at_start;                 ///< Before the first step.
+  /// Kinds by `Measurement::sensor`; empty for odometry, IMU and LiDARs.
+  std::vector<std::string> sensors;
+  StatusSample at_start;  ///< Before the first step.
 };
 
 /// A run. Topics and frames follow from names, models and the profile.

@@ -168,7 +168,8 @@ void describe(SettingsVisitor& v, Scenario& s) {
     std::any& settings = s.sections.try_emplace(row.name, row.settings).first->second;
     v.section({row.name, "", row.help}, [&](SettingsVisitor& w) { row.describe(w, settings); });
   }
-  v.leave_out("ros");  // in a program without it
+  // in a program without it
+  if (scenario_sections().find("ros") == nullptr) v.leave_as_is("ros", s.ros_as_is);
 }
 
 std::vector<VehicleSetup> Scenario::fleet() const {

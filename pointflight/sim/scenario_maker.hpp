@@ -10,15 +10,15 @@ namespace pointflight {
 
 /// What a scenario is made up from.
 struct ScenarioWish {
-  std::string map_path;  ///< Is opened.
-  std::string map_key;   ///< What the scenario says.
-  std::string lidar = "mid360";
-  std::string vehicle = "quad_330";
-  double length = 60.0;           ///< Of the mission, where the map allows, m.
-  double speed = 2.0;             ///< m/s
-  std::optional<Vector3d> start;  ///< World, m; else a free place.
-  std::optional<Aabb> bounds;     ///< World, m: start and waypoints lie inside.
-  bool mission = true;            ///< Else nothing is looked for where there is a start.
+  std::string map_path;              ///< Is opened.
+  std::string map_key;               ///< What the scenario says.
+  std::string lidar = "mid360";      ///< Name or path of a sensor file.
+  std::string vehicle = "quad_330";  ///< Name or path of a vehicle file.
+  double length = 60.0;              ///< Of the mission, where the map allows, m.
+  double speed = 2.0;                ///< m/s
+  std::optional<Vector3d> start;     ///< World, m; else a free place.
+  std::optional<Aabb> bounds;        ///< World, m: start and waypoints lie inside.
+  bool mission = true;               ///< Else nothing is looked for where there is a start.
 };
 
 /// A scenario for a map: a free start, waypoints and a heading along the first leg. Throws

@@ -124,10 +124,10 @@ SensorKind sensor_kind(std::string name, std::string help, std::vector<SensorCol
   kind.columns = std::move(columns);
   kind.settings = Settings{};
   kind.describe = [](SettingsVisitor& visitor, std::any& settings) {
-    describe(visitor, *std::any_cast<Settings>(&settings));
+    describe(visitor, std::any_cast<Settings&>(settings));
   };
   kind.make = [](const SensorSite& site, const std::any& settings) {
-    return std::make_unique<S>(site, *std::any_cast<Settings>(&settings));
+    return std::make_unique<S>(site, std::any_cast<const Settings&>(settings));
   };
   return kind;
 }
@@ -138,7 +138,7 @@ Registry<SensorKind>& sensor_kinds();
 /// One entry of a scenario's `sensors`.
 struct SensorSetup {
   const SensorKind* kind = nullptr;  ///< Never null once it is read.
-  std::any settings;                 ///< The kind's.
+  std::any settings;                 ///< The kind's; empty: its defaults.
 };
 
 /// The keys of an entry.

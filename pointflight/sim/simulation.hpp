@@ -140,10 +140,10 @@ class Simulation {
   void finish_run();
   /// A measurement whose interval has ended.
   struct DueInterval {
-    std::size_t vehicle;
-    std::size_t sensor_number;
-    const IntervalSensor* sensor;
-    std::int64_t index;
+    std::size_t vehicle = 0;
+    std::size_t sensor_number = 0;
+    const IntervalSensor* sensor = nullptr;
+    std::int64_t index = 0;
     SimTime start, end;
   };
   [[nodiscard]] std::vector<DueInterval> due_intervals();

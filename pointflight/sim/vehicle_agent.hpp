@@ -120,6 +120,9 @@ class VehicleAgent {
                const VehicleSetup& setup,
                const RendererByKind& renderer);
 
+  VehicleAgent(const VehicleAgent&) = delete;  // its sensors know its faults
+  VehicleAgent& operator=(const VehicleAgent&) = delete;
+
   /// Hovering at its start, rotors at hover speed; or landed, rotors still.
   [[nodiscard]] VehicleStatus start() const;
 

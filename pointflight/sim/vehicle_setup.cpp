@@ -15,6 +15,11 @@ constexpr double kSettleTime = 1.0;      // s after the last that is to be done
 constexpr double kCommandTime = 5.0;     // s for a command without an end of its own
 constexpr std::size_t kLidarsMax = 256;  // their numbers have 8 bits in random streams
 
+/// What the recorder calls files of its own.
+bool is_file_of_every_vehicle(const std::string& name) {
+  return name == "trajectory" || name == "scans" || name == "imu" || name == "odometry";
+}
+
 /// The vehicle's file with what the scenario changes of it.
 VehicleSettings settings_of(const Scenario& scenario,
                             std::size_t number,
@@ -33,9 +38,11 @@ VehicleSettings settings_of(const Scenario& scenario,
   override_with(setup.limits.body_rate_max, c.body_rate_max);
   if (c.tilt_max_deg > c.kind->tilt_max_deg) {
     throw InputError(
-        fmt::format("{}: a tilt of {} degrees; above 85 only `controller: geometric` flies",
+        fmt::format("{}: a tilt of {} degrees; `controller: {}` flies up to {}, geometric beyond",
                     scenario.place(scenario.vehicle_key(number, "limits.tilt_max_deg")),
-                    c.tilt_max_deg));
+                    c.tilt_max_deg,
+                    c.kind->name,
+                    c.kind->tilt_max_deg));
   }
   if (setup.battery && s.battery.cells <= 0.0) {
     throw InputError(fmt::format("{}: {} has no battery; write one into its file",
@@ -73,6 +80,12 @@ VehicleAgent::VehicleAgent(const Scenario& scenario,
 }
 
 void VehicleAgent::mount_sensors(const Scenario& scenario, const RendererByKind& renderer) {
+  if (setup_.sensors.size() > kLidarsMax - 2) {
+    throw InputError(fmt::format("{}: {} sensors on one vehicle; {} at most",
+                                 scenario.place(scenario.vehicle_key(number_, "sensors")),
+                                 setup_.sensors.size(),
+                                 kLidarsMax - 2));
+  }
   if (setup_.lidars.size() > kLidarsMax) {
     throw InputError(fmt::format("{}: {} lidars on one vehicle; {} at most",
                                  scenario.place(scenario.vehicle_key(number_, "lidars")),
@@ -88,7 +101,14 @@ void VehicleAgent::mount_sensors(const Scenario& scenario, const RendererByKind&
     const SensorSetup& sensor = setup_.sensors[i];
     const std::string key = scenario.vehicle_key(number_, fmt::format("sensors[{}]", i));
     mount(sensor.kind, scenario.at(key, [&] {
-      return sensor.kind->make(site(sensors_.size()), sensor.settings);
+      if (sensor.kind == nullptr) throw InputError("a sensor needs a kind");
+      if (is_file_of_every_vehicle(sensor.kind->name)) {
+        throw InputError(fmt::format(
+            "'{}' is a file of every vehicle; call the kind something else", sensor.kind->name));
+      }
+      const bool open = !sensor.settings.has_value();
+      return sensor.kind->make(site(sensors_.size()),
+                               open ? sensor.kind->settings : sensor.settings);
     }));
   }
   for (std::size_t i = 0; i < setup_.lidars.size(); ++i) {

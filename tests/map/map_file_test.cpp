@@ -93,6 +93,8 @@ TEST(MapFile, UnknownSectionsAreLeftAloneAndCanBeRead) {
   auto bytes = map_bytes(ball().tree, description);
   bytes[table_of(bytes)[4].offset] = std::byte{8};
   expect_contains(error_of([&] { opened(bytes)->verify(); }), "section 'label'");
+  description.extra = {{"twice", {}}, {"twice", {}}};
+  EXPECT_THROW(static_cast<void>(map_bytes(ball().tree, description)), std::invalid_argument);
   for (const char* name : {"", "words", "seventeen_bytes_x"}) {
     description.extra = {{name, {}}};
     EXPECT_THROW(static_cast<void>(map_bytes(ball().tree, description)), std::invalid_argument);

@@ -33,6 +33,7 @@ void add_own() {
   output_types().add({.name = "place",
                       .help = "where it is by its states",
                       .make = per_sample<place_of>(),
+                      .frame = OutputType::Frame::kBody,
                       .has_child = true});
   input_types().add({.name = "height",
                      .help = "how high to take off",
@@ -49,10 +50,13 @@ class Counter : public Outlet {
   }
   [[nodiscard]] bool has_readers(int /*topic*/) const override { return true; }
   void send(int topic, const Bytes& bytes, std::int64_t /*time*/) override {
-    if (topics[static_cast<std::size_t>(topic)].name == "/drone0/here") sent.push_back(bytes);
+    const std::string& name = topics[static_cast<std::size_t>(topic)].name;
+    if (name == "/drone0/here") sent.push_back(bytes);
+    if (name == "/tf_static") transforms = decode<Wire::kCdr, msg::TFMessage>(*bytes);
   }
   std::vector<Topic> topics;
   std::vector<Bytes> sent;
+  std::optional<msg::TFMessage> transforms;
 };
 
 TEST(OwnOutputs, AreSentUnderTheNamesOfScenariosAndProfiles) {
@@ -74,6 +78,8 @@ TEST(OwnOutputs, AreSentUnderTheNamesOfScenariosAndProfiles) {
   ASSERT_TRUE(first);
   EXPECT_EQ(first->header.frame_id, "map");
   EXPECT_EQ(first->pose.position.x, 10.0);
+  ASSERT_TRUE(counter.transforms);
+  EXPECT_TRUE(counter.transforms->transforms.empty()) << "its frame is no sensor's";
 }
 
 TEST(OwnOutputs, KeysWithoutEffectAreRefusedForThemToo) {

@@ -10,6 +10,7 @@
 #include "pointflight/map/map_builder.hpp"
 #include "pointflight/map/map_file.hpp"
 #include "pointflight/run/run_loop.hpp"
+#include "pointflight/run/threaded_link.hpp"
 #include "pointflight/sim/flight_recorder.hpp"
 #include "ros_common/ros_link.hpp"
 #include "tests/sim/runs.hpp"
@@ -61,7 +62,7 @@ class Recorder : public Link {
 
 std::unique_ptr<RosLink> keeping(const RunDescription& run, Messages& messages) {
   auto link = std::make_unique<RosLink>(run, load_ros_profile("default"), RosLinkOptions{});
-  link->add(std::unique_ptr<Outlet>(std::make_unique<Keeper>(messages)));
+  link->add_recording(std::make_unique<Keeper>(messages));
   return link;
 }
 
@@ -120,6 +121,14 @@ TEST(Playback, ARunsFolderGivesTheMessagesOfTheRun) {
     EXPECT_EQ(same, messages.size()) << topic;
   }
   EXPECT_EQ(flown.size(), played.size());
+
+  // once more, behind a thread of its own
+  Messages again;
+  const auto second = keeping(run.description(), again);
+  ThreadedLink threaded(*second, 8, ThreadedLink::WhenFull::kWait);
+  Link* const other[] = {&threaded};
+  play(run, other, {});
+  EXPECT_EQ(again["/two/mid360/points"], flown["/two/mid360/points"]);
 }
 
 TEST(Playback, FoldersThatAreNoRunsSayWhatIsMissing) {
@@ -135,7 +144,7 @@ TEST(Playback, FoldersThatAreNoRunsSayWhatIsMissing) {
   };
   const std::string states = read_file(folder / "run/one/trajectory.csv");
   write_file(folder / "run/one/trajectory.csv", states.substr(0, states.find('\n') + 1));
-  expect_contains(error(), "trajectory.csv: no rows");
+  expect_contains(error(), "trajectory.csv: has no states");
   std::string doubled = states;
   doubled += states.substr(states.find('\n') + 1);
   write_file(folder / "run/one/trajectory.csv", doubled);
@@ -149,6 +158,19 @@ TEST(Playback, FoldersThatAreNoRunsSayWhatIsMissing) {
   write_file(folder / "run/two/scans/0_000000.pcd", other);
   expect_contains(error(), "points are not the sensor's");
   write_file(folder / "run/two/scans/0_000000.pcd", scan);
+  write_file(folder / "run/one/imu.csv", "time,gyro_x\n0,0\n");
+  expect_contains(error(), "2 columns where a run writes 7");
+  write_file(folder / "run/one/imu.csv", "time,gyro_x\n");  // nothing came
+  EXPECT_NO_THROW(RecordedRun(folder / "run", executor));
+  const std::string events = read_file(folder / "run/events.csv");
+  write_file(folder / "run/events.csv", events + "1.2,collision,map,,,,,,,,\n");
+  expect_contains(error(), "of an unknown vehicle");
+  write_file(folder / "run/events.csv", events);
+  const std::string summary = read_file(folder / "run/summary.json");
+  std::string endless = summary;
+  endless.replace(endless.find("\"simulated_time\": 1.5"), 21, "\"simulated_time\": 1e6");
+  write_file(folder / "run/summary.json", endless);
+  expect_contains(error(), "the run ended at 1000000.0 s, its files at 1.5 s");
   std::filesystem::remove(folder / "run/summary.json");
   expect_contains(error(), "summary.json: is missing");
 }

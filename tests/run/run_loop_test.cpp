@@ -175,6 +175,35 @@ TEST(RunLoop, EndsWhereNobodyIsLeftOrSomebodyWantsIt) {
   EXPECT_EQ(link.calls, "open close");
 }
 
+TEST(RunLoop, EndsWhilePausedAndAfterAReset) {
+  const Executor executor(1);
+  for (const std::vector<std::pair<int, Order>>& orders :
+       {std::vector<std::pair<int, Order>>{{20, PauseOrder{true}}, {40, EndOrder{}}},
+        std::vector<std::pair<int, Order>>{{20, EndOrder{}}, {20, ResetOrder{}}}}) {
+    Simulation simulation(short_run(), hall(), executor);
+    Probe link;
+    link.orders = orders;
+    RunLoop loop(simulation, {});
+    loop.add(link);
+    EXPECT_EQ(loop.run(), RunEnd::kInterrupted);
+    EXPECT_LT(link.steps, 60);
+  }
+}
+
+TEST(RunLoop, ClosesAllLinksWhereOneCannotBeClosed) {
+  const Executor executor(1);
+  class Full : public Link {
+    void close() override { throw std::runtime_error("no room"); }
+  } full;
+  Simulation simulation(short_run(), hall(), executor);
+  Probe other;
+  RunLoop loop(simulation, {});
+  loop.add(full);
+  loop.add(other);
+  EXPECT_THROW(loop.run(), std::runtime_error);
+  EXPECT_EQ(other.calls, "open close");
+}
+
 TEST(ThreadedLink, HandsOverEverythingInOrder) {
   const Executor executor(2);
   ByteSink stepped;
@@ -221,6 +250,7 @@ TEST(ThreadedLink, DropsTheOldestForThoseWhoAreSlow) {
   loop.add(link);
   loop.run();
   EXPECT_LE(stuck.taken, 12);
+  EXPECT_LE(stuck.steps, 14) << "steps are merged where samples between them went";
   EXPECT_EQ(loop.dropped() + static_cast<std::uint64_t>(stuck.taken),
             static_cast<std::uint64_t>(release.samples));
 }

@@ -140,6 +140,17 @@ TEST(OwnSensors, HaveAFileOfTheirColumnsAndReadBack) {
   EXPECT_EQ(std::any_cast<AltimeterSettings>(read.vehicles[0].sensors[1].settings).walk, 0.1);
 }
 
+TEST(OwnSensors, AreMountedByProgramsToo) {
+  add_altimeter();
+  const Executor executor(1);
+  Scenario scenario = hovering();
+  scenario.vehicles[0].sensors.push_back({sensor_kinds().find("altimeter"), {}});
+  const Simulation simulation(scenario, hall(), executor);
+  EXPECT_EQ(simulation.vehicle(0).sensors().size(), 3u);
+  scenario.vehicles[0].sensors.push_back({nullptr, {}});
+  expect_contains(error_of([&] { Simulation(scenario, hall(), executor); }), "sensors[1].kind: '' is unknown");
+}
+
 TEST(OwnSensors, MistakesSayWhere) {
   add_altimeter();
   const auto error = [](const std::string& sensors) {
