@@ -155,16 +155,21 @@ POINTFLIGHT_INLINE void set_up_planes(Packet& p,
   }
 }
 
-/// Sets up a packet of the first `count` groups.
-POINTFLIGHT_INLINE void set_up(Packet& p, std::size_t count) {
-  p.count = count;
-  p.failed = 0;
+/// The apex is the first beam's origin; the others lie up to the spread away.
+POINTFLIGHT_INLINE void set_up_apex(Packet& p) {
   for (int k = 0; k < 3; ++k) {
     p.apex[k] = p.groups[0].origin[k][0];
     p.apex_box[k] = static_cast<float>(p.apex[k]);
   }
   p.spread = spread_of(p);
   p.one_origin = p.spread == 0.0f;
+}
+
+/// Sets up a packet of the first `count` groups.
+POINTFLIGHT_INLINE void set_up(Packet& p, std::size_t count) {
+  p.count = count;
+  p.failed = 0;
+  set_up_apex(p);
 
   // the frame: w along the mean direction, u and v across it
   Vector3f mean = Vector3f::Zero();

@@ -28,87 +28,78 @@ double roll_of(const RigidBodyState& s) {
   return rotation_vector(s.q_world_body).x();
 }
 
-std::vector<Trial> trials_of(const VehicleSettings& v) {
+PositionCommand place(double x, double z, double yaw) {
+  PositionCommand command;
+  command.p_world = {x, 0.0, z};
+  command.yaw = yaw;
+  return command;
+}
+
+/// Of the attitude.
+std::vector<Trial> inner_trials(const VehicleSettings& v) {
   const ControllerSettings& c = v.controller;
   const double weight = v.mass * kGravity;
-  const auto position = [](const Vector3d& p, double yaw) {
-    PositionCommand command;
-    command.p_world = p;
-    command.yaw = yaw;
-    return command;
-  };
   LoopDesign rate = c.roll_pitch;
   rate.natural_frequency = 2.0 * rate.damping * rate.natural_frequency;
-  LoopDesign velocity = c.horizontal;
-  velocity.natural_frequency *= kVelocityToPosition;
-  velocity.integral = 0.0;
+  const auto roll_rate = [=](double x) { return BodyRateCommand{{x, 0, 0}, weight}; };
+  const auto roll = [=](double x) {
+    return AttitudeCommand{quaternion_from_rpy(x, 0, 0), weight, Vector3d::Zero()};
+  };
+  const auto yaw = [](double x) { return place(0.0, 0.0, x); };
   return {
       {"roll rate",
        "rad/s",
        0.2,
        rate,
        true,
-       [=](double x) {
-         return BodyRateCommand{{x, 0, 0}, weight};
-       },
+       roll_rate,
        [](const RigidBodyState& s) { return s.omega_body.x(); }},
-      {"roll attitude",
-       "rad",
-       0.1,
-       c.roll_pitch,
-       false,
-       [=](double x) {
-         return AttitudeCommand{quaternion_from_rpy(x, 0, 0), weight, Vector3d::Zero()};
-       },
-       [](const RigidBodyState& s) { return roll_of(s); }},
+      {"roll attitude", "rad", 0.1, c.roll_pitch, false, roll, roll_of},
       {"yaw",
        "rad",
        0.1,
        c.yaw,
        false,
-       [=](double x) {
-         return position({0, 0, 0}, x);
-       },
+       yaw,
        [](const RigidBodyState& s) { return yaw_of(s.q_world_body); }},
-      {"acceleration x",
-       "m/s^2",
-       0.5,
-       c.roll_pitch,
-       false,
-       [=](double x) {
-         return AccelerationCommand{{x, 0, 0}, 0.0, 0.0};
-       },
-       // what the tilt makes of the thrust; drag takes its part later
-       [](const RigidBodyState& s) {
-         const Vector3d b3 = s.q_world_body * Vector3d::UnitZ();
-         return kGravity * b3.x() / b3.z();
-       }},
+  };
+}
+
+/// Of the place and what leads to it.
+std::vector<Trial> outer_trials(const VehicleSettings& v) {
+  const ControllerSettings& c = v.controller;
+  LoopDesign velocity = c.horizontal;
+  velocity.natural_frequency *= kVelocityToPosition;
+  velocity.integral = 0.0;
+  const auto accelerate = [](double x) { return AccelerationCommand{{x, 0, 0}, 0.0, 0.0}; };
+  const auto go = [](double x) { return VelocityCommand{{x, 0, 0}, 0.0, 0.0}; };
+  // what the tilt makes of the thrust; drag takes its part later
+  const auto tilted = [](const RigidBodyState& s) {
+    const Vector3d b3 = s.q_world_body * Vector3d::UnitZ();
+    return kGravity * b3.x() / b3.z();
+  };
+  return {
+      {"acceleration x", "m/s^2", 0.5, c.roll_pitch, false, accelerate, tilted},
       {"velocity x",
        "m/s",
        0.5,
        velocity,
        false,
-       [=](double x) {
-         return VelocityCommand{{x, 0, 0}, 0.0, 0.0};
-       },
+       go,
        [](const RigidBodyState& s) { return s.v_world.x(); }},
       {"position x",
        "m",
        0.5,
        c.horizontal,
        false,
-       [=](double x) {
-         return position({x, 0, 0}, 0.0);
-       },
+       [](double x) { return place(x, 0.0, 0.0); },
        [](const RigidBodyState& s) { return s.p_world.x(); }},
       {"position z",
        "m",
        0.5,
        c.vertical,
        false,
-       [=](double x) {
-         return position({0, 0, x}, 0.0);
-       },
+       [](double x) { return place(0.0, x, 0.0); },
        [](const RigidBodyState& s) { return s.p_world.z(); }},
   };
 }
@@ -180,7 +171,9 @@ std::vector<StepResponse> step_responses(const VehicleSettings& settings) {
   std::vector<StepResponse> responses;
   const Multirotor vehicle(settings);
   const auto controller = make_controller(settings.controller.kind, settings);
-  for (const Trial& trial : trials_of(settings)) {
+  std::vector<Trial> trials = inner_trials(settings);
+  for (Trial& trial : outer_trials(settings)) trials.push_back(std::move(trial));
+  for (const Trial& trial : trials) {
     StepResponse r;
     r.name = trial.name;
     r.unit = trial.unit;

@@ -148,7 +148,8 @@ TEST(OwnSensors, AreMountedByProgramsToo) {
   const Simulation simulation(scenario, hall(), executor);
   EXPECT_EQ(simulation.vehicle(0).sensors().size(), 3u);
   scenario.vehicles[0].sensors.push_back({nullptr, {}});
-  expect_contains(error_of([&] { Simulation(scenario, hall(), executor); }), "sensors[1].kind: '' is unknown");
+  expect_contains(error_of([&] { Simulation(scenario, hall(), executor); }),
+                  "sensors[1].kind: '' is unknown");
 }
 
 TEST(OwnSensors, MistakesSayWhere) {
