@@ -131,7 +131,7 @@ std::vector<MapSection> table_of(std::span<const std::byte> bytes, const MapHead
     }
     return table;
   }
-  if (header.section_count > kMapSectionsMax) return {};
+  if (header.section_count == 0 || header.section_count > kMapSectionsMax) return {};
   table.resize(header.section_count);
   std::memcpy(table.data(), at, table.size() * sizeof(MapSection));
   return table;
