@@ -17,6 +17,8 @@ class RosBridge : public SampleSink {
   /// Stamps count from `epoch` (since the Unix epoch). Throws InputError (a profile that cannot
   /// be).
   RosBridge(RunDescription run, const RosProfile& profile, Duration epoch);
+  RosBridge(const RosBridge&) = delete;  // its streams know where it is
+  RosBridge& operator=(const RosBridge&) = delete;
 
   /// Before `start`. The outlet must outlive the bridge.
   void add(Outlet& outlet);

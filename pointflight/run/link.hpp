@@ -25,8 +25,7 @@ enum class Waiting {
 
 /// What somebody outside is to a run: a ROS, a recording, files, a page, a flight controller,
 /// another process. Samples come in, orders go out. All calls come from the thread of the run's
-/// loop
-/// (`RunLoop`), in this order: `open`, `is_ready` until it is, then for each step samples,
+/// loop (`RunLoop`), in this order: `open`, `is_ready` until it is, then for each step samples,
 /// `on_step` and `take_orders`, at last `close`. A link with a thread of its own: `ThreadedLink`.
 class Link : public SampleSink {
  public:
@@ -43,7 +42,7 @@ class Link : public SampleSink {
 
   /// What this link asks for since it was last asked, in order; obeyed between steps.
   virtual std::vector<Order> take_orders() { return {}; }
-  /// A command of its was not taken, and why.
+  /// One of its commands was not taken, and why.
   virtual void on_rejected(const VehicleOrder& /*order*/, const std::string& /*why*/) {}
 
   /// The run is about to start again at time zero; it has come to `reached`.

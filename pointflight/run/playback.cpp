@@ -4,11 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <deque>
 #include <filesystem>
-#include <fstream>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <tuple>
+#include <utility>
 
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/input_error.hpp"
@@ -16,6 +16,7 @@
 #include "pointflight/io/csv_table.hpp"
 #include "pointflight/run/run_files.hpp"
 #include "pointflight/run/run_loop.hpp"
+#include "pointflight/sim/flight_recorder.hpp"
 
 namespace pointflight {
 namespace {
@@ -86,21 +87,15 @@ struct RecordedRun::Files {
     add_states(v, folder / "trajectory.csv");
     add_odometry(v, folder / "odometry.csv");
     add_imu(v, folder / "imu.csv");
-    const auto sensors = simulation.vehicle(v).sensors();
-    std::map<std::string, int> alike;
-    for (std::size_t i = 0; i < sensors.size(); ++i) {
-      if (sensors[i].kind == nullptr) continue;
-      const int before = alike[sensors[i].kind->name]++;
-      const std::string name = sensors[i].kind->name;
-      add_sensor(
-          v, i, folder / (before == 0 ? name + ".csv" : fmt::format("{}_{}.csv", name, before)));
+    for (const auto& [number, file] : sensor_files(simulation.vehicle(v))) {
+      add_sensor(v, number, folder / file);
     }
     add_scans(v, folder);
   }
 
   /// Null where the run wrote no such file, or nothing but its columns' names.
   const CsvTable* table(const fs::path& path, std::size_t columns) {
-    if (!fs::exists(path) || words_of(path.string()).empty()) return nullptr;
+    if (!has_rows(path)) return nullptr;
     const CsvTable& t = tables.emplace_back(path.string());
     if (t.columns() >= columns) return &t;
     throw InputError(
@@ -237,12 +232,12 @@ struct RecordedRun::Files {
 
   [[nodiscard]] Sample with_points(Scan scan, const std::string& path) const {
     const MountedLidar& mounted = *simulation.vehicle(scan.vehicle).lidars()[scan.sensor];
+    const PoseTrack track = tracks[scan.vehicle].with_mount(mounted.T_body_sensor());
     const std::vector<Beam> beams = mounted.lidar().beams(scan.index, executor);
     scan.snapshot = mounted.takes_snapshots();
     scan.middle = mounted.lidar().middle_of(scan.start, beams, scan.snapshot);
     scan.points = read_scan_points(path, beams);
-    return ScanSample{std::make_shared<const Scan>(scan),
-                      tracks[scan.vehicle].with_mount(mounted.T_body_sensor())};
+    return ScanSample{std::make_shared<const Scan>(std::move(scan)), track};
   }
 
   void add_events(const std::string& path) {

@@ -17,6 +17,12 @@ constexpr double kTimeMax = 2e6;
 
 }  // namespace
 
+bool has_rows(const std::filesystem::path& path) {
+  std::ifstream file(path);
+  std::string line;
+  return std::getline(file, line) && std::getline(file, line);
+}
+
 SimTime time_at(const CsvTable& table, std::size_t row, int column) {
   const double time = table.at(row, column);
   if (!(time >= 0.0 && time <= kTimeMax)) {

@@ -13,7 +13,11 @@
 
 namespace pointflight {
 
+/// True for a file with a line beyond that of its columns' names.
+bool has_rows(const std::filesystem::path& path);
+/// Throws InputError where it is none of a run.
 SimTime time_at(const CsvTable& table, std::size_t row, int column);
+/// As `time_at`.
 Label label_at(const CsvTable& table, std::size_t row, int column);
 Vector3d vector_at(const CsvTable& table, std::size_t row, int column);
 /// w, x, y, z from a column on.
@@ -21,9 +25,9 @@ Quaterniond rotation_at(const CsvTable& table, std::size_t row, int column);
 /// px ... wz from a column on.
 RigidBodyState body_at(const CsvTable& table, std::size_t row, int column);
 /// Lines of a file as words between commas, without the first line. Throws InputError where there
-/// is none.
+/// is no such file.
 std::vector<std::vector<std::string>> words_of(const std::string& path);
-/// What summary.json says.
+/// When the run ended, by its summary.json. Throws InputError.
 SimTime ended_at(const std::filesystem::path& path);
 /// 0 where it is empty. Throws InputError, with the file's name, where it is no number of a run.
 double number_in(const std::string& word, const std::string& path);

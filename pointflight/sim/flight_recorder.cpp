@@ -134,20 +134,27 @@ struct FlightRecorder::VehicleFiles {
   std::map<std::uint32_t, OutputFile> sensors;  ///< By `Measurement::sensor`.
 };
 
-/// Files of sensors that a program has added: "barometer.csv", "barometer_1.csv", ...
-void FlightRecorder::add_sensor_files(const VehicleAgent& vehicle, VehicleFiles& files) {
+std::map<std::size_t, std::string> sensor_files(const VehicleAgent& vehicle) {
+  std::map<std::size_t, std::string> files;
   std::map<std::string, int> alike;
   for (std::size_t i = 0; i < vehicle.sensors().size(); ++i) {
     const SensorKind* kind = vehicle.sensors()[i].kind;
     if (kind == nullptr) continue;
     const int before = alike[kind->name]++;
-    const std::string name =
-        before == 0 ? kind->name + ".csv" : fmt::format("{}_{}.csv", kind->name, before);
+    files[i] = before == 0 ? kind->name + ".csv" : fmt::format("{}_{}.csv", kind->name, before);
+  }
+  return files;
+}
+
+void FlightRecorder::add_sensor_files(const VehicleAgent& vehicle, VehicleFiles& files) {
+  for (const auto& [number, name] : sensor_files(vehicle)) {
     OutputFile file(at(files.folder, name.c_str()));
     std::string header = "time,delivered";
-    for (const SensorColumn& column : kind->columns) header += "," + column.name;
+    for (const SensorColumn& column : vehicle.sensors()[number].kind->columns) {
+      header += "," + column.name;
+    }
     file.write(header + "\n");
-    files.sensors.emplace(static_cast<std::uint32_t>(i), std::move(file));
+    files.sensors.emplace(static_cast<std::uint32_t>(number), std::move(file));
   }
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -59,5 +60,9 @@ std::string summary_json(const Simulation& simulation);
 
 /// "map", "drone1", "obstacle 3": what a label stands for in a run.
 std::string label_name(const Simulation& simulation, Label label);
+
+/// Names of the files of sensors that a program has added, by `Measurement::sensor`:
+/// "barometer.csv", "barometer_1.csv", ...
+std::map<std::size_t, std::string> sensor_files(const VehicleAgent& vehicle);
 
 }  // namespace pointflight
