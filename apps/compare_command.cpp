@@ -1,5 +1,3 @@
-#include <fmt/format.h>
-
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
@@ -11,6 +9,7 @@
 
 #include "apps/commands.hpp"
 #include "apps/error_picture.hpp"
+#include "apps/error_table.hpp"
 #include "apps/flags.hpp"
 #include "apps/settings_json.hpp"
 #include "apps/terminal.hpp"
@@ -32,33 +31,6 @@ struct CompareFlags {
   bool json = false;
   int threads = 0;
 };
-
-nlohmann::ordered_json to_json(const ErrorStatistics& s) {
-  return {{"rays", s.rays},
-          {"median_abs_error", s.median_abs_error},
-          {"p90_abs_error", s.p90_abs_error},
-          {"p95_abs_error", s.p95_abs_error},
-          {"bias", s.bias},
-          {"missing_fraction", s.missing_fraction},
-          {"early_fraction", s.early_fraction},
-          {"late_fraction", s.late_fraction},
-          {"wrong_fraction", s.wrong_fraction}};
-}
-
-void print_row(const std::string& name, const ErrorStatistics& s) {
-  fmt::print(
-      "{:<24} {:>9} {:>7.2f} {:>7.2f} {:>7.2f} {:>8.2f} {:>8.1f} {:>8.1f} {:>8.1f} {:>7.1f}\n",
-      name,
-      s.rays,
-      100.0 * (1.0 - s.wrong_fraction - s.missing_fraction),
-      100.0 * s.early_fraction,
-      100.0 * s.late_fraction,
-      100.0 * s.missing_fraction,
-      1e3 * s.median_abs_error,
-      1e3 * s.p90_abs_error,
-      1e3 * s.p95_abs_error,
-      1e3 * s.bias);
-}
 
 /// A picture of where a scan's errors sit.
 void draw_scan_errors(const RealScan& scan,
@@ -105,19 +77,8 @@ void compare(const CompareFlags& flags) {
   ErrorCollector all;
   ErrorCollector supported;
   nlohmann::ordered_json rows = nlohmann::ordered_json::array();
-  if (!flags.json) {
-    fmt::print("{:<24} {:>9} {:>7} {:>7} {:>7} {:>8} {:>8} {:>8} {:>8} {:>7}\n",
-               "",
-               "rays",
-               "right %",
-               "early %",
-               "late %",
-               "missing%",
-               "median",
-               "p90",
-               "p95",
-               "bias mm");
-  }
+  const ErrorTable table;
+  if (!flags.json) table.print_heading();
   for (std::size_t i = 0; i < scans.size(); ++i) {
     report(progress, "comparing", static_cast<double>(i) / static_cast<double>(scans.size()));
     const auto rays = compare_scan(scans[i], *renderer, cloud ? &*cloud : nullptr, executor);
@@ -126,26 +87,26 @@ void compare(const CompareFlags& flags) {
     all.add(scan_all);
     supported.add(scan_supported);
     rows.push_back({{"file", scans[i].file},
-                    {"all", to_json(scan_all.statistics())},
-                    {"supported", to_json(scan_supported.statistics())}});
-    if (!flags.json) print_row(scans[i].file, scan_all.statistics());
+                    {"all", table.json(scan_all.statistics())},
+                    {"supported", table.json(scan_supported.statistics())}});
+    if (!flags.json) table.print_row(scans[i].file, scan_all.statistics());
     if (!flags.png.empty()) draw_scan_errors(scans[i], rays, cloud.has_value(), flags.png);
   }
   std::optional<ErrorCollector> floor;
   if (flags.floor) floor = compare_floor(scans, executor, progress);
   end_progress();
   if (flags.json) {
-    nlohmann::ordered_json json = {
-        {"overall",
-         {{"all", to_json(all.statistics())}, {"supported", to_json(supported.statistics())}}},
-        {"scans", rows}};
-    if (floor) json["floor"] = to_json(floor->statistics());
+    nlohmann::ordered_json json = {{"overall",
+                                    {{"all", table.json(all.statistics())},
+                                     {"supported", table.json(supported.statistics())}}},
+                                   {"scans", rows}};
+    if (floor) json["floor"] = table.json(floor->statistics());
     print_json(json);
     return;
   }
-  print_row("all", all.statistics());
-  if (cloud) print_row("all, supported", supported.statistics());
-  if (floor) print_row("scans among themselves", floor->statistics());
+  table.print_row("all", all.statistics());
+  if (cloud) table.print_row("all, supported", supported.statistics());
+  if (floor) table.print_row("scans among themselves", floor->statistics());
 }
 
 }  // namespace

@@ -11,6 +11,7 @@
 
 #include "apps/commands.hpp"
 #include "apps/error_picture.hpp"
+#include "apps/error_table.hpp"
 #include "apps/flags.hpp"
 #include "apps/terminal.hpp"
 #include "pointflight/core/input_error.hpp"
@@ -40,51 +41,21 @@ struct FidelityFlags {
   int threads = 0;
 };
 
-nlohmann::ordered_json to_json(const ErrorStatistics& s) {
-  return {{"rays", s.rays},
-          {"median_abs_error", s.median_abs_error},
-          {"p95_abs_error", s.p95_abs_error},
-          {"bias", s.bias},
-          {"early_fraction", s.early_fraction},
-          {"late_fraction", s.late_fraction},
-          {"missing_fraction", s.missing_fraction},
-          {"leak_fraction", s.leak_fraction()},
-          {"false_fraction", s.false_fraction}};
-}
+constexpr ErrorTable kTable{.has_empty_rays = true};
 
 nlohmann::ordered_json to_json(const std::vector<FidelityRow>& rows) {
   nlohmann::ordered_json json = nlohmann::ordered_json::object();
-  for (const FidelityRow& row : rows) json[row.name] = to_json(row.statistics);
+  for (const FidelityRow& row : rows) json[row.name] = kTable.json(row.statistics);
   return json;
 }
 
-void print_row(const std::string& name, const ErrorStatistics& s) {
-  fmt::print("  {:<22} {:>9} {:>8.3f} {:>8.3f} {:>8.3f} {:>8.2f} {:>8.2f} {:>8.2f}\n",
-             name,
-             s.rays,
-             100.0 * s.early_fraction,
-             100.0 * s.leak_fraction(),
-             100.0 * s.false_fraction,
-             1e3 * s.median_abs_error,
-             1e3 * s.p95_abs_error,
-             1e3 * s.bias);
-}
-
 void print_report(const FidelityReport& report) {
-  fmt::print("  {:<22} {:>9} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8}\n",
-             "",
-             "rays",
-             "early %",
-             "leak %",
-             "false %",
-             "median",
-             "p95",
-             "bias mm");
-  print_row("all", report.all);
-  print_row("interior", report.interior);
-  print_row("silhouette", report.silhouette);
+  kTable.print_heading();
+  kTable.print_row("all", report.all);
+  kTable.print_row("interior", report.interior);
+  kTable.print_row("silhouette", report.silhouette);
   for (const auto* rows : {&report.by_incidence, &report.by_range, &report.by_tag}) {
-    for (const FidelityRow& row : *rows) print_row(row.name, row.statistics);
+    for (const FidelityRow& row : *rows) kTable.print_row(row.name, row.statistics);
   }
   fmt::print("\n");
 }
@@ -190,9 +161,9 @@ void run_scene(const ExactScene& scene,
                          {"tau", map->model().tau},
                          {"seed", flags.seed},
                          {"surfels", map->surfel_count()},
-                         {"all", to_json(report.all)},
-                         {"interior", to_json(report.interior)},
-                         {"silhouette", to_json(report.silhouette)},
+                         {"all", kTable.json(report.all)},
+                         {"interior", kTable.json(report.interior)},
+                         {"silhouette", kTable.json(report.silhouette)},
                          {"by_incidence", to_json(report.by_incidence)},
                          {"by_range", to_json(report.by_range)},
                          {"by_kind", to_json(report.by_tag)}});

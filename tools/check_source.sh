@@ -62,4 +62,13 @@ found=$(grep -rnE '#include <(fmt|yaml-cpp|nlohmann|tbb|oneapi|nanoflann|xxhash|
         pointflight ros_common recording --include='*.hpp' | grep -vE 'io/byte_cursor.hpp|-inl.hpp')
 [ -z "$found" ] || { echo "third-party headers in public headers:"; breach "$found"; }
 
+# Each source includes its own header first, so that headers compile alone.
+for source in $(git ls-files 'pointflight/*.cpp' 'apps/*.cpp' 'ros_common/*.cpp' 'recording/*.cpp' 'ros1/*.cpp' 'ros2/*.cpp'); do
+  [ -f "${source%.cpp}.hpp" ] || continue
+  case $(grep -m1 '^#include' "$source") in
+    "#include \"${source%.cpp}.hpp\"") ;;
+    *) breach "$source does not include its own header first" ;;
+  esac
+done
+
 exit $failed
