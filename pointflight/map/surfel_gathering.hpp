@@ -68,7 +68,7 @@ class SurfelGathering {
  private:
   struct Entry {
     BuildSurfel surfel;
-    std::uint8_t intensity;
+    std::uint8_t intensity = 0;
   };
 
   void append(const std::array<std::int32_t, 3>& voxel, SurfelWord word, std::uint8_t intensity) {
