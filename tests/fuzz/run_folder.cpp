@@ -1,7 +1,9 @@
 // Any bytes as one of the files of a run's folder: played, or an InputError of one line. The first
 // line of the input names the file.
+#include <algorithm>
 #include <array>
 #include <cstdint>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -10,11 +12,12 @@
 
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/geometry/shape_scene.hpp"
+#include "pointflight/io/cloud_reader.hpp"
 #include "pointflight/map/map_builder.hpp"
 #include "pointflight/map/map_file.hpp"
 #include "pointflight/run/playback.hpp"
 #include "pointflight/run/run_loop.hpp"
-#include "pointflight/sim/flight_recorder.hpp"
+#include "tests/run/recorder.hpp"
 
 namespace pointflight {
 namespace {
@@ -28,19 +31,6 @@ constexpr std::array<const char*, 7> kFiles = {"trajectory.csv",
                                                "obstacles.csv",
                                                "summary.json",
                                                "scans/0_000000.pcd"};
-
-/// Writes the run's folder.
-class Recorder : public Link {
- public:
-  Recorder(const std::string& folder, const Simulation& simulation)
-      : simulation_(simulation), recorder_(folder, simulation) {}
-  void on_sample(const Sample& sample) override { recorder_.on_sample(sample); }
-  void close() override { recorder_.finish(simulation_); }
-
- private:
-  const Simulation& simulation_;
-  FlightRecorder recorder_;
-};
 
 void write(const fs::path& path, std::string_view bytes) {
   std::ofstream(path, std::ios::binary)
@@ -77,7 +67,7 @@ class Folder {
     const Scenario scenario = load_scenario((path_ / "s.yaml").string());
     Simulation simulation(scenario, scenario.open_map(), executor);
     RunLoop loop(simulation, {});
-    Recorder recorder((path_ / "run").string(), simulation);
+    testing::Recorder recorder((path_ / "run").string(), simulation);
     loop.add(recorder);
     loop.run();
     for (const char* file : kFiles) {

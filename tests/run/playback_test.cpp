@@ -11,8 +11,8 @@
 #include "pointflight/map/map_file.hpp"
 #include "pointflight/run/run_loop.hpp"
 #include "pointflight/run/threaded_link.hpp"
-#include "pointflight/sim/flight_recorder.hpp"
 #include "ros_common/ros_link.hpp"
+#include "tests/run/recorder.hpp"
 #include "tests/sim/runs.hpp"
 
 namespace pointflight {
@@ -21,6 +21,7 @@ namespace {
 using testing::error_of;
 using testing::expect_contains;
 using testing::read_file;
+using testing::Recorder;
 using testing::TemporaryFolder;
 using testing::write_file;
 
@@ -45,19 +46,6 @@ class Keeper : public Outlet {
  private:
   Messages& messages_;
   std::vector<std::string> names_;
-};
-
-/// Writes the run's folder.
-class Recorder : public Link {
- public:
-  Recorder(const std::string& folder, const Simulation& simulation)
-      : simulation_(simulation), recorder_(folder, simulation) {}
-  void on_sample(const Sample& sample) override { recorder_.on_sample(sample); }
-  void close() override { recorder_.finish(simulation_); }
-
- private:
-  const Simulation& simulation_;
-  FlightRecorder recorder_;
 };
 
 std::unique_ptr<RosLink> keeping(const RunDescription& run, Messages& messages) {
