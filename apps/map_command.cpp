@@ -46,7 +46,7 @@ struct ImportFlags {
 std::string about_spacing(double spacing, double resolution, double supported) {
   if (spacing <= 0.0) return "unknown";
   const std::string points = fmt::format("{:.1f} mm", spacing * 1e3);
-  if (resolution >= 2.2 * spacing) return points;
+  if (resolution >= 0.9 * supported) return points;
   return fmt::format("{}: {:.4g} m is finer than the points, {:.2g} m or more is advised",
                      points,
                      resolution,
@@ -85,10 +85,15 @@ void print_report(const ImportReport& r, const ImportOptions& options) {
                                     r.outlier_points)
                       : "kept"));
   log("noise         " + about_noise(r.noise, r.projection.projected, r.projection.too_thick));
-  if (r.grown_surfels > 0) {
-    log(fmt::format("thin scan     {} surfels widened to close gaps", r.grown_surfels));
+  if (r.grown_surfels + r.wide_surfels > 0) {
+    log(fmt::format("thin scan     {} surfels widened to close gaps, {} for several cells each",
+                    r.grown_surfels,
+                    r.wide_surfels));
   }
-  log(fmt::format("coverage      {:.2f} makes a return ({:.0f} points per planar cell)",
+  if (r.small_surfels > 0) {
+    log(fmt::format("fine forms    {} surfels for parts of cells", r.small_surfels));
+  }
+  log(fmt::format("coverage      {:.2f} makes a return ({:.0f} points per planar surfel)",
                   r.tau,
                   r.points_per_cell));
   log(fmt::format("surfels       {}, {:.0f} % planar{}",
@@ -241,7 +246,13 @@ void print_findings(const nlohmann::ordered_json& metadata, double resolution) {
                          count_in(projection, "projected"),
                          count_in(projection, "too_thick")));
   const std::uint64_t grown = count_in(metadata, "grown_surfels");
-  if (grown > 0) fmt::print("  thin scan   {} surfels widened to close gaps\n", grown);
+  const std::uint64_t wide = count_in(metadata, "wide_surfels");
+  if (grown + wide > 0) {
+    fmt::print(
+        "  thin scan   {} surfels widened to close gaps, {} for several cells each\n", grown, wide);
+  }
+  const std::uint64_t small = count_in(metadata, "small_surfels");
+  if (small > 0) fmt::print("  fine forms  {} surfels for parts of cells\n", small);
 }
 
 void print_info(const SurfelMap& map, const InfoFlags& flags) {

@@ -23,6 +23,7 @@ enum class StreamId : std::uint32_t {
   kGusts = 13,         ///< entity: vehicle, index: physics step * 4 + draw
   kDroppedScans = 14,  ///< entity: vehicle << 8 | lidar, index: scan
   kOwnSensors = 15,    ///< of kinds that programs add; entity: vehicle << 8 | sensor
+  kSurvey = 16,        ///< of an exact scene; entity: which draw, index: its number
   kTest = 1000,        ///< inputs of tests and benchmarks
 };
 

@@ -33,6 +33,8 @@ std::string import_metadata(const ImportReport& report, const ImportOptions& opt
                         {"projected", report.projection.projected},
                         {"too_thick", report.projection.too_thick}};
   json["surfels"] = report.surfels;
+  json["wide_surfels"] = report.wide_surfels;
+  json["small_surfels"] = report.small_surfels;
   json["planar_surfels"] = report.planar_surfels;
   json["points_per_planar_cell"] = report.points_per_cell;
   json["tau"] = static_cast<double>(report.tau);

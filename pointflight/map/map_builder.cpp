@@ -5,18 +5,19 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <mutex>
 #include <span>
 
 #include "pointflight/core/argument.hpp"
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/io/read_ahead.hpp"
+#include "pointflight/map/chosen_surfels.hpp"
 #include "pointflight/map/import_check.hpp"
 #include "pointflight/map/import_metadata.hpp"
 #include "pointflight/map/noise_projection.hpp"
 #include "pointflight/map/spacing.hpp"
 #include "pointflight/map/sparse_growth.hpp"
 #include "pointflight/map/surfel_fit.hpp"
+#include "pointflight/map/surfel_scales.hpp"
 
 namespace pointflight {
 namespace {
@@ -26,17 +27,14 @@ constexpr double kDefaultMeshResolution = 0.05;
 // walls that coincide with cell faces would split into two layers of cells
 constexpr double kGridPhase = -0.37;
 
-/// Coverage that makes a return, by the median of points per planar cell: measured between 1 and 80
-/// points per cell, on exact scenes and on real scans (docs/fidelity.md).
-double tau_for(double points_per_cell) {
-  constexpr double kThin = 2.0;
-  constexpr double kFair = 6.0;
+/// Coverage that makes a return, by the median of points per planar surfel: thin maps have holes to
+/// bridge; the denser, the sharper their edges can be. Measured between 1 and 80 points, on exact
+/// scenes and on real scans (docs/fidelity.md).
+double tau_for(double points_per_surfel) {
   constexpr double kMany = 32.0;
   constexpr double kDense = 64.0;
-  const auto share = [&](double from, double to) {
-    return std::clamp((points_per_cell - from) / (to - from), 0.0, 1.0);
-  };
-  return 0.23 + 0.13 * share(kThin, kFair) + 0.04 * share(kMany, kDense);
+  const double share = std::clamp((points_per_surfel - kMany) / (kDense - kMany), 0.0, 1.0);
+  return 0.36 + 0.04 * share;
 }
 
 /// One import: the passes over the points in order.
@@ -212,21 +210,45 @@ class Import {
   void build_tree() {
     ImportReport& report = map_.report;
     find_bounds();
-    const auto surfels = fit_surfels(cells_, executor_, scratch_, progress_);
-    pointflight::report(progress_, "closing gaps of thin scans", 0.0);
-    report.grown_surfels = grow_sparse_surfels(cells_, surfels, executor_, progress_);
-    report.surfels = surfels.size();
-    choose_tau(surfels);
-    const ScratchArray<std::uint8_t> intensity =
-        report.has_intensity ? intensities() : ScratchArray<std::uint8_t>();
+    const ChosenSurfels chosen = choose_scales();
+    report.surfels = chosen.surfels.size();
+    report.planar_surfels = chosen.planar;
+    report.points_per_cell = chosen.points_per_planar;
+    report.tau = options_.tau.value_or(static_cast<float>(tau_for(report.points_per_cell)));
+    map_.description.intensity_offset = chosen.intensity_offset;
+    map_.description.intensity_step = chosen.intensity_step;
     cells_ = {};  // room for the tree
     pointflight::report(progress_, "building the hierarchy", 0.0);
-    TreeInput input{surfels, intensity, {}, report.resolution};
+    TreeInput input{chosen.surfels, chosen.intensity, {}, report.resolution};
     for (std::size_t axis = 0; axis < 3; ++axis) {
       input.low[axis] = static_cast<std::uint32_t>(min_voxel_[axis] + kMaxVoxel);
     }
     map_.tree = build_bvh8(input, options_.quality, executor_, scratch_);
     pointflight::report(progress_, "building the hierarchy", 1.0);
+  }
+
+  /// Surfels of the cells, of wider ones where points are thin, of smaller ones where many lie on
+  /// something that is not flat.
+  ChosenSurfels choose_scales() {
+    ImportReport& report = map_.report;
+    const auto surfels = fit_surfels(cells_, executor_, scratch_, progress_);
+    pointflight::report(progress_, "closing gaps of thin scans", 0.0);
+    const SparseBlocks sparse(cells_, surfels, executor_);
+    std::vector<bool> covered;
+    const auto wide =
+        surfels_of_wide_cells(cells_, sparse, covered, executor_, scratch_, progress_);
+    report.wide_surfels = wide.size();
+    report.grown_surfels =
+        grow_sparse_surfels(cells_, surfels, covered, sparse, executor_, progress_);
+    ScratchArray<SurfelPiece> small;
+    SmallCells splitting(cells_, surfels, covered, executor_, scratch_, options_.cells_memory);
+    if (!splitting.empty()) {
+      for_each_batch("splitting cells",
+                     [&](std::span<const CloudPoint> points) { splitting.add(points); });
+      small = splitting.finish(progress_);
+    }
+    report.small_surfels = small.size();
+    return choose_surfels(cells_, surfels, covered, wide, small, report.has_intensity, scratch_);
   }
 
   /// Where the map lies: in voxels, and its centroids in the world.
@@ -271,68 +293,6 @@ class Import {
     map_.description.origin_world =
         cells_.frame().base_world +
         map_.report.resolution * Vector3d(min_voxel_[0], min_voxel_[1], min_voxel_[2]);
-  }
-
-  /// Thin maps have holes to bridge; the denser, the sharper their edges can be.
-  void choose_tau(const ScratchArray<BuildSurfel>& surfels) {
-    constexpr std::size_t kMostPoints = 1 << 12;
-    ImportReport& report = map_.report;
-    std::vector<std::uint64_t> cells_with(kMostPoints + 1, 0);
-    std::mutex mutex;
-    const std::vector<std::size_t> first = cells_.first_numbers();
-    cells_.for_each_tile(executor_, [&](std::size_t t, std::span<VoxelCell> cells) {
-      std::vector<std::uint32_t> counts;
-      for (std::size_t i = 0; i < cells.size(); ++i) {
-        if (is_planar(surfels[first[t] + i].word)) counts.push_back(cells[i].n);
-      }
-      surfels.release(first[t], first[t] + cells.size());
-      const std::lock_guard lock(mutex);  // the order of whole numbers does not show
-      for (const std::uint32_t n : counts) ++cells_with[std::min<std::size_t>(n, kMostPoints)];
-      report.planar_surfels += counts.size();
-    });
-    std::uint64_t below = 0;
-    for (std::size_t n = 0; n <= kMostPoints && report.planar_surfels > 0; ++n) {
-      below += cells_with[n];
-      if (below <= report.planar_surfels / 2) continue;
-      report.points_per_cell = static_cast<double>(n);
-      break;
-    }
-    report.tau = options_.tau.value_or(static_cast<float>(tau_for(report.points_per_cell)));
-  }
-
-  /// Mean intensity of each cell as a byte between the least and the greatest.
-  ScratchArray<std::uint8_t> intensities() {
-    const auto mean = [](const VoxelCell& cell) {
-      const float value = cell.intensity_sum / static_cast<float>(cell.n);
-      return std::isfinite(value) ? value : 0.0f;
-    };
-    std::vector<std::pair<float, float>> of_tile(
-        cells_.tiles().size(),
-        {std::numeric_limits<float>::infinity(), -std::numeric_limits<float>::infinity()});
-    cells_.for_each_tile(executor_, [&](std::size_t t, std::span<VoxelCell> cells) {
-      for (const VoxelCell& cell : cells) {
-        of_tile[t].first = std::min(of_tile[t].first, mean(cell));
-        of_tile[t].second = std::max(of_tile[t].second, mean(cell));
-      }
-    });
-    float min = std::numeric_limits<float>::infinity();
-    float max = -min;
-    for (const auto& [low, high] : of_tile) {
-      min = std::min(min, low);
-      max = std::max(max, high);
-    }
-    const float step = (max - min) / 255.0f;
-    map_.description.intensity_offset = min;
-    map_.description.intensity_step = std::isfinite(step) ? step : 0.0f;
-    ScratchArray<std::uint8_t> codes(scratch_, cells_.count());
-    const std::vector<std::size_t> first = cells_.first_numbers();
-    cells_.for_each_tile(executor_, [&](std::size_t t, std::span<VoxelCell> cells) {
-      for (std::size_t i = 0; i < cells.size(); ++i) {
-        const float code = step > 0.0f ? std::round((mean(cells[i]) - min) / step) : 0.0f;
-        codes[first[t] + i] = static_cast<std::uint8_t>(std::clamp(code, 0.0f, 255.0f));
-      }
-    });
-    return codes;
   }
 
   void describe() {

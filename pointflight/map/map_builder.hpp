@@ -48,16 +48,18 @@ struct ImportReport {
   std::uint64_t cells = 0;                ///< Occupied, before outliers are dropped.
   std::uint64_t outlier_cells = 0;        ///< Dropped.
   std::uint64_t outlier_points = 0;       ///< In the dropped cells.
-  std::uint64_t surfels = 0;              ///< In the map: one for each cell that is left.
+  std::uint64_t surfels = 0;              ///< In the map.
+  std::uint64_t wide_surfels = 0;         ///< Of them, those that stand for several thin cells.
+  std::uint64_t small_surfels = 0;        ///< Of them, those that stand for part of a cell.
   std::uint64_t planar_surfels = 0;       ///< Of them, those of thickness class 0.
   double noise = 0.0;                     ///< Deviation of the points across flat surfaces, m.
   ProjectionReport projection;            ///< All zero where the cloud was clean.
-  double points_per_cell = 0.0;           ///< Median of the planar cells.
+  double points_per_cell = 0.0;           ///< Median of the planar surfels.
   float tau = 0.0f;                       ///< Coverage that makes a return.
   std::uint64_t grown_surfels = 0;        ///< Widened where the scan is thin.
   double resolution = 0.0;                ///< r, m.
   double spacing = 0.0;                   ///< Median nearest-neighbour distance, m; 0 if unknown.
-  double supported_resolution = 0.0;      ///< 2.5 spacings.
+  double supported_resolution = 0.0;      ///< 2 spacings.
   bool resolution_was_chosen = false;     ///< True: by the spacing, since no option gave one.
   bool has_intensity = false;             ///< A source has them.
   bool intensity_from_colors = false;     ///< Of a source that has colours and no intensity.

@@ -118,7 +118,7 @@ Vector3d SpacingEstimate::middle() const {
 }
 
 double supported_resolution(double spacing) {
-  const double wanted = 2.5 * spacing;
+  const double wanted = 2.0 * spacing;
   if (!(wanted > 1e-9) || !(wanted < 1e12)) return 0.0;
   // steps of the second digit, without logarithms; 36 / 1000 is 0.036, 36 * 0.001 is not
   double divisor = 1.0;

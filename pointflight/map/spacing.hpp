@@ -35,7 +35,7 @@ class SpacingEstimate {
   std::uint64_t one_in_ = 1;
 };
 
-/// The smallest resolution that a spacing supports: 2.5 times it (measured on scans of a hall:
+/// The smallest resolution that a spacing supports: 2.0 times it (measured on scans of a hall:
 /// below, walls get holes), rounded up to two digits.
 double supported_resolution(double spacing);
 

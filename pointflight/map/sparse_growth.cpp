@@ -1,10 +1,8 @@
 #include "pointflight/map/sparse_growth.hpp"
 
 #include <algorithm>
-#include <array>
 #include <atomic>
 #include <cmath>
-#include <map>
 #include <optional>
 
 #include "pointflight/map/covariance_axes.hpp"
@@ -13,59 +11,8 @@
 namespace pointflight {
 namespace {
 
-constexpr double kBlock = 3.0;   // m
-constexpr double kSparse = 4.0;  // points per cell
 constexpr std::size_t kEnoughCells = 7;
 constexpr std::int32_t kWidest = 3;  // cells to each side: 7^3
-
-/// Whole numbers; as doubles, because cells of a hostile file may be thousands of kilometres wide.
-using BlockKey = std::array<double, 3>;
-
-BlockKey block_of(double resolution, const VoxelCell& cell) {
-  BlockKey key{};
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    key[axis] = std::floor(cell.voxel[axis] * resolution / kBlock);
-  }
-  return key;
-}
-
-/// Planar cells of a block, and those with too few points.
-struct Counts {
-  std::size_t all = 0;
-  std::size_t sparse = 0;
-  [[nodiscard]] bool median_is_sparse() const { return 2 * sparse > all; }
-};
-
-using Blocks = std::map<BlockKey, Counts>;
-
-Blocks count_blocks(const CellTiles& cells,
-                    const ScratchArray<BuildSurfel>& surfels,
-                    const std::vector<std::size_t>& first,
-                    const Executor& executor) {
-  std::vector<Blocks> of_tile(cells.tiles().size());
-  cells.for_each_tile(executor, [&](std::size_t t, std::span<VoxelCell> own) {
-    Blocks& blocks = of_tile[t];
-    BlockKey last{};
-    Counts* counts = nullptr;
-    for (std::size_t i = 0; i < own.size(); ++i) {
-      if (!is_planar(surfels[first[t] + i].word)) continue;
-      const BlockKey key = block_of(cells.resolution(), own[i]);
-      if (counts == nullptr || key != last) counts = &blocks[key];
-      last = key;
-      ++counts->all;
-      counts->sparse += own[i].n < kSparse ? 1 : 0;
-    }
-    surfels.release(first[t], first[t] + own.size());
-  });
-  Blocks all;
-  for (const Blocks& blocks : of_tile) {
-    for (const auto& [key, counts] : blocks) {
-      all[key].all += counts.all;
-      all[key].sparse += counts.sparse;
-    }
-  }
-  return all;
-}
 
 /// The widened surfel, or nothing where the surroundings are not planar.
 std::optional<Surfel> widened(const VoxelGrid& grid,
@@ -106,14 +53,13 @@ std::optional<Surfel> widened(const VoxelGrid& grid,
 
 std::uint64_t grow_sparse_surfels(const CellTiles& cells,
                                   const ScratchArray<BuildSurfel>& surfels,
+                                  const std::vector<bool>& covered,
+                                  const SparseBlocks& blocks,
                                   const Executor& executor,
                                   const Progress& progress) {
   const std::vector<std::size_t> first = cells.first_numbers();
-  const Blocks blocks = count_blocks(cells, surfels, first, executor);
   const auto is_thin = [&](const VoxelCell& cell) {
-    if (cell.n >= kSparse) return false;
-    const auto block = blocks.find(block_of(cells.resolution(), cell));
-    return block != blocks.end() && block->second.median_is_sparse();
+    return cell.n < kSparsePoints && blocks.contain(cells.resolution(), cell);
   };
   std::vector<char> has_thin(cells.tiles().size(), 0);
   cells.for_each_tile(executor, [&](std::size_t t, std::span<VoxelCell> own) {
@@ -129,7 +75,7 @@ std::uint64_t grow_sparse_surfels(const CellTiles& cells,
     std::vector<double> squared;
     for (std::size_t i = 0; i < view.count; ++i) {
       const VoxelCell& cell = view.grid.cells()[i];
-      if (!is_thin(cell)) continue;
+      if (!is_thin(cell) || (!covered.empty() && covered[first[view.tile] + i])) continue;
       if (const auto wide = widened(view.grid, window, cell, squared)) {
         surfels[first[view.tile] + i].word = encode(*wide);
         ++grown;

@@ -71,7 +71,7 @@ static void angles(const Ray* rays,
 /// Splats of eight points at a time, before those that matter are picked.
 struct SplatLanes {
   alignas(32) float p[3][8], n[3][8], distance[8], cos_max[8], theta_max[8], row_at[8],
-      column_at[8];
+      column_at[8], reach_squared[8];
 };
 
 /// Point i + k of all, lane k of its eight.
@@ -92,6 +92,7 @@ POINTFLIGHT_INLINE PaperSplat splat_of(const PaperImage& image,
   splat_k.column_at = s.column_at[k];
   splat_k.planar = points.planar[i + k];
   splat_k.intensity = points.intensity[i + k];
+  splat_k.reach_squared = s.reach_squared[k];
   const float reach = s.theta_max[k] / image.step;
   // a point smaller than a pixel has at least the row that it is nearest to
   const float row = s.row_at[k];
@@ -108,10 +109,10 @@ static void project(const PaperImage& image,
                     std::vector<PaperSplat>& splats) {
   const F8 zero = splat(0.0f);
   const F8 one = splat(1.0f);
-  const F8 radius = splat(image.radius);
-  // theta_max is below pi / 2 of its sine
-  const F8 beside = splat(1.6f * image.radius);
   for (std::size_t i = 0; i < points.count; i += 8) {
+    const F8 radius = load_unaligned(points.radius.data() + i);
+    // theta_max is below pi / 2 of its sine
+    const F8 beside = splat(1.6f) * radius;
     const F8 qx = load_unaligned(points.x.data() + i);
     const F8 qy = load_unaligned(points.y.data() + i);
     const F8 qz = load_unaligned(points.z.data() + i);
@@ -139,6 +140,7 @@ static void project(const PaperImage& image,
     SplatLanes s;  // NOLINT(cppcoreguidelines-pro-type-member-init): all is written
     store(sine + splat(kQuarterTurn - 1.0f) * sine2 * sine, s.theta_max);
     store(sqrt(one - sine2), s.cos_max);
+    store(splat(4.0f) * radius * radius, s.reach_squared);
     const F8 azimuth = arc_tangent(y, x);
     const F8 elevation = arc_tangent(z, sqrt(across));
     store((elevation - splat(image.elevation_min)) / splat(image.step), s.row_at);
@@ -193,7 +195,7 @@ POINTFLIGHT_INLINE void fill_columns(
     // a point stands for a cube of substance: its plane ends near it (the paper leaves that open,
     // and grazing planes would reach to the sensor)
     const M8 near_point =
-        (ex * ex + ey * ey + ez * ez < splat(image.reach_squared)) & (splat(0.0f) < plane_depth);
+        (ex * ex + ey * ey + ez * ez < splat(s.reach_squared)) & (splat(0.0f) < plane_depth);
     const M8 drawn = without(within, without(on_plane, near_point));
     const F8 depth = select(on_plane, plane_depth, distance);
     const F8 cosine = select(planar, steepness, splat(1.0f));
@@ -268,21 +270,22 @@ using RowMajor = Eigen::Matrix<float, 3, 3, Eigen::RowMajor>;
 
 }  // namespace
 
-void PaperPoints::add(const Vector3f& place, const Vector3f& normal, bool is_planar, float value) {
-  x.push_back(place.x());
-  y.push_back(place.y());
-  z.push_back(place.z());
-  nx.push_back(normal.x());
-  ny.push_back(normal.y());
-  nz.push_back(normal.z());
-  planar.push_back(is_planar ? 1.0f : 0.0f);
-  intensity.push_back(value);
+void PaperPoints::add(const Point& point) {
+  x.push_back(point.place.x());
+  y.push_back(point.place.y());
+  z.push_back(point.place.z());
+  nx.push_back(point.normal.x());
+  ny.push_back(point.normal.y());
+  nz.push_back(point.normal.z());
+  planar.push_back(point.is_planar ? 1.0f : 0.0f);
+  intensity.push_back(point.intensity);
+  radius.push_back(point.radius);
   ++count;
 }
 
 void PaperPoints::finish() {
   const std::size_t room = (count + 7) / 8 * 8;
-  for (std::vector<float>* values : {&x, &y, &z, &nx, &ny, &nz, &planar, &intensity}) {
+  for (std::vector<float>* values : {&x, &y, &z, &nx, &ny, &nz, &planar, &intensity, &radius}) {
     values->resize(room, 0.0f);
     values->shrink_to_fit();
   }

@@ -26,8 +26,15 @@ struct PaperPoints {
   std::vector<float> nx, ny, nz;  ///< Normals.
   std::vector<float> planar;      ///< 1 where gamma is below the threshold, else 0.
   std::vector<float> intensity;
+  std::vector<float> radius;  ///< Of the point's cube, m.
 
-  void add(const Vector3f& place, const Vector3f& normal, bool is_planar, float value);
+  struct Point {
+    Vector3f place, normal;
+    bool is_planar;
+    float intensity;
+    float radius;
+  };
+  void add(const Point& point);
   /// Fills up the last group, once all points are there.
   void finish();
 };
@@ -44,8 +51,6 @@ struct PaperImage {
   float elevation_min = 0.0f;
   bool full_turn = false;  ///< The last column lies beside the first.
   float range_max = 0.0f;
-  float radius = 0.0f;         ///< Of a point's cube: sqrt(3) / 2 r, m.
-  float reach_squared = 0.0f;  ///< A point's plane ends so far from it, m^2.
   // which directions fill any pixel, without trigonometry
   float sin_low = -1.0f, sin_high = 1.0f;
   bool narrow = false;     ///< The azimuths are a wedge of less than half a turn:
@@ -65,6 +70,7 @@ struct PaperSplat {
   float row_at, column_at;  ///< Where it projects to.
   float planar;
   float intensity;
+  float reach_squared;  ///< The point's plane ends so far from it, m^2.
   int first_row, last_row;
 };
 

@@ -32,7 +32,7 @@ Extent extent_of(const PaperAngles& angles, std::size_t count) {
 }
 
 /// An empty image laid over the rays.
-PaperImage image_over(const Extent& rays, const RayBatch& batch, double radius) {
+PaperImage image_over(const Extent& rays, const RayBatch& batch) {
   const double step = batch.image_resolution;
   const auto low = static_cast<double>(rays.azimuth_min);
   const double spread = static_cast<double>(rays.azimuth_max) - low;
@@ -51,8 +51,6 @@ PaperImage image_over(const Extent& rays, const RayBatch& batch, double radius) 
   image.azimuth_min = static_cast<float>(azimuth_min);
   image.elevation_min = static_cast<float>(bottom);
   image.range_max = batch.range_max;
-  image.radius = static_cast<float>(radius);
-  image.reach_squared = static_cast<float>(4.0 * radius * radius);
   // half a pixel more, for points that round to the outermost
   image.sin_low = static_cast<float>(math::sin(std::max(-kPi / 2, bottom - step)));
   image.sin_high = static_cast<float>(math::sin(std::min(kPi / 2, top + step)));
@@ -113,21 +111,80 @@ Hit look_up(const PaperImage& image, float azimuth, float elevation) {
   return {image.depth[at], image.cosine[at], image.intensity[at], kMapLabel};
 }
 
+/// The paper's point of a cell: half the diagonal of its cube, m.
+double radius_of(double cell_width) {
+  return std::sqrt(3.0) / 2.0 * cell_width;
+}
+
 /// Points on the surface of a solid, about `spacing` apart (its frame). Their normals are not used.
 PaperPoints points_of(const Solid& solid, double spacing) {
   PaperPoints points;
+  const auto radius = static_cast<float>(radius_of(spacing));
   for (const Vector3d& p : surface_points(solid, spacing)) {
-    points.add(p.cast<float>(), Vector3f::UnitZ(), false, 0.0f);
+    points.add({p.cast<float>(), Vector3f::UnitZ(), false, 0.0f, radius});
   }
   return points;
 }
 
-PaperPoints points_of(const SurfelMap& map, double gamma_max) {
+/// How wide the cells are that surfels stand for. The paper knows one width; maps have several, and
+/// what they store is only the spread: small cells share a voxel of the map, and the spread of a
+/// filled cell is its width / sqrt(12).
+class CellWidths {
+  static constexpr double kWide = 1.8;
+
+ public:
+  explicit CellWidths(const SurfelMap& map) : map_(map) {
+    voxels_.reserve(map.surfel_count());
+    for_each_surfel(map.words(), [&](const LeafHeader& leaf, std::size_t word) {
+      voxels_.push_back(voxel_of(leaf, decode(map.words()[word])));
+    });
+    std::sort(voxels_.begin(), voxels_.end());
+  }
+
+  /// `visit(point in the world, its PaperPoints::Point but for the place, index in words)`
+  template <class Visit>
+  void for_each_point(double gamma_threshold, const Visit& visit) const {
+    const double r = map_.resolution();
+    for_each_surfel(map_.words(), [&](const LeafHeader& leaf, std::size_t word) {
+      const Surfel surfel = decode(map_.words()[word]);
+      const double width = r * cells_wide(leaf, surfel);
+      const Vector3d at = map_.origin_world() + r * (Vector3d(leaf.x, leaf.y, leaf.z) +
+                                                     surfel.center_voxels.cast<double>());
+      visit(at,
+            PaperPoints::Point{Vector3f::Zero(),
+                               surfel.axes.col(0),
+                               static_cast<double>(surfel.s[0]) * r < gamma_threshold * width,
+                               map_.intensity(static_cast<std::uint32_t>(word)),
+                               static_cast<float>(radius_of(width))});
+    });
+  }
+
+ private:
+  static std::uint64_t voxel_of(const LeafHeader& leaf, const Surfel& surfel) {
+    const auto place = [&](std::uint32_t low, int axis) {
+      return low + static_cast<std::uint64_t>(surfel.center_voxels[axis]);
+    };
+    return place(leaf.x, 0) | place(leaf.y, 1) << 21 | place(leaf.z, 2) << 42;
+  }
+  [[nodiscard]] double cells_wide(const LeafHeader& leaf, const Surfel& surfel) const {
+    const auto [from, to] =
+        std::equal_range(voxels_.begin(), voxels_.end(), voxel_of(leaf, surfel));
+    if (to - from > 1) return 0.5;
+    const double wide = std::sqrt(12.0) * static_cast<double>(surfel.s[1]);
+    return wide < kWide ? 1.0 : wide;
+  }
+
+  const SurfelMap& map_;
+  std::vector<std::uint64_t> voxels_;  // of the surfels, sorted
+};
+
+PaperPoints points_of(const SurfelMap& map, double gamma_threshold) {
   PaperPoints points;
-  map.for_each_surfel(
-      [&](const Vector3d& center, const Vector3d& normal, double thickness, std::uint32_t) {
-        points.add(center.cast<float>(), normal.cast<float>(), thickness < gamma_max, 0.0f);
-      });
+  CellWidths(map).for_each_point(gamma_threshold,
+                                 [&](const Vector3d& center, PaperPoints::Point point) {
+                                   point.place = center.cast<float>();
+                                   points.add(point);
+                                 });
   return points;
 }
 
@@ -139,9 +196,8 @@ PaperRenderer::PaperRenderer(const Scene& scene, const PaperOptions& options)
   require_argument(options_.voxel_length > 0.0, "PaperRenderer: a voxel length above 0 is wanted");
   const double l = options_.voxel_length;
   std::map<std::array<std::int64_t, 3>, std::size_t> index;
-  const double gamma_max = options_.gamma_threshold * map_->resolution();
-  map_->for_each_surfel(
-      [&](const Vector3d& center, const Vector3d& normal, double thickness, std::uint32_t word) {
+  CellWidths(*map_).for_each_point(
+      options_.gamma_threshold, [&](const Vector3d& center, PaperPoints::Point point) {
         const Vector3d cell = (center / l).array().floor();
         const std::array<std::int64_t, 3> key = {static_cast<std::int64_t>(cell.x()),
                                                  static_cast<std::int64_t>(cell.y()),
@@ -149,10 +205,9 @@ PaperRenderer::PaperRenderer(const Scene& scene, const PaperOptions& options)
         const auto [at, is_new] = index.try_emplace(key, voxels_.size());
         if (is_new) voxels_.push_back({cell * l, {}});
         Voxel& voxel = voxels_[at->second];
-        voxel.points.add((center - voxel.corner_world).cast<float>(),
-                         normal.cast<float>(),
-                         thickness < gamma_max,
-                         map_->intensity(word));
+        point.place = (center - voxel.corner_world).cast<float>();
+        largest_radius_ = std::max(largest_radius_, static_cast<double>(point.radius));
+        voxel.points.add(point);
       });
   for (Voxel& voxel : voxels_) voxel.points.finish();
 }
@@ -224,7 +279,7 @@ void PaperRenderer::draw_bodies(const RayBatch& batch,
     PaperPoints points = solid != nullptr
                              ? points_of(*solid, map_->resolution())
                              : points_of(*std::get<std::shared_ptr<const SurfelMap>>(body.shape),
-                                         options_.gamma_threshold * map_->resolution());
+                                         options_.gamma_threshold);
     std::fill(points.intensity.begin(), points.intensity.end(), static_cast<float>(number));
     points.finish();
     std::vector<PaperSplat> splats;
@@ -248,10 +303,9 @@ void PaperRenderer::render(const RayBatch& batch,
   executor.parallel_for(batch.rays.size(), 4096, [&](std::size_t begin, std::size_t end) {
     paper_angles(batch.rays, turn, begin, end, angles);
   });
-  const double radius = std::sqrt(3.0) / 2.0 * map_->resolution();
-  PaperImage image = image_over(extent_of(angles, batch.rays.size()), batch, radius);
+  PaperImage image = image_over(extent_of(angles, batch.rays.size()), batch);
 
-  const double ball = std::sqrt(3.0) / 2.0 * options_.voxel_length + radius;
+  const double ball = radius_of(options_.voxel_length) + largest_radius_;
   const Vector3d half = Vector3d::Constant(0.5 * options_.voxel_length);
   std::vector<std::size_t> seen;
   for (std::size_t v = 0; v < voxels_.size(); ++v) {

@@ -17,7 +17,8 @@ struct PaperOptions {
 /// are projected into a depth image of angular resolution theta_res (azimuth by elevation, laid
 /// over the rays of the batch); each fills the pixels within theta_max = asin(sqrt(3)/2 r / d) (eq.
 /// 1), a point on a plane with the depth at which the pixel's ray meets that plane; pixels keep the
-/// smallest depth. A ray returns the depth of its pixel.
+/// smallest depth. A ray returns the depth of its pixel. r is that of the cell that a surfel stands
+/// for: half the map's for small ones, more for wide ones.
 ///
 /// All rays start at the sensor's pose, as in the paper: no rolling scan. Bodies are drawn as
 /// points of their surfaces, about r apart, where they are at that instant (the paper, section
@@ -47,6 +48,7 @@ class PaperRenderer : public Renderer {
   std::shared_ptr<const SurfelMap> map_;
   PaperOptions options_;
   std::vector<Voxel> voxels_;
+  double largest_radius_ = 0.0;  ///< Of the points, m.
 };
 
 }  // namespace pointflight

@@ -182,8 +182,9 @@ TEST(Import, ClosesTheGapsOfAThinScanOnly) {
     options.resolution = 0.05;
     const ImportedMap imported =
         import_points(cloud_of(scene, per_cell / (0.05 * 0.05), 0.0), options);
-    const auto share = static_cast<double>(imported.report.grown_surfels) /
-                       static_cast<double>(imported.report.surfels);
+    const auto share =
+        static_cast<double>(imported.report.grown_surfels + imported.report.wide_surfels) /
+        static_cast<double>(imported.report.surfels);
     if (per_cell < 4.0) {
       EXPECT_GT(share, 0.9);
     } else {
@@ -262,10 +263,10 @@ TEST(Import, ChoosesTheResolutionThatTheSpacingSupports) {
   }
   const ImportedMap map = import_points(points, {});
   EXPECT_NEAR(map.report.spacing, 0.02, 1e-9);
-  EXPECT_NEAR(map.report.resolution, 0.05, 1e-9);
+  EXPECT_NEAR(map.report.resolution, 0.04, 1e-9);
   EXPECT_TRUE(map.report.resolution_was_chosen);
-  EXPECT_NEAR(supported_resolution(0.0257), 0.065, 1e-9);
-  EXPECT_NEAR(supported_resolution(1.3), 3.3, 1e-9);
+  EXPECT_NEAR(supported_resolution(0.0257), 0.052, 1e-9);
+  EXPECT_NEAR(supported_resolution(1.3), 2.6, 1e-9);
 }
 
 TEST(Import, KeepsIntensities) {

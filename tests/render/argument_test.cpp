@@ -107,11 +107,11 @@ TEST(Arguments, OfReadersAndWriters) {
 }
 
 TEST(Arguments, ResolutionsHaveTwoDigits) {
-  EXPECT_EQ(supported_resolution(0.0143), 0.036);
-  EXPECT_EQ(supported_resolution(0.00143), 0.0036);
-  EXPECT_EQ(supported_resolution(1.0), 2.5);
-  EXPECT_EQ(supported_resolution(100.0), 250.0);
-  EXPECT_EQ(supported_resolution(123.0), 310.0);
+  EXPECT_EQ(supported_resolution(0.0143), 0.029);
+  EXPECT_EQ(supported_resolution(0.00143), 0.0029);
+  EXPECT_EQ(supported_resolution(1.0), 2.0);
+  EXPECT_EQ(supported_resolution(100.0), 200.0);
+  EXPECT_EQ(supported_resolution(123.0), 250.0);
   EXPECT_EQ(supported_resolution(kNan), 0.0);
   EXPECT_EQ(supported_resolution(kInf), 0.0);
   EXPECT_EQ(supported_resolution(0.0), 0.0);
