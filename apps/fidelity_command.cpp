@@ -13,6 +13,7 @@
 #include "apps/error_picture.hpp"
 #include "apps/error_table.hpp"
 #include "apps/flags.hpp"
+#include "apps/survey_fidelity.hpp"
 #include "apps/terminal.hpp"
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/fidelity/scene_beams.hpp"
@@ -39,6 +40,7 @@ struct FidelityFlags {
   std::string png;
   bool force = false;
   int threads = 0;
+  SurveyFlags survey;
 };
 
 constexpr ErrorTable kTable{.has_empty_rays = true};
@@ -182,13 +184,45 @@ void run_scene(const ExactScene& scene,
   }
 }
 
+/// What both kinds share, where it was given; defaults differ.
+void complete_survey_flags(const CLI::App& app, FidelityFlags& flags) {
+  const auto was_given = [&](const char* name) { return app.count(name) > 0; };
+  for (const char* name : {"--points-per-cell", "--density-min", "--thinned", "--beams", "--png"}) {
+    if (was_given(name)) {
+      throw InputError(fmt::format("{} means nothing to --survey; leave one of them out", name));
+    }
+  }
+  SurveyFlags& survey = flags.survey;
+  if (flags.noises.size() > 1) {
+    throw InputError("--noise: a survey takes one value, that of its ranges");
+  }
+  if (was_given("--noise")) survey.walk.noise = flags.noises.front();
+  if (was_given("--lidar")) survey.lidar = flags.lidar;
+  if (was_given("--poses")) survey.places = flags.poses;
+  if (flags.tau > 0.0) survey.tau = static_cast<float>(flags.tau);
+  survey.resolutions = {std::nullopt};
+  if (was_given("--resolution")) {
+    survey.resolutions.assign(flags.resolutions.begin(), flags.resolutions.end());
+  }
+  survey.renderers = flags.renderers;
+  survey.walk.seed = flags.seed;
+  survey.json = flags.json;
+}
+
 void fidelity(const FidelityFlags& flags) {
   const Executor executor(flags.threads);
+  if (!flags.survey.out.empty()) make_picture_folder(flags.survey.out, flags.force);
   if (!flags.png.empty()) make_picture_folder(flags.png, flags.force);
   std::vector<ExactScene> scenes;
   for (const std::string& name : flags.scenes) scenes.push_back(load_scene(name));
   nlohmann::ordered_json cases = nlohmann::ordered_json::array();
-  for (const ExactScene& scene : scenes) run_scene(scene, flags, executor, cases);
+  for (const ExactScene& scene : scenes) {
+    if (flags.survey.on) {
+      measure_surveyed(scene, flags.survey, executor, interruptible_progress(), cases);
+    } else {
+      run_scene(scene, flags, executor, cases);
+    }
+  }
   if (flags.json) {
     fmt::print("{}\n",
                nlohmann::ordered_json{{"cases", cases}}.dump(
@@ -249,12 +283,16 @@ void add_fidelity_command(CLI::App& parent, int& /*exit_code*/) {
       ->capture_default_str();
   app->add_flag("--json", flags->json, "JSON on stdout");
   app->add_option("--png", flags->png, "Folder for pictures of where the errors sit");
+  add_survey_flags(*app, flags->survey);
   add_force_flag(*app, flags->force);
   app->add_option("--threads", flags->threads, "0: all cores")->check(CLI::Range(0, 1024));
   app->footer(scene_help());
-  app->callback([flags] {
+  app->callback([flags, app] {
+    if (flags->survey.on) complete_survey_flags(*app, *flags);
     if (flags->scenes.empty()) {
-      for (const auto& [name, about] : scene_names()) flags->scenes.push_back(name);
+      for (const auto& [name, about] : scene_names()) {
+        if (!flags->survey.on || !make_small_scene(name)) flags->scenes.push_back(name);
+      }
     }
     fidelity(*flags);
   });

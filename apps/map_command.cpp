@@ -4,13 +4,12 @@
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
 #include <algorithm>
-#include <chrono>
-#include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 
 #include "apps/commands.hpp"
 #include "apps/flags.hpp"
+#include "apps/import_report.hpp"
 #include "apps/map_edit.hpp"
 #include "apps/pictures.hpp"
 #include "apps/settings_json.hpp"
@@ -23,192 +22,6 @@
 
 namespace pointflight::apps {
 namespace {
-
-struct ImportFlags {
-  std::vector<std::string> inputs;
-  std::string output;
-  double resolution = 0.0;
-  double scale = 1.0;
-  std::vector<double> shift;
-  std::string up = "z";
-  double tau = 0.0;  ///< 0: by the density.
-  std::string quality = "high";
-  bool keep_outliers = false;
-  int outlier_neighbours = 8;
-  double outlier_sigmas = OutlierOptions{}.sigmas;
-  std::string outliers_out;
-  std::string scratch;
-  std::string format;
-  bool force = false;
-  int threads = 0;
-};
-
-std::string about_spacing(double spacing, double resolution, double supported) {
-  if (spacing <= 0.0) return "unknown";
-  const std::string points = fmt::format("{:.1f} mm", spacing * 1e3);
-  if (resolution >= 0.9 * supported) return points;
-  return fmt::format("{}: {:.4g} m is finer than the points, {:.2g} m or more is advised",
-                     points,
-                     resolution,
-                     supported);
-}
-
-std::string about_noise(double noise, std::uint64_t projected, std::uint64_t too_thick) {
-  return fmt::format(
-      "{:.1f} mm across flat surfaces; {}",
-      noise * 1e3,
-      projected > 0
-          ? fmt::format(
-                "{} cells moved onto their planes, {} left (two faces?)", projected, too_thick)
-          : "clean enough to be left as it is");
-}
-
-void print_report(const ImportReport& r, const ImportOptions& options) {
-  log(fmt::format(
-      "points        {} read{}{}",
-      short_count(static_cast<double>(r.points_read)),
-      r.points_not_finite > 0 ? fmt::format(", {} NaN or infinite dropped", r.points_not_finite)
-                              : "",
-      r.points_out_of_reach > 0 ? fmt::format(", {} too far away dropped", r.points_out_of_reach)
-                                : ""));
-  log(fmt::format("resolution    {:.4g} m{}",
-                  r.resolution,
-                  r.resolution_was_chosen ? " (chosen from the spacing)" : ""));
-  log("spacing       " + about_spacing(r.spacing, r.resolution, r.supported_resolution));
-  if (r.intensity_from_colors) log("colours       kept as intensities: their luminance, 0 to 255");
-  log(fmt::format("outliers      {}",
-                  options.outliers.enabled
-                      ? fmt::format("{} of {} cells ({} points) dropped; --keep-outliers keeps "
-                                    "them, --export-outliers FILE.pcd shows them",
-                                    r.outlier_cells,
-                                    r.cells,
-                                    r.outlier_points)
-                      : "kept"));
-  log("noise         " + about_noise(r.noise, r.projection.projected, r.projection.too_thick));
-  if (r.grown_surfels + r.wide_surfels > 0) {
-    log(fmt::format("thin scan     {} surfels widened to close gaps, {} for several cells each",
-                    r.grown_surfels,
-                    r.wide_surfels));
-  }
-  if (r.small_surfels > 0) {
-    log(fmt::format("fine forms    {} surfels for parts of cells", r.small_surfels));
-  }
-  log(fmt::format("coverage      {:.2f} makes a return ({:.0f} points per planar surfel)",
-                  r.tau,
-                  r.points_per_cell));
-  log(fmt::format("surfels       {}, {:.0f} % planar{}",
-                  short_count(static_cast<double>(r.surfels)),
-                  100.0 * static_cast<double>(r.planar_surfels) /
-                      static_cast<double>(std::max<std::uint64_t>(1, r.surfels)),
-                  r.has_intensity ? ", with intensity" : ""));
-}
-
-std::string folder_of(const std::string& path) {
-  const std::filesystem::path folder = std::filesystem::path(path).parent_path();
-  return folder.empty() ? "." : folder.string();
-}
-
-void import_map(const ImportFlags& flags) {
-  const auto start = std::chrono::steady_clock::now();
-  ImportOptions options;
-  if (flags.resolution > 0.0) options.resolution = flags.resolution;
-  options.scale = flags.scale;
-  if (!flags.shift.empty()) options.shift = Vector3d(flags.shift.data());
-  options.up = flags.up.front();
-  options.quality = flags.quality == "high" ? TreeQuality::kHigh : TreeQuality::kNormal;
-  if (flags.tau > 0.0) options.tau = static_cast<float>(flags.tau);
-  options.outliers.enabled = !flags.keep_outliers;
-  options.outliers.neighbours = flags.outlier_neighbours;
-  options.outliers.sigmas = flags.outlier_sigmas;
-  options.scratch_folder = flags.scratch.empty() ? folder_of(flags.output) : flags.scratch;
-  for (const std::string& input : flags.inputs) refuse_same_file(flags.output, input);
-  refuse_to_overwrite(flags.output, flags.force);
-  refuse_to_overwrite(flags.outliers_out, flags.force);
-  std::optional<OutputFile> outliers;
-  if (!flags.outliers_out.empty()) {
-    refuse_same_file(flags.outliers_out, flags.output);
-    for (const std::string& input : flags.inputs) refuse_same_file(flags.outliers_out, input);
-    outliers.emplace(flags.outliers_out);
-  }
-  OutputFile output(flags.output);  // first: a folder that is not there is said at once
-  const Executor executor(flags.threads);
-  const Progress progress = interruptible_progress();
-  const std::vector<CloudSource> sources =
-      cloud_sources(flags.inputs, flags.format, options.scratch_folder, progress);
-  const ImportedMap map = import_clouds(sources, options, executor, progress);
-  end_progress();
-  if (outliers) write_cloud_pcd(std::move(*outliers), map.outliers, map.report.has_intensity);
-  write_map(std::move(output), map.tree, map.description);
-  print_report(map.report, options);
-  for (const std::string& warning : map.report.warnings) log("warning: " + warning);
-  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
-  log(fmt::format("took          {:.1f} s", took.count()));
-  fmt::print("{}\n", flags.output);
-}
-
-void add_import(CLI::App& parent) {
-  auto* app = parent.add_subcommand("import", "Make a .pfmap from clouds or meshes");
-  auto flags = std::make_shared<ImportFlags>();
-  app->add_option("inputs",
-                  flags->inputs,
-                  "Clouds or meshes: " + known_cloud_formats() + "; -: a cloud from standard input")
-      ->required();
-  app->add_option("-o,--output", flags->output, "The .pfmap to write")->required();
-  app->add_option(
-      "--format",
-      flags->format,
-      "What the inputs are, whatever their names: pcd, ply, las, xyz, ...; without it by "
-      "the name, standard input by its first bytes");
-  app->add_option("--resolution",
-                  flags->resolution,
-                  "Voxel size r, m; without it the one that the points' spacing supports")
-      ->check(within(1e-4, 1e4));
-  app->add_option("--shift",
-                  flags->shift,
-                  "x,y,z to add, m, after --scale and --up: many planners want the ground at z = 0")
-      ->delimiter(',')
-      ->expected(3)
-      ->check(within(-1e9, 1e9));
-  app->add_option("--scale", flags->scale, "Metres per unit of the files")
-      ->check(within(1e-9, 1e9))
-      ->capture_default_str();
-  app->add_option("--scratch",
-                  flags->scratch,
-                  "Folder for what does not fit in 2.5 GB of memory; without it that of the output")
-      ->check(CLI::ExistingDirectory);
-  app->add_option("--up", flags->up, "The files' up axis; y is turned to z")
-      ->check(CLI::IsMember({"y", "z"}))
-      ->capture_default_str();
-  app->add_option("--quality",
-                  flags->quality,
-                  "Of the hierarchy: normal builds it three times faster, rays in foliage are a "
-                  "fifth slower")
-      ->check(CLI::IsMember({"normal", "high"}))
-      ->capture_default_str();
-  app->add_option("--tau",
-                  flags->tau,
-                  "Coverage that makes a return, 0.3 (fewest holes) to 0.5 (sharpest edges); "
-                  "default: by the density of the points")
-      ->check(within(0.05, 1.0));
-  app->add_flag("--keep-outliers",
-                flags->keep_outliers,
-                "No outlier removal (thin wires, very uneven clouds)");
-  app->add_option("--outlier-neighbours",
-                  flags->outlier_neighbours,
-                  "Cells that a cell's distance is measured to")
-      ->check(CLI::Range(1, 100))
-      ->capture_default_str();
-  app->add_option("--outlier-sigmas",
-                  flags->outlier_sigmas,
-                  "A cell goes if it is this many deviations farther than the mean")
-      ->check(within(0.0, 1e6))
-      ->capture_default_str();
-  app->add_option(
-      "--export-outliers", flags->outliers_out, "Write the dropped cells as a PCD cloud");
-  add_force_flag(*app, flags->force);
-  app->add_option("--threads", flags->threads, "0: all cores")->check(CLI::Range(0, 1024));
-  app->callback([flags] { import_map(*flags); });
-}
 
 struct InfoFlags {
   std::string map;
@@ -382,6 +195,7 @@ void add_map_command(CLI::App& parent, int& /*exit_code*/) {
   app->require_subcommand(1);
   add_import(*app);
   add_info(*app);
+  add_fit(*app);
   add_crop(*app);
   add_thin(*app);
   add_transform(*app);

@@ -79,11 +79,13 @@ std::uint64_t stream_points(const CloudSource& source,
                             const Progress& progress,
                             const std::function<void(std::vector<CloudPoint>&)>& visit);
 
+void add_import(CLI::App& parent);
 void add_crop(CLI::App& parent);
 void add_thin(CLI::App& parent);
 void add_transform(CLI::App& parent);
 void add_merge(CLI::App& parent);
 void add_export(CLI::App& parent);
 void add_diff(CLI::App& parent);
+void add_fit(CLI::App& parent);
 
 }  // namespace pointflight::apps

@@ -17,7 +17,8 @@ allowed() {
     render) echo "core geometry map render" ;;
     lidar) echo "core geometry io map render lidar" ;;
     vehicle) echo "core geometry io vehicle" ;;
-    fidelity) echo "core geometry io map render fidelity" ;;
+    fit) echo "core geometry io map render fit" ;;
+    fidelity) echo "core geometry io map render lidar fit fidelity" ;;
     world) echo "core geometry io map world" ;;
     sim) echo "core geometry io map render lidar vehicle world sim" ;;
     run) echo "core geometry io map render lidar vehicle world sim run" ;;
@@ -27,7 +28,7 @@ allowed() {
     recording) echo "core ros_common recording" ;;
   esac
 }
-for folder in core geometry io map render lidar vehicle world fidelity sim run ros_common recording ros1 ros2; do
+for folder in core geometry io map render lidar vehicle world fit fidelity sim run ros_common recording ros1 ros2; do
   where=pointflight/$folder
   [ -d "$where" ] || where=$folder
   for used in $(grep -rhoE '#include "(pointflight/[a-z_]+|apps|tests|examples|ros_common|recording|ros1|ros2)/' "$where" |

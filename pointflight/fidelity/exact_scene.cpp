@@ -191,8 +191,13 @@ class SampledCloud : public CloudReader {
                  sampling.points_per_cell / (sampling.resolution * sampling.resolution));
     double owed = 0.0;  // carried over, so that many small shapes get their share
     for (std::size_t i = 0; i < scene.geometry.shapes.size(); ++i) {
-      const double thin =
-          scene.shape_density.empty() ? 1.0 : static_cast<double>(scene.shape_density[i]);
+      // a dense cloud of all shapes would make panes of glass opaque, which they are not
+      // (SceneTree)
+      const bool is_glass = scene.tags[scene.shape_tag[i]] == "glass";
+      const double thin = is_glass ? 0.0
+                          : scene.shape_density.empty()
+                              ? 1.0
+                              : static_cast<double>(scene.shape_density[i]);
       owed += area(scene.geometry.shapes[i]) * density * thin;
       const auto count = static_cast<std::uint64_t>(owed);
       owed -= static_cast<double>(count);
@@ -272,7 +277,8 @@ void ExactScene::tag_from(std::size_t first, const std::string& tag, float densi
 std::vector<std::pair<std::string, std::string>> scene_names() {
   std::vector<std::pair<std::string, std::string>> names = {
       {"hall", "45 x 20 x 8 m: pillars, tables, pipes, 2 cm rods, 5 cm partitions, a ladder"},
-      {"forest", "48 x 27 x 19 m: relief, 160 trees with branches, 56,000 leaves"}};
+      {"forest", "48 x 27 x 19 m: relief, 160 trees with branches, 56,000 leaves"},
+      {"yard", "30 x 20 x 8 m: trees, hedge, grass, net, railings, glass, shelves, a staircase"}};
   const auto small = small_scene_names();
   names.insert(names.end(), small.begin(), small.end());
   return names;
@@ -280,6 +286,7 @@ std::vector<std::pair<std::string, std::string>> scene_names() {
 
 ExactScene load_scene(const std::string& name_or_path) {
   if (name_or_path == "hall" || name_or_path == "forest") return shipped(name_or_path);
+  if (name_or_path == "yard") return make_yard_scene();
   if (auto small = make_small_scene(name_or_path)) return std::move(*small);
   std::error_code ignored;
   if (!fs::is_regular_file(name_or_path, ignored)) {

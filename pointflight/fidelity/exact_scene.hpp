@@ -40,6 +40,9 @@ ExactScene parse_scene(std::string_view text, const std::string& path);
 /// Names and one line each.
 std::vector<std::pair<std::string, std::string>> scene_names();
 
+/// A yard with a house, a staircase, a net, railings, glass and vegetation of several kinds.
+ExactScene make_yard_scene();
+
 /// The small exact cases by name; nothing for another name.
 std::optional<ExactScene> make_small_scene(const std::string& name);
 /// Names and one line each.

@@ -10,8 +10,8 @@
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/core/math.hpp"
 #include "pointflight/core/random.hpp"
+#include "pointflight/fidelity/scene_tree.hpp"
 #include "pointflight/geometry/rotation.hpp"
-#include "pointflight/geometry/shape_tree.hpp"
 
 namespace pointflight {
 namespace {
@@ -20,12 +20,6 @@ constexpr double kFreeRadius = 0.3;                // m
 constexpr double kBeside = 0.2 * kDegree;          // where silhouettes are looked for
 constexpr double kJump = ErrorStatistics::kRight;  // m
 constexpr double kAimSpread = 0.1;                 // m, around the places aimed at
-
-Vector3d direction(double azimuth, double elevation) {
-  const auto a = math::sincos(azimuth);
-  const auto e = math::sincos(elevation);
-  return {e.cos * a.cos, e.cos * a.sin, e.sin};
-}
 
 BeamPlan grid_plan(const std::string& name,
                    std::array<int, 2> size,
@@ -41,7 +35,7 @@ BeamPlan grid_plan(const std::string& name,
       const double az = azimuth_deg[0] + (i + 0.5) * (azimuth_deg[1] - azimuth_deg[0]) / size[0];
       const double el =
           elevation_deg[0] + (j + 0.5) * (elevation_deg[1] - elevation_deg[0]) / size[1];
-      plan.directions_sensor.push_back(direction(az * kDegree, el * kDegree).cast<float>());
+      plan.directions_sensor.push_back(unit_direction(az * kDegree, el * kDegree).cast<float>());
     }
   }
   return plan;
@@ -55,27 +49,13 @@ BeamPlan uniform_plan() {
   for (std::uint64_t i = 0; i < 20000; ++i) {
     const auto [u, v] = random.uniform2(i);
     plan.directions_sensor.push_back(
-        direction(2.0 * kPi * u, (-7.0 + 59.0 * v) * kDegree).cast<float>());
+        unit_direction(2.0 * kPi * u, (-7.0 + 59.0 * v) * kDegree).cast<float>());
   }
   return plan;
 }
 
-/// Point `i` of `count` spread evenly over the unit sphere (Fibonacci's spiral).
-Vector3d spread_direction(std::size_t i, std::size_t count) {
-  const double z = 1.0 - (2.0 * static_cast<double>(i) + 1.0) / static_cast<double>(count);
-  return direction(static_cast<double>(i) * 2.399963229728653, math::asin(z));
-}
-
-bool is_free(const ShapeTree& tree, const Vector3d& place) {
-  constexpr std::size_t kLooks = 500;
-  for (std::size_t i = 0; i < kLooks; ++i) {
-    const auto met = tree.intersect(place, spread_direction(i, kLooks));
-    if (met && met->range < kFreeRadius) return false;
-  }
-  return true;
-}
-
-std::vector<Pose> poses_of(const ExactScene& scene, const ShapeTree& tree, const BeamPlan& plan) {
+std::vector<Pose> poses_of(const ExactScene& scene, const SceneTree& tree, const BeamPlan& plan) {
+  if (!plan.places.empty()) return plan.places;
   if (!scene.poses.empty()) return scene.poses;
   constexpr std::uint64_t kTries = 20000;
   const RandomStream random(plan.seed, StreamId::kScenePoses, 0);
@@ -84,7 +64,7 @@ std::vector<Pose> poses_of(const ExactScene& scene, const ShapeTree& tree, const
     const auto [u, v] = random.uniform2(2 * i);
     const auto [w, turn] = random.uniform2(2 * i + 1);
     const Vector3d place = scene.free.min + scene.free.size().cwiseProduct(Vector3d(u, v, w));
-    if (!is_free(tree, place)) continue;
+    if (!tree.is_free(place, kFreeRadius, 500)) continue;
     poses.push_back({quaternion_from_rpy(0, 0, 2.0 * kPi * turn), place});
   }
   if (poses.size() < plan.poses) {
@@ -103,7 +83,7 @@ std::array<Vector3d, 2> across(const Vector3d& d) {
 
 class Caster {
  public:
-  Caster(const ExactScene& scene, const ShapeTree& tree, const BeamPlan& plan)
+  Caster(const ExactScene& scene, const SceneTree& tree, const BeamPlan& plan)
       : scene_(scene), tree_(tree), plan_(plan) {
     double sum = 0.0;
     for (std::uint32_t i = 0; i < scene.geometry.shapes.size(); ++i) {
@@ -141,7 +121,7 @@ class Caster {
   [[nodiscard]] Vector3d aimed(std::size_t pose, const Vector3d& from, std::size_t beam) const {
     const RandomStream random(plan_.seed, StreamId::kAimedBeams, static_cast<std::uint32_t>(pose));
     const auto [u, v] = random.uniform2(3 * beam);
-    if (targets_.empty()) return direction(2.0 * kPi * u, math::asin(2.0 * v - 1.0));
+    if (targets_.empty()) return unit_direction(2.0 * kPi * u, math::asin(2.0 * v - 1.0));
     const auto [w, a] = random.uniform2(3 * beam + 1);
     const auto [b, c] = random.uniform2(3 * beam + 2);
     const auto at = std::upper_bound(share_.begin(), share_.end(), w * share_.back());
@@ -185,7 +165,7 @@ class Caster {
   }
 
   const ExactScene& scene_;
-  const ShapeTree& tree_;
+  const SceneTree& tree_;
   const BeamPlan& plan_;
   std::vector<std::uint32_t> targets_;
   std::vector<double> share_;  ///< Running sum of the targets' shares of the beams.
@@ -243,7 +223,7 @@ SceneBeams cast_exactly(const ExactScene& scene,
                         const BeamPlan& plan,
                         const Executor& executor,
                         const Progress& progress) {
-  const ShapeTree tree(scene.geometry.shapes);
+  const SceneTree tree(scene);
   SceneBeams result;
   result.plan = plan;
   result.poses = poses_of(scene, tree, plan);

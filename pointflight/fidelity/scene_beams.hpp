@@ -18,6 +18,7 @@ struct BeamPlan {
   /// Unit vectors in the sensor frame; empty: aimed at the scene's targets, or all around.
   std::vector<Vector3f> directions_sensor;
   float range_max = 40.0f;          ///< m
+  std::vector<Pose> places;         ///< T_world_sensor; empty: the scene's own.
   std::size_t poses = 8;            ///< Random ones where the scene has none of its own.
   std::size_t aimed_beams = 20000;  ///< A pose, without directions.
   std::uint64_t seed = 1;           ///< Of poses and aimed directions.

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -48,6 +49,10 @@ class CloudReader {
 
   /// True if the points carry a colour.
   [[nodiscard]] virtual bool has_color() const { return false; }
+
+  /// When the points of the last batch were measured, s, in their order; empty where the file does
+  /// not say. By the field's own zero: the scan's start, or the epoch.
+  [[nodiscard]] virtual std::span<const double> times() const { return {}; }
 
   /// The unit that the file's header or its first comments name; nothing where they name none.
   [[nodiscard]] virtual std::optional<FileUnit> unit() const { return std::nullopt; }

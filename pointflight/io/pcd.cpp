@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cmath>
 #include <optional>
 
 #include "pointflight/io/byte_cursor.hpp"
@@ -48,6 +49,10 @@ class PcdReader : public CloudReader {
       const PcdColumn* field = find(name);
       if (field != nullptr && field->size == 4) color_ = *field;
     }
+    for (const char* name : {"time", "t", "timestamp", "time_stamp", "offset_time"}) {
+      const PcdColumn* field = find(name);
+      if (field != nullptr && !time_) time_ = *field;
+    }
     if (header_.encoding == PcdEncoding::kAscii) {
       lines_.emplace(as_text(file_.bytes()).substr(header_.data_offset));
     } else if (header_.encoding == PcdEncoding::kBinary) {
@@ -60,6 +65,7 @@ class PcdReader : public CloudReader {
 
   bool read(std::vector<CloudPoint>& batch) override {
     batch.clear();
+    times_.clear();
     const std::uint64_t count = std::min<std::uint64_t>(kBatch, header_.points - next_);
     if (header_.encoding == PcdEncoding::kAscii) {
       read_ascii(count, batch);
@@ -72,6 +78,7 @@ class PcdReader : public CloudReader {
 
   [[nodiscard]] bool has_intensity() const override { return intensity_.has_value(); }
   [[nodiscard]] bool has_color() const override { return color_.has_value(); }
+  [[nodiscard]] std::span<const double> times() const override { return times_; }
   [[nodiscard]] std::optional<FileUnit> unit() const override { return header_.unit; }
   [[nodiscard]] double share_read() const override {
     return header_.points == 0 ? 1.0
@@ -132,6 +139,7 @@ class PcdReader : public CloudReader {
     for (PcdColumn* field : {&position_[0], &position_[1], &position_[2]}) to_columns(*field);
     if (intensity_) to_columns(*intensity_);
     if (color_) to_columns(*color_);
+    if (time_) to_columns(*time_);
   }
 
   /// In unpacked data `offset` is where the field's column starts.
@@ -158,7 +166,14 @@ class PcdReader : public CloudReader {
     return value >= 0.0 && value <= 4294967295.0 ? static_cast<std::uint32_t>(value) : 0;
   }
 
-  void read_binary(std::uint64_t count, std::vector<CloudPoint>& batch) const {
+  /// Drivers write seconds (Velodyne: time, RoboSense: timestamp), nanoseconds as whole numbers
+  /// (Ouster: t, Livox: offset_time) or as doubles since 1970 (Livox: timestamp).
+  [[nodiscard]] double seconds_of(double value) const {
+    constexpr double kSecondsEnd = 1e11;  // the year 5138
+    return time_->type != 'F' || std::abs(value) > kSecondsEnd ? 1e-9 * value : value;
+  }
+
+  void read_binary(std::uint64_t count, std::vector<CloudPoint>& batch) {
     batch.resize(count);
     for (std::uint64_t i = 0; i < count; ++i) {
       for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -169,6 +184,7 @@ class PcdReader : public CloudReader {
       if (color_) {
         batch[i].color = unpack_color(load<std::uint32_t>(place_of(next_ + i, *color_)));
       }
+      if (time_) times_.push_back(seconds_of(binary_number(next_ + i, *time_)));
     }
     if (header_.encoding == PcdEncoding::kBinary) {
       file_.release_before(header_.data_offset + (next_ + count) * header_.point_size);
@@ -202,6 +218,7 @@ class PcdReader : public CloudReader {
       }
       if (intensity_) point.intensity = static_cast<float>(words_[intensity_->offset]);
       if (color_) point.color = unpack_color(color_bits(words_[color_->offset]));
+      if (time_) times_.push_back(seconds_of(words_[time_->offset]));
     }
   }
 
@@ -215,9 +232,11 @@ class PcdReader : public CloudReader {
   std::array<PcdColumn, 3> position_;
   std::optional<PcdColumn> intensity_;
   std::optional<PcdColumn> color_;
+  std::optional<PcdColumn> time_;
   std::optional<LineCursor> lines_;
   std::vector<std::byte> unpacked_;
   std::vector<double> words_;
+  std::vector<double> times_;
   std::uint64_t next_ = 0;
 };
 

@@ -43,4 +43,24 @@ std::vector<TumPose> read_tum(const std::string& path) {
   return poses;
 }
 
+void write_tum(OutputFile file, const std::vector<TumPose>& poses) {
+  file.write("# timestamp tx ty tz qx qy qz qw [file] (T_world_sensor)\n");
+  for (const TumPose& pose : poses) {
+    const Vector3d& p = pose.T_world_sensor.translation;
+    const Quaterniond& q = pose.T_world_sensor.rotation;
+    file.write(fmt::format("{} {} {} {} {} {} {} {}{}{}\n",
+                           pose.time,
+                           p.x(),
+                           p.y(),
+                           p.z(),
+                           q.x(),
+                           q.y(),
+                           q.z(),
+                           q.w(),
+                           pose.file.empty() ? "" : " ",
+                           pose.file));
+  }
+  file.commit();
+}
+
 }  // namespace pointflight

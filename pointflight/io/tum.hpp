@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "pointflight/core/output_file.hpp"
 #include "pointflight/geometry/types.hpp"
 
 namespace pointflight {
@@ -17,5 +18,8 @@ struct TumPose {
 /// Reads a TUM trajectory; lines that start with # are comments. Quaternions are normalised. Throws
 /// InputError with file and line.
 std::vector<TumPose> read_tum(const std::string& path);
+
+/// Writes one, with a head line.
+void write_tum(OutputFile file, const std::vector<TumPose>& poses);
 
 }  // namespace pointflight

@@ -59,32 +59,6 @@ void check_pose(const Pose& pose) {
   throw InputError("a map is moved by finite metres and a unit quaternion");
 }
 
-MapDescription describe(const SurfelMap& map) {
-  MapDescription d;
-  d.resolution = map.resolution();
-  d.origin_world = map.origin_world();
-  d.bounds_world = map.bounds_world();
-  d.model = map.model();
-  d.has_intensity = map.has_intensity();
-  d.intensity_offset = map.intensity_offset();
-  d.intensity_step = map.intensity_step();
-  d.surfel_count = map.surfel_count();
-  d.metadata = std::string(map.metadata());
-  return d;
-}
-
-void append_note(EditedMap& edited, const std::string& note) {
-  auto json = nlohmann::ordered_json::parse(edited.description.metadata, nullptr, false);
-  if (!json.is_object()) json = nlohmann::ordered_json::object();
-  if (!json.contains("edited") || !json["edited"].is_array()) {
-    json["edited"] = nlohmann::ordered_json::array();
-  }
-  json["edited"].push_back(note);
-  json["surfels"] = edited.surfels;
-  json.erase("planar_surfels");  // of the import; `map info` counts
-  edited.description.metadata = json.dump(1, ' ', false, nlohmann::json::error_handler_t::replace);
-}
-
 /// The tree and its words as they are.
 EditedMap shifted(const SurfelMap& map, const Vector3d& by, const EditOptions& options) {
   Scratch scratch(options.scratch_folder, options.scratch_memory);
@@ -96,7 +70,7 @@ EditedMap shifted(const SurfelMap& map, const Vector3d& by, const EditOptions& o
   copy(map.nodes(), edited.tree.nodes);
   copy(map.words(), edited.tree.words);
   copy(map.intensity_codes(), edited.tree.intensity);
-  edited.description = describe(map);
+  edited.description = description_of(map);
   edited.description.origin_world += by;
   edited.description.bounds_world.min += by;
   edited.description.bounds_world.max += by;
@@ -136,6 +110,32 @@ std::uint8_t code_in(const MapDescription& description, float intensity) {
 
 }  // namespace
 
+MapDescription description_of(const SurfelMap& map) {
+  MapDescription d;
+  d.resolution = map.resolution();
+  d.origin_world = map.origin_world();
+  d.bounds_world = map.bounds_world();
+  d.model = map.model();
+  d.has_intensity = map.has_intensity();
+  d.intensity_offset = map.intensity_offset();
+  d.intensity_step = map.intensity_step();
+  d.surfel_count = map.surfel_count();
+  d.metadata = std::string(map.metadata());
+  return d;
+}
+
+void append_note(EditedMap& edited, const std::string& note) {
+  auto json = nlohmann::ordered_json::parse(edited.description.metadata, nullptr, false);
+  if (!json.is_object()) json = nlohmann::ordered_json::object();
+  if (!json.contains("edited") || !json["edited"].is_array()) {
+    json["edited"] = nlohmann::ordered_json::array();
+  }
+  json["edited"].push_back(note);
+  json["surfels"] = edited.surfels;
+  json.erase("planar_surfels");  // of the import; `map info` counts
+  edited.description.metadata = json.dump(1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
 EditedMap crop_map(const SurfelMap& map,
                    const std::function<bool(const Vector3d& center_world)>& keep,
                    const EditOptions& options,
@@ -152,7 +152,7 @@ EditedMap crop_map(const SurfelMap& map,
     if (!kept[at++]) return;
     gathering.add_as_is(leaf, map.words()[word], intensity_code(map, word));
   });
-  EditedMap edited = gathering.build(describe(map), true, "crop", executor);
+  EditedMap edited = gathering.build(description_of(map), true, "crop", executor);
   edited.surfels_before = kept.size();
   append_note(edited, options.note);
   return edited;
@@ -176,7 +176,7 @@ EditedMap transform_map(const SurfelMap& map,
       refuse_width(map.resolution());
     }
   });
-  EditedMap edited = gathering.build(describe(map), false, "transform", executor);
+  EditedMap edited = gathering.build(description_of(map), false, "transform", executor);
   edited.surfels_before = count;
   append_note(edited, options.note);
   return edited;
@@ -203,7 +203,7 @@ EditedMap merge_maps(const std::vector<PlacedMap>& maps,
   const bool first_stays = T_first.rotation.vec().isZero(0.0);
   std::size_t most = 0;
   for (const PlacedMap& placed : maps) most += count_surfels(*placed.map);
-  MapDescription description = describe(first);
+  MapDescription description = description_of(first);
   join_intensities(maps, description);
   const Vector3d base =
       first_stays ? Vector3d(first.origin_world() + T_first.translation)

@@ -32,6 +32,12 @@ struct EditOptions {
   std::string note = {};  ///< What was done, appended to the metadata's list "edited".
 };
 
+/// What `write_map` needs to write the same map again.
+MapDescription description_of(const SurfelMap& map);
+
+/// Appends what was done to the metadata's list "edited".
+void append_note(EditedMap& edited, const std::string& note);
+
 /// Keeps the surfels whose centre in the world `keep` accepts; it is called from one thread. Throws
 /// InputError where none is left.
 EditedMap crop_map(const SurfelMap& map,

@@ -15,9 +15,9 @@ namespace pointflight {
 
 /// A surfel that stands for a wide or a small cell.
 struct SurfelPiece {
-  BuildSurfel surfel;    ///< By the map's own voxels.
-  std::uint32_t n;       ///< Points.
-  float mean_intensity;  ///< Of the points.
+  BuildSurfel surfel;           ///< By the map's own voxels.
+  std::uint32_t n = 0;          ///< Points.
+  float mean_intensity = 0.0f;  ///< Of the points.
 };
 
 /// Mean intensity of a cell's points; 0 where it is not finite.

@@ -107,7 +107,12 @@ POINTFLIGHT_INLINE void shorten(const KernelMap& map, RayState& s) {
   s.end = end < s.end ? end : s.end;
 }
 
+/// What becomes of what a beam has met: it ends the beam's way, or all is kept up to the beam's
+/// end.
+enum class Meetings { kEndTheWay, kAllKept };
+
 /// Adds the hits among eight lanes; `hit` has a bit for each. `first_word` is the word of lane 0.
+template <Meetings kMeetings>
 POINTFLIGHT_INLINE void add_hits(const KernelMap& map,
                                  RayState& s,
                                  std::uint32_t hit,
@@ -115,8 +120,13 @@ POINTFLIGHT_INLINE void add_hits(const KernelMap& map,
                                  std::uint32_t first_word,
                                  std::uint64_t& overflows) {
   if (s.hits.count + 8 > kHits) {
-    shorten(map, s);
-    overflows += make_room(s.hits, s.end) ? 1 : 0;
+    if constexpr (kMeetings == Meetings::kEndTheWay) shorten(map, s);
+    const bool was_lossy = make_room(s.hits, s.end);
+    overflows += was_lossy ? 1 : 0;
+    // what is kept has no gap: its end is the ray's
+    if (kMeetings == Meetings::kAllKept && was_lossy) {
+      s.end = *std::max_element(s.hits.t, s.hits.t + s.hits.count);
+    }
   }
   alignas(32) float t[8];
   alignas(32) float cosine[8];
@@ -135,10 +145,12 @@ POINTFLIGHT_INLINE void add_hits(const KernelMap& map,
     h.nearest = std::min(h.nearest, t[lane]);
   }
   store_unaligned(splat(kNever), h.t + h.count);
+  if constexpr (kMeetings == Meetings::kAllKept) return;
   // where the nearest hit begins the surface, farther ones cannot move it
   if (h.nearest < s.first && h.total >= map.tau) shorten(map, s);
 }
 
+template <Meetings kMeetings>
 POINTFLIGHT_INLINE void visit_leaf(const KernelMap& map,
                                    RayState& s,
                                    const Entry& entry,
@@ -171,10 +183,11 @@ POINTFLIGHT_INLINE void visit_leaf(const KernelMap& map,
   const M8 accepted = (meeting.m2 < splat(map.support_squared)) & (splat(0.0f) <= meeting.t) &
                       (meeting.t <= splat(s.end));
   const std::uint32_t hit = bits(accepted) & lanes;
-  if (hit != 0) add_hits(map, s, hit, meeting, entry.index + 1, overflows);
+  if (hit != 0) add_hits<kMeetings>(map, s, hit, meeting, entry.index + 1, overflows);
 }
 
 /// On to the next inner node, through the leaves on the way. False at the end of the beam's way.
+template <Meetings kMeetings>
 POINTFLIGHT_INLINE bool advance(const KernelMap& map,
                                 RayState& s,
                                 std::uint32_t entered,
@@ -196,7 +209,7 @@ POINTFLIGHT_INLINE bool advance(const KernelMap& map,
         next = swapped ? other : next;
       }
       if (next.meta != Bvh8Node::kInner) {
-        visit_leaf(map, s, next, overflows);
+        visit_leaf<kMeetings>(map, s, next, overflows);
       } else if (next.index < map.node_count) {
         s.node = map.nodes + next.index;
         return true;
@@ -209,7 +222,7 @@ POINTFLIGHT_INLINE bool advance(const KernelMap& map,
     const Entry entry = s.stack[--s.depth];
     if (entry.t > s.end) continue;
     if (entry.meta != Bvh8Node::kInner) {
-      visit_leaf(map, s, entry, overflows);
+      visit_leaf<kMeetings>(map, s, entry, overflows);
     } else if (entry.index < map.node_count) {
       s.node = map.nodes + entry.index;
       return true;
@@ -218,16 +231,14 @@ POINTFLIGHT_INLINE bool advance(const KernelMap& map,
   return false;
 }
 
-/// Single rays, several in flight. Returns how many lists overflowed.
-static std::uint64_t trace_singly(const KernelMap& map,
-                                  const Ray* rays,
-                                  const std::uint32_t* order,
-                                  std::size_t count,
-                                  KernelHit* hits) {
-  if (map.node_count == 0) {
-    for (std::size_t i = 0; i < count; ++i) hits[order[i]] = {};
-    return 0;
-  }
+/// Single rays, several in flight. `finish(state)` takes each at the end of its way. Returns how
+/// many lists overflowed.
+template <Meetings kMeetings, class Finish>
+POINTFLIGHT_INLINE std::uint64_t follow_singly(const KernelMap& map,
+                                               const Ray* rays,
+                                               const std::uint32_t* order,
+                                               std::size_t count,
+                                               const Finish& finish) {
   // 130 KB, too large for the small stacks that some shells and embedding programs give; filled by
   // start_ray
   thread_local const auto states = std::make_unique_for_overwrite<RayState[]>(kInFlight);
@@ -247,11 +258,11 @@ static std::uint64_t trace_singly(const KernelMap& map,
     for (std::size_t k = 0; k < flying; ++k) entered[k] = test_node(*active[k]);
     for (std::size_t k = 0; k < flying;) {
       RayState& s = *active[k];
-      if (advance(map, s, entered[k], overflows)) {
+      if (advance<kMeetings>(map, s, entered[k], overflows)) {
         ++k;
         continue;
       }
-      hits[s.ray] = return_of(map, s.first, s.hits);
+      finish(s);
       if (next + kInFlight < count) hwy::Prefetch(rays + order[next + kInFlight]);
       if (next < count) {
         start_ray(map, rays[order[next]], order[next], s);

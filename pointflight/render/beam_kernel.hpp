@@ -14,21 +14,21 @@ namespace pointflight {
 
 /// Numbers of the map that every beam needs.
 struct KernelMap {
-  const Bvh8Node* nodes;
-  std::size_t node_count;
-  const SurfelWord* words;
-  std::size_t word_count;
-  double origin[3];  ///< World position of voxel (0, 0, 0), m.
-  double resolution;
-  float support_squared;  ///< M^2
-  float inverse_support;  ///< 1 / M^2
-  float weight_scale;     ///< Weight of a hit in the middle, in steps of kWeightOne.
+  const Bvh8Node* nodes = nullptr;
+  std::size_t node_count = 0;
+  const SurfelWord* words = nullptr;
+  std::size_t word_count = 0;
+  double origin[3] = {0, 0, 0};  ///< World position of voxel (0, 0, 0), m.
+  double resolution = 0.0;
+  float support_squared = 0.0f;  ///< M^2
+  float inverse_support = 0.0f;  ///< 1 / M^2
+  float weight_scale = 0.0f;     ///< Weight of a hit in the middle, in steps of kWeightOne.
   SurfelScale scale;
-  float window;      ///< m
-  std::int32_t tau;  ///< In steps of kWeightOne.
+  float window = 0.0f;   ///< m
+  std::int32_t tau = 0;  ///< In steps of kWeightOne.
   /// Groups of eight beams that are wider (radius, rad) meet so many surfels apart that single rays
   /// are faster: in proportion to r, measured from 0.02 to 0.2 m.
-  float widest_group;
+  float widest_group = 0.0f;
 };
 
 /// Weights are whole numbers of 2^-20: their sums do not depend on the order of adding.

@@ -17,6 +17,20 @@
 HWY_BEFORE_NAMESPACE();
 namespace pointflight::HWY_NAMESPACE {
 
+/// The hits of single rays. Returns how many lists overflowed.
+static std::uint64_t trace_singly(const KernelMap& map,
+                                  const Ray* rays,
+                                  const std::uint32_t* order,
+                                  std::size_t count,
+                                  KernelHit* hits) {
+  if (map.node_count == 0) {
+    for (std::size_t i = 0; i < count; ++i) hits[order[i]] = {};
+    return 0;
+  }
+  return follow_singly<Meetings::kEndTheWay>(
+      map, rays, order, count, [&](RayState& s) { hits[s.ray] = return_of(map, s.first, s.hits); });
+}
+
 static_assert(kRows <= 128, "shares_of: sums of whole numbers must fit 32 bits");
 
 /// The hit rule for eight beams at once: where the surface of each begins, or kNever.

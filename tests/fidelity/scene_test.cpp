@@ -177,7 +177,7 @@ TEST(ExactScene, BadScenesSayFileAndLine) {
   expect_contains(error("f.csv", "shape,tag\n"), "no shapes");
   expect_contains(error("g.csv", "disc,x,nan,0,0,0,0,1,,,,1\n"), "not a number");
   expect_contains(error("h.csv.xz", "no xz at all"), "damaged or cut off xz data");
-  expect_contains(error_of([] { load_scene("hal"); }), "known: hall, forest, box");
+  expect_contains(error_of([] { load_scene("hal"); }), "known: hall, forest, yard, box");
 }
 
 TEST(ExactScene, AThinnedCloudHasOnePointACube) {

@@ -33,9 +33,117 @@ TEST_F(Program, MeasuresFidelityInExactScenes) {
   }
   EXPECT_TRUE(std::filesystem::exists(folder / "pictures/box_0.1_0mm_beam.png"));
   EXPECT_TRUE(std::filesystem::exists(folder / "pictures/partition_5cm_0.1_5mm_paper.png"));
-  expect_user_error(run("fidelity nowhere"), "known: hall, forest, box");
+  expect_user_error(run("fidelity nowhere"), "known: hall, forest, yard, box");
   expect_user_error(run("fidelity box --resolution 0"), "--resolution");
   expect_user_error(run("fidelity box --lidar nosuch"), "nosuch");
+}
+
+/// A room with a pillar, 8 x 6 x 3 m, as a file of shapes.
+std::string room_csv() {
+  std::string csv = "shape,tag,x0,y0,z0,x1,y1,z1,x2,y2,z2,r0,r1\n";
+  const auto wall =
+      [&](const std::string& a, const std::string& b, const std::string& c, const std::string& d) {
+        csv += "triangle,wall," + a + "," + b + "," + c + "\ntriangle,wall," + a + "," + c + "," +
+               d + "\n";
+      };
+  wall("0,0,0", "8,0,0", "8,6,0", "0,6,0");
+  wall("0,0,3", "8,0,3", "8,6,3", "0,6,3");
+  wall("0,0,0", "8,0,0", "8,0,3", "0,0,3");
+  wall("0,6,0", "8,6,0", "8,6,3", "0,6,3");
+  wall("0,0,0", "0,6,0", "0,6,3", "0,0,3");
+  wall("8,0,0", "8,6,0", "8,6,3", "8,0,3");
+  return csv + "cone,pillar,4,3,0,4,3,3,,,,0.1,0.1\n";
+}
+
+TEST_F(Program, SurveysASceneAndFitsItsMapToTheRays) {
+  const TemporaryFolder folder;
+  write_file(folder / "room.csv", room_csv());
+  const Result result = run(
+      fmt::format("fidelity {0}/room.csv --survey --seconds 1.5 --fit --poses 2 --resolution 0.1 "
+                  "--renderer beam,paper --survey-out {0}/survey --json",
+                  folder.path()));
+  ASSERT_EQ(result.code, 0) << result.err;
+  const auto cases = nlohmann::json::parse(result.out)["cases"];
+  ASSERT_EQ(cases.size(), 4u);
+  EXPECT_EQ(cases[0]["fitted"], false);
+  EXPECT_EQ(cases[2]["fitted"], true);
+  EXPECT_EQ(cases[2]["survey"]["lidar"], "mid360");
+  EXPECT_GT(cases[2]["inside"]["rays"].get<int>(), 20000);
+  EXPECT_LT(cases[2]["inside"]["wrong_fraction"].get<double>(), 0.02);
+  EXPECT_LT(cases[2]["edge"]["early_fraction"].get<double>(),
+            cases[0]["edge"]["early_fraction"].get<double>());
+}
+
+/// The survey of the room in `folder`; the flags that read it.
+std::string survey_the_room(const TemporaryFolder& folder) {
+  write_file(folder / "room.csv", room_csv());
+  const Result made =
+      run(fmt::format("fidelity {0}/room.csv --survey --seconds 1.5 --poses 1 --resolution 0.2 "
+                      "--survey-out {0}/survey",
+                      folder.path()));
+  EXPECT_EQ(made.code, 0) << made.err;
+  return fmt::format("--scans {0}/scans --poses {0}/poses.tum --free {0}/free",
+                     folder / "survey/room");
+}
+
+TEST_F(Program, FitsAMapToTheScansItWasMadeOf) {
+  const TemporaryFolder folder;
+  const std::string scans = survey_the_room(folder);
+  const std::string survey = folder / "survey/room";
+  const Result bare = run(
+      fmt::format("map import {}/cloud.pcd --resolution 0.1 -o {}", survey, folder / "bare.pfmap"));
+  ASSERT_EQ(bare.code, 0) << bare.err;
+  const Result fit = run(fmt::format("map fit {} {} -o {} --export-ghosts {}",
+                                     folder / "bare.pfmap",
+                                     scans,
+                                     folder / "fit.pfmap",
+                                     folder / "ghosts.pcd"));
+  ASSERT_EQ(fit.code, 0) << fit.err;
+  EXPECT_NE(fit.err.find("% right"), std::string::npos) << fit.err;
+  EXPECT_TRUE(std::filesystem::exists(folder / "ghosts.pcd"));
+  const Result info = run(fmt::format("map info {} --json --verify", folder / "fit.pfmap"));
+  ASSERT_EQ(info.code, 0) << info.err;
+  EXPECT_NE(info.out.find("rays of 15 scans"), std::string::npos) << info.out;
+}
+
+TEST_F(Program, MakesAMapOfScans) {
+  const TemporaryFolder folder;
+  const std::string scans = survey_the_room(folder);
+  const Result whole = run(fmt::format("map import {} -o {}", scans, folder / "auto.pfmap"));
+  ASSERT_EQ(whole.code, 0) << whole.err;
+  EXPECT_NE(whole.err.find("of left out rays right"), std::string::npos) << whole.err;
+  for (const int threads : {1, 3}) {
+    ASSERT_EQ(run(fmt::format("map import {} --resolution 0.1 --threads {} -o {}",
+                              scans,
+                              threads,
+                              folder / fmt::format("{}.pfmap", threads)))
+                  .code,
+              0);
+  }
+  EXPECT_TRUE(testing::read_file(folder / "1.pfmap") == testing::read_file(folder / "3.pfmap"))
+      << "the same bytes for any number of threads";
+}
+
+TEST_F(Program, SurveysThatCannotBeAreErrorsOfOneLine) {
+  const TemporaryFolder folder;
+  write_file(folder / "room.csv", room_csv());
+  write_file(folder / "poses.tum", "0 0 0 1 0 0 0 1\n");
+  const std::string out = " -o " + (folder / "m.pfmap");
+  expect_user_error(run("fidelity hall --survey --beams 7"), "means nothing to --survey");
+  expect_user_error(run("fidelity hall --survey --noise 0,0.01"), "one value");
+  expect_user_error(run("fidelity hall --seconds 10"), "--survey");
+  expect_user_error(run("fidelity hall --survey --lidar nosuch"), "nosuch");
+  expect_user_error(run("map import" + out), "--scans");
+  expect_user_error(run("map import --scans " + folder.path() + out), "--poses");
+  expect_user_error(
+      run(fmt::format(
+          "map import --scans {0} --poses {0}/poses.tum --scale 2{1}", folder.path(), out)),
+      "map transform");
+  std::filesystem::create_directories(folder / "empty");
+  expect_user_error(
+      run(fmt::format("map import --scans {0}/empty --poses {0}/poses.tum{1}", folder.path(), out)),
+      "no clouds");
+  EXPECT_FALSE(std::filesystem::exists(folder / "m.pfmap"));
 }
 
 TEST_F(Program, ComparesRealScansWithAMap) {

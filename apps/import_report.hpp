@@ -1,0 +1,19 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "pointflight/map/map_builder.hpp"
+
+namespace pointflight::apps {
+
+/// How far the points lie apart, and whether the resolution is finer.
+std::string about_spacing(double spacing, double resolution, double supported);
+
+/// How noisy flat surfaces were, and what became of it.
+std::string about_noise(double noise, std::uint64_t projected, std::uint64_t too_thick);
+
+/// What an import found and did, on stderr.
+void print_report(const ImportReport& report, const ImportOptions& options);
+
+}  // namespace pointflight::apps

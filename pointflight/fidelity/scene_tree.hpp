@@ -1,0 +1,34 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "pointflight/fidelity/exact_scene.hpp"
+#include "pointflight/geometry/shape_tree.hpp"
+
+namespace pointflight {
+
+/// What a LiDAR's beams meet in a scene. Shapes with the tag "glass" send a beam back within 15
+/// degrees of their normal and are not there for any other: what a pane does to 905 nm.
+class SceneTree {
+ public:
+  /// Refers to the scene, which must outlive the tree and stay as it is.
+  explicit SceneTree(const ExactScene& scene);
+
+  /// First shape that sends a beam (unit `direction`) back.
+  [[nodiscard]] std::optional<ShapeTree::Met> intersect(const Vector3d& origin,
+                                                        const Vector3d& direction) const;
+
+  /// True if no shape, glass included, is nearer than `radius`, as seen along `looks` directions.
+  [[nodiscard]] bool is_free(const Vector3d& place, double radius, std::size_t looks) const;
+
+ private:
+  const ExactScene& scene_;
+  ShapeTree tree_;
+  std::vector<bool> is_glass_;  ///< Of each tag.
+};
+
+/// Unit vector, rad.
+Vector3d unit_direction(double azimuth, double elevation);
+
+}  // namespace pointflight

@@ -1,0 +1,48 @@
+// The way of a person who surveys a scene.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "pointflight/fidelity/exact_scene.hpp"
+#include "pointflight/fidelity/scene_tree.hpp"
+#include "pointflight/geometry/motion.hpp"
+
+namespace pointflight {
+
+/// How a scene is surveyed.
+struct SurveyOptions {
+  double seconds = 60.0;    ///< Of the walk.
+  double speed = 1.0;       ///< m/s
+  double tilt_deg = 15.0;   ///< The sensor looks down ahead: level, it would miss the near ground.
+  double noise = 0.01;      ///< Deviation of the ranges, m.
+  double shake = 0.005;     ///< Deviation of each scan's believed place, per axis, m.
+  double shake_deg = 0.03;  ///< Of its believed attitude, about each axis.
+  std::uint64_t seed = 1;   ///< Of the way and all noise.
+};
+
+/// Entities of the random streams of a survey.
+namespace survey_draws {
+inline constexpr std::uint32_t kWay = 0;     ///< Places to walk by.
+inline constexpr std::uint32_t kShake = 1;   ///< Errors of poses.
+inline constexpr std::uint32_t kPlaces = 2;  ///< Places to judge from.
+inline constexpr std::uint32_t kNoise = 3;   ///< Of the first scan; one more for each.
+}  // namespace survey_draws
+
+/// A walk at chest height (1.2 to 1.8 m above what is below) along straight legs, 0.4 m from
+/// everything: T_world_sensor every `scan_period`, one pose more than there are scans. Throws
+/// InputError where the scene has no such way.
+std::vector<TimedPose> make_walk(const ExactScene& scene,
+                                 const SceneTree& tree,
+                                 const SurveyOptions& options,
+                                 Duration scan_period);
+
+/// Free places near a walk: 0.5 to 1.5 m beside it, up to 0.5 m above or below, 0.3 m from
+/// everything, level, with any heading. Throws InputError where there are not as many.
+std::vector<Pose> places_near(const ExactScene& scene,
+                              const SceneTree& tree,
+                              const std::vector<TimedPose>& walk,
+                              std::size_t count,
+                              std::uint64_t seed);
+
+}  // namespace pointflight

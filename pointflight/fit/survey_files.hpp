@@ -1,0 +1,59 @@
+// Surveys as people have them: a folder of scans and a file of poses.
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "pointflight/fit/survey_rays.hpp"
+
+namespace pointflight {
+
+/// Where a survey lies.
+struct SurveyFiles {
+  std::string scans;  ///< Folder of clouds in the sensor frame, m.
+  /// TUM (`time tx ty tz qx qy qz qw [file]`) or KITTI (rows of a 3 x 4 matrix): T_world_sensor.
+  std::string poses;
+  /// Folder of clouds under the scans' names, of shots without a return: points up to which all is
+  /// free. Empty: none.
+  std::string free;
+  /// Times of points are left aside: motion within a scan was taken out of it.
+  bool is_deskewed = false;
+};
+
+/// A survey on disk. Which pose is which scan's: by the file's ninth column; else as many poses as
+/// there are clouds in the folder, in the order of their names (numbers by size); else the names of
+/// the clouds are their times (s or ns) and the poses a trajectory. Points with times of their own
+/// get poses between: offsets from the scan's time, or, where they are large, times of the
+/// trajectory.
+class SurveyFolder {
+ public:
+  /// Reads the poses. Throws InputError.
+  explicit SurveyFolder(SurveyFiles files);
+
+  /// Scans in it.
+  [[nodiscard]] std::size_t scan_count() const { return scans_.size(); }
+
+  /// Reads the scans that `chosen` accepts by their number, all without it. Callable as often as
+  /// wanted; the folder must outlive the reader.
+  [[nodiscard]] std::unique_ptr<SurveyReader> open(
+      const std::function<bool(std::size_t scan)>& chosen = {}) const;
+
+ private:
+  friend class SurveyFolderReader;
+  struct Scan {
+    std::string file;  ///< Name without folder.
+    SimTime time;      ///< By the poses' clock.
+  };
+
+  void match_scans(const std::vector<std::string>& named);
+
+  SurveyFiles files_;
+  std::vector<TimedPose> poses_;
+  bool poses_have_times_ = true;
+  std::vector<Scan> scans_;
+};
+
+}  // namespace pointflight
