@@ -27,16 +27,6 @@ std::unique_ptr<CloudReader> surveyed_cloud(const Survey& survey, double thin) {
   return thin > 0.0 ? thinned(std::move(cloud), thin) : std::move(cloud);
 }
 
-SurveyedPlaces places_seen(const Survey& survey) {
-  SurveyedPlaces places;
-  const auto cloud = cloud_of(rays_of(survey));
-  std::vector<CloudPoint> batch;
-  while (cloud->read(batch)) {
-    for (const CloudPoint& point : batch) places.add(point.position);
-  }
-  return places;
-}
-
 SceneBeams beams_beside(const ExactScene& scene,
                         const SceneTree& tree,
                         const Survey& survey,
@@ -197,7 +187,7 @@ void measure_surveyed(const ExactScene& scene,
       make_survey(scene, tree, load_lidar(flags.lidar), flags.walk, executor, progress);
   if (!flags.out.empty()) write_out(scene, survey, flags, progress);
   const SceneBeams beams = beams_beside(scene, tree, survey, flags, executor, progress);
-  const SurveyedPlaces seen = places_seen(survey);
+  const SurveyedPlaces seen = places_of([&] { return rays_of(survey); });
   for (const auto& resolution : flags.resolutions) {
     ImportOptions options;
     options.resolution = resolution;

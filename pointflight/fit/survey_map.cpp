@@ -53,16 +53,6 @@ class SeenCloud : public CloudReader {
   const SurveyedPlaces& seen_;
 };
 
-SurveyedPlaces places_of(const SurveyOpener& survey) {
-  SurveyedPlaces seen;
-  const auto reader = cloud_of(survey());
-  std::vector<CloudPoint> points;
-  while (reader->read(points)) {
-    for (const CloudPoint& point : points) seen.add(point.position);
-  }
-  return seen;
-}
-
 /// Of the points, or of the survey's returns; with `seen` of those that lie beside its places.
 ImportedMap import_points(const SurveyPoints& points,
                           const SurveyOpener& survey,

@@ -47,4 +47,14 @@ bool SurveyedPlaces::has(const Vector3d& point_world) const {
   return false;
 }
 
+SurveyedPlaces places_of(const SurveyOpener& survey) {
+  SurveyedPlaces seen;
+  const auto reader = cloud_of(survey());
+  std::vector<CloudPoint> points;
+  while (reader->read(points)) {
+    for (const CloudPoint& point : points) seen.add(point.position);
+  }
+  return seen;
+}
+
 }  // namespace pointflight

@@ -19,4 +19,7 @@ class SurveyedPlaces {
   std::unordered_set<std::uint64_t> cells_;
 };
 
+/// Of all returns of a survey.
+SurveyedPlaces places_of(const SurveyOpener& survey);
+
 }  // namespace pointflight
