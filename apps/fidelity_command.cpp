@@ -215,6 +215,12 @@ void fidelity(const FidelityFlags& flags) {
   if (!flags.png.empty()) make_picture_folder(flags.png, flags.force);
   std::vector<ExactScene> scenes;
   for (const std::string& name : flags.scenes) scenes.push_back(load_scene(name));
+  for (std::size_t i = 1; i < scenes.size() && !flags.survey.out.empty(); ++i) {
+    const auto same = [&](const ExactScene& other) { return other.name == scenes[i].name; };
+    if (std::none_of(scenes.begin(), scenes.begin() + static_cast<std::ptrdiff_t>(i), same))
+      continue;
+    throw InputError(fmt::format("--survey-out: two scenes are named '{}'", scenes[i].name));
+  }
   nlohmann::ordered_json cases = nlohmann::ordered_json::array();
   for (const ExactScene& scene : scenes) {
     if (flags.survey.on) {

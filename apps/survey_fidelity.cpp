@@ -201,7 +201,7 @@ void measure_surveyed(const ExactScene& scene,
         *bare, [&] { return rays_of(survey); }, {}, {}, executor, report, progress);
     const auto map = SurfelMap::from_bytes(map_bytes(fitted.tree, fitted.description), scene.name);
     const OwnRays own = measure_rays(
-        *map, [&] { return rays_of(survey); }, 0.1, {}, executor, progress);
+        *map, [&] { return rays_of(survey); }, FitOptions{}.right, {}, executor, progress);
     judge(map, scene, beams, seen, flags, &own, executor, cases);
   }
 }

@@ -89,7 +89,9 @@ std::vector<TimedPose> read_kitti(const std::string& path) {
 void sort_names(std::vector<std::string>& names) {
   const auto number = [](const std::string& name) -> std::optional<double> {
     double value = 0.0;
-    if (!parse_number(fs::path(name).stem().string(), value)) return std::nullopt;
+    if (!parse_number(fs::path(name).stem().string(), value) || !std::isfinite(value)) {
+      return std::nullopt;
+    }
     return value;
   };
   const bool numbers = std::all_of(names.begin(), names.end(), [&](const std::string& name) {

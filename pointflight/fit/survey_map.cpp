@@ -151,7 +151,8 @@ SurveyMap map_survey(const SurveyFolder& survey,
   }
   ImportedMap imported = import_points(points, all, nullptr, chosen, executor, progress);
   made.imported = imported.report;
-  made.imported.resolution_was_chosen = !options.resolution;
+  // by the spacing, where no scans were left out to judge
+  made.imported.resolution_was_chosen = !options.resolution && made.tried.empty();
   made.imported.warnings =
       import_warnings(made.imported, options, imported.description.bounds_world);
   made.outliers = std::move(imported.outliers);

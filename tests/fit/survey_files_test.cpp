@@ -112,6 +112,15 @@ TEST(SurveyFolder, ReadsKittiPoses) {
   EXPECT_TRUE(rays[0].point_world().isApprox(Vector3d(5, 9, 7), 1e-6)) << "turned by 90 degrees";
 }
 
+TEST(SurveyFolder, NumbersAreOrderedBySizeAndNanIsAWord) {
+  const TwoScans two;
+  std::filesystem::rename(two.folder / "scans/a.pcd", two.folder / "scans/10.pcd");
+  std::filesystem::rename(two.folder / "scans/b.pcd", two.folder / "scans/9.pcd");
+  EXPECT_EQ(all_of(*SurveyFolder(two.files()).open())[0].range, 2.0f) << "9 before 10";
+  std::filesystem::rename(two.folder / "scans/9.pcd", two.folder / "scans/nan.pcd");
+  EXPECT_EQ(all_of(*SurveyFolder(two.files()).open())[0].range, 3.0f) << "10 before nan, as text";
+}
+
 TEST(SurveyFolder, NamesAreTimesOfATrajectory) {
   const TwoScans two;
   std::filesystem::rename(two.folder / "scans/a.pcd", two.folder / "scans/0.25.pcd");

@@ -132,6 +132,9 @@ TEST_F(Program, SurveysThatCannotBeAreErrorsOfOneLine) {
   expect_user_error(run("fidelity hall --survey --beams 7"), "means nothing to --survey");
   expect_user_error(run("fidelity hall --survey --noise 0,0.01"), "one value");
   expect_user_error(run("fidelity hall --seconds 10"), "--survey");
+  expect_user_error(
+      run(fmt::format("fidelity hall hall --survey --survey-out {}/out", folder.path())),
+      "two scenes are named 'hall'");
   expect_user_error(run("fidelity hall --survey --lidar nosuch"), "nosuch");
   expect_user_error(run("map import" + out), "--scans");
   expect_user_error(run("map import --scans " + folder.path() + out), "--poses");
