@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
@@ -101,6 +102,9 @@ class ScratchArray {
   [[nodiscard]] T* end() const { return data() + size_; }
   /// All of them.
   [[nodiscard]] std::span<T> span() const { return {data(), size_}; }
+
+  /// Forgets the values from `size` on; their room is kept.
+  void shrink(std::size_t size) { size_ = std::min(size, size_); }
 
   /// See ScratchBlock.
   void release(std::size_t begin, std::size_t end) const {

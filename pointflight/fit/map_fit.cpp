@@ -137,11 +137,6 @@ EditedMap changed(
   return all.build(description_of(map), true, "the map", executor);
 }
 
-Vector3d center_of(const SurfelMap& map, const LeafHeader& leaf, const Surfel& surfel) {
-  return map.origin_world() + map.resolution() * (Vector3d(leaf.x, leaf.y, leaf.z) +
-                                                  surfel.center_voxels.cast<double>());
-}
-
 // ---- pass 1
 
 constexpr std::size_t kPassed = 0;
@@ -181,7 +176,7 @@ EditedMap shrink_by_passes(const SurfelMap& map,
     }
     const double share = hits / (hits + passes);
     if (share < fit.ghost_share && passes >= fit.ghost_passes) {
-      report.ghosts.push_back(center_of(map, leaf, decode(word)));
+      report.ghosts.push_back(map.center_world(leaf, word));
       return std::nullopt;
     }
     const double factor = math::pow(std::max(share, kLeastShare), fit.exponent);
@@ -211,7 +206,7 @@ class WeightSlopes {
     const LeafHeader leaf = decode_leaf(map_.words()[met.word - headers_[met.word]]);
     const Vector3d nearest = ray.origin_world +
                              static_cast<double>(met.t) * ray.direction_world.cast<double>() -
-                             center_of(map_, leaf, surfel);
+                             map_.center_world(leaf, map_.words()[met.word]);
     std::array<double, 3> squares{};
     double q = 0.0;
     for (int k = 0; k < 3; ++k) {

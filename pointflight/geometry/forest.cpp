@@ -14,6 +14,13 @@ class Draws {
  public:
   explicit Draws(std::uint64_t seed) : random_(seed, StreamId::kForest, 0) {}
   double operator()(double low, double high) { return random_.uniform(next_++, low, high); }
+  /// One of each pair of bounds, z first. Never as arguments of one call: those are computed in an
+  /// order that each compiler chooses.
+  Vector3d vector(const Vector3d& low, const Vector3d& high) {
+    Vector3d drawn;
+    for (int axis = 2; axis >= 0; --axis) drawn[axis] = (*this)(low[axis], high[axis]);
+    return drawn;
+  }
 
  private:
   RandomStream random_;
@@ -46,8 +53,8 @@ void add_ground(const ForestOptions& options, ShapeScene& scene) {
 void add_leaves(const Vector3d& around, Draws& draw, ShapeScene& scene) {
   constexpr int kLeaves = 10;
   for (int i = 0; i < kLeaves; ++i) {
-    const Vector3d offset(draw(-0.35, 0.35), draw(-0.35, 0.35), draw(-0.25, 0.35));
-    const Vector3d normal = Vector3d(draw(-1, 1), draw(-1, 1), draw(0.2, 1)).normalized();
+    const Vector3d offset = draw.vector({-0.35, -0.35, -0.25}, {0.35, 0.35, 0.35});
+    const Vector3d normal = draw.vector({-1.0, -1.0, 0.2}, {1.0, 1.0, 1.0}).normalized();
     scene.shapes.emplace_back(Disc{around + offset, normal, draw(0.04, 0.10)});
   }
 }
@@ -55,7 +62,9 @@ void add_leaves(const Vector3d& around, Draws& draw, ShapeScene& scene) {
 void add_tree(const Vector3d& foot, const ForestOptions& options, Draws& draw, ShapeScene& scene) {
   const double height = draw(options.height_min, options.height_max);
   const double radius = draw(options.trunk_radius_min, options.trunk_radius_max);
-  const Vector3d top = foot + Vector3d(draw(-0.4, 0.4), draw(-0.4, 0.4), height);
+  const double top_y = draw(-0.4, 0.4);
+  const double top_x = draw(-0.4, 0.4);
+  const Vector3d top = foot + Vector3d(top_x, top_y, height);
   scene.shapes.emplace_back(Cone{foot - Vector3d(0, 0, 0.3), top, radius, 0.2 * radius});
   // branches leave the upper two thirds of the trunk, with leaves at their ends
   const int branches = static_cast<int>(draw(6.0, 12.0));

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "pointflight/map/bvh8_part.hpp"
+#include "pointflight/map/voxel_moments.hpp"
 
 namespace pointflight {
 namespace {
@@ -140,6 +141,18 @@ class TreeBuilder {
 };
 
 }  // namespace
+
+Aabb bounds_of(std::span<const BuildSurfel> surfels,
+               const Vector3d& base_world,
+               double resolution) {
+  Aabb bounds;
+  for (const BuildSurfel& surfel : surfels) {
+    const auto voxel = morton_decode(surfel.morton);
+    const Vector3d corner = Vector3d(voxel[0], voxel[1], voxel[2]).array() - kMaxVoxel;
+    bounds.add(base_world + resolution * (corner + center_voxels(surfel.word).cast<double>()));
+  }
+  return bounds;
+}
 
 Bvh8 build_bvh8(const TreeInput& input,
                 TreeQuality quality,

@@ -38,6 +38,9 @@ struct BuildSurfel {
   SurfelWord word = 0;       ///< With its centre in voxels from the voxel's low corner, in [0, 1].
 };
 
+/// Box around the centres of surfels, m; `base_world`: corner of voxel (0, 0, 0).
+Aabb bounds_of(std::span<const BuildSurfel> surfels, const Vector3d& base_world, double resolution);
+
 /// A hierarchy over surfels as a map's file holds it; the first node is the root.
 struct Bvh8 {
   ScratchArray<Bvh8Node> nodes;          ///< Inner nodes; the root first.

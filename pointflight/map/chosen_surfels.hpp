@@ -3,7 +3,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "pointflight/map/surfel_scales.hpp"
+#include "pointflight/map/cell_tiles.hpp"
+#include "pointflight/map/surfel_piece.hpp"
 
 namespace pointflight {
 

@@ -14,10 +14,11 @@
 #include "pointflight/map/import_check.hpp"
 #include "pointflight/map/import_metadata.hpp"
 #include "pointflight/map/noise_projection.hpp"
+#include "pointflight/map/small_cells.hpp"
 #include "pointflight/map/spacing.hpp"
 #include "pointflight/map/sparse_growth.hpp"
 #include "pointflight/map/surfel_fit.hpp"
-#include "pointflight/map/surfel_scales.hpp"
+#include "pointflight/map/wide_cells.hpp"
 
 namespace pointflight {
 namespace {
@@ -217,6 +218,8 @@ class Import {
     report.tau = options_.tau.value_or(static_cast<float>(tau_for(report.points_per_cell)));
     map_.description.intensity_offset = chosen.intensity_offset;
     map_.description.intensity_step = chosen.intensity_step;
+    map_.description.bounds_world =
+        bounds_of(chosen.surfels.span(), cells_.frame().base_world, report.resolution);
     cells_ = {};  // room for the tree
     pointflight::report(progress_, "building the hierarchy", 0.0);
     TreeInput input{chosen.surfels, chosen.intensity, {}, report.resolution};
@@ -251,12 +254,11 @@ class Import {
     return choose_surfels(cells_, surfels, covered, wide, small, report.has_intensity, scratch_);
   }
 
-  /// Where the map lies: in voxels, and its centroids in the world.
+  /// Where the map lies, in voxels.
   void find_bounds() {
     struct Bounds {
       std::array<std::int32_t, 3> min{kMaxVoxel, kMaxVoxel, kMaxVoxel};
       std::array<std::int32_t, 3> max{-kMaxVoxel, -kMaxVoxel, -kMaxVoxel};
-      Aabb world;
     };
     std::vector<Bounds> of_tile(cells_.tiles().size());
     cells_.for_each_tile(executor_, [&](std::size_t t, std::span<VoxelCell> cells) {
@@ -265,7 +267,6 @@ class Import {
           of_tile[t].min[axis] = std::min(of_tile[t].min[axis], cell.voxel[axis]);
           of_tile[t].max[axis] = std::max(of_tile[t].max[axis], cell.voxel[axis]);
         }
-        of_tile[t].world.add(cells_.frame().centroid_world(cell));
       }
     });
     Bounds all;
@@ -274,8 +275,6 @@ class Import {
         all.min[axis] = std::min(all.min[axis], bounds.min[axis]);
         all.max[axis] = std::max(all.max[axis], bounds.max[axis]);
       }
-      all.world.min = all.world.min.cwiseMin(bounds.world.min);
-      all.world.max = all.world.max.cwiseMax(bounds.world.max);
     }
     for (std::size_t axis = 0; axis < 3; ++axis) {
       if (all.max[axis] - all.min[axis] >= (1 << 20)) {
@@ -289,7 +288,6 @@ class Import {
       }
     }
     min_voxel_ = all.min;
-    map_.description.bounds_world = all.world;
     map_.description.origin_world =
         cells_.frame().base_world +
         map_.report.resolution * Vector3d(min_voxel_[0], min_voxel_[1], min_voxel_[2]);

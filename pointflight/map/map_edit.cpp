@@ -29,11 +29,6 @@ std::uint8_t intensity_code(const SurfelMap& map, std::size_t word) {
   return map.has_intensity() ? map.intensity_codes()[word] : std::uint8_t{0};
 }
 
-Vector3d center_world(const SurfelMap& map, const LeafHeader& leaf, const Surfel& surfel) {
-  return map.origin_world() + map.resolution() * (Vector3d(leaf.x, leaf.y, leaf.z) +
-                                                  surfel.center_voxels.cast<double>());
-}
-
 Surfel turned(Surfel surfel, const Quaterniond& rotation) {
   surfel.axes = (rotation.toRotationMatrix() * surfel.axes.cast<double>()).cast<float>();
   return surfel;
@@ -143,7 +138,7 @@ EditedMap crop_map(const SurfelMap& map,
   std::vector<bool> kept;  // a bit a surfel, so that no room is taken for those that go
   std::size_t count = 0;
   for_each_surfel(map.words(), [&](const LeafHeader& leaf, std::size_t word) {
-    kept.push_back(keep(center_world(map, leaf, decode(map.words()[word]))));
+    kept.push_back(keep(map.center_world(leaf, map.words()[word])));
     count += kept.back() ? 1 : 0;
   });
   SurfelGathering gathering(map.origin_world(), map.resolution(), count, options);
@@ -170,7 +165,7 @@ EditedMap transform_map(const SurfelMap& map,
   SurfelGathering gathering(T_new_old * middle, map.resolution(), count, options);
   for_each_surfel(map.words(), [&](const LeafHeader& leaf, std::size_t word) {
     const Surfel surfel = decode(map.words()[word]);
-    const Vector3d center = T_new_old * center_world(map, leaf, surfel);
+    const Vector3d center = T_new_old * map.center_world(leaf, map.words()[word]);
     const std::uint8_t code = intensity_code(map, word);
     if (!gathering.add(center, turned(surfel, T_new_old.rotation), code)) {
       refuse_width(map.resolution());
@@ -227,7 +222,7 @@ EditedMap merge_maps(const std::vector<PlacedMap>& maps,
         return;
       }
       const Surfel surfel = decode(map.words()[word]);
-      const Vector3d center = T * center_world(map, leaf, surfel);
+      const Vector3d center = T * map.center_world(leaf, map.words()[word]);
       const bool taken =
           std::any_of(maps.begin(),
                       maps.begin() + static_cast<std::ptrdiff_t>(m),
@@ -279,7 +274,7 @@ std::uint64_t for_each_missing(
   const auto all = static_cast<double>(std::max<std::size_t>(1, map.words().size()));
   for_each_surfel(map.words(), [&](const LeafHeader& leaf, std::size_t word) {
     ++count;
-    centers.push_back(center_world(map, leaf, decode(map.words()[word])));
+    centers.push_back(map.center_world(leaf, map.words()[word]));
     if (centers.size() < kBatch) return;
     flush();
     report(progress, "comparing", static_cast<double>(word) / all);

@@ -11,9 +11,7 @@ std::optional<Nearest> SurfelMap::nearest(const Vector3d& point_world, double ma
       find_nearest(nodes_, words_, scale_, resolution_, point_world - origin_, max_distance);
   if (found.word == 0) return std::nullopt;
   const LeafHeader leaf = decode_leaf(words_[found.leaf]);
-  const Vector3d center =
-      origin_ + resolution_ * (Vector3d(leaf.x, leaf.y, leaf.z) +
-                               decode(words_[found.word]).center_voxels.cast<double>());
+  const Vector3d center = center_world(leaf, words_[found.word]);
   return Nearest{std::sqrt(static_cast<double>(found.squared_distance)), center, found.word};
 }
 

@@ -46,9 +46,18 @@ SparseBlocks::SparseBlocks(const CellTiles& cells,
   }
 }
 
-bool SparseBlocks::contain(double resolution, const VoxelCell& cell) const {
-  const auto block = blocks_.find(key_of(resolution, cell));
+bool SparseBlocks::is_sparse(const Key& key) const {
+  const auto block = blocks_.find(key);
   return block != blocks_.end() && block->second.median_is_sparse();
+}
+
+bool SparseSearch::contain(double resolution, const VoxelCell& cell) {
+  const SparseBlocks::Key key = SparseBlocks::key_of(resolution, cell);
+  if (last_ != key) {
+    last_ = key;
+    is_sparse_ = blocks_.is_sparse(key);
+  }
+  return is_sparse_;
 }
 
 bool SparseBlocks::any() const {

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <map>
+#include <optional>
 
 #include "pointflight/map/bvh8.hpp"
 #include "pointflight/map/cell_tiles.hpp"
@@ -21,12 +22,11 @@ class SparseBlocks {
                const ScratchArray<BuildSurfel>& surfels,
                const Executor& executor);
 
-  /// True for a cell in one; cells of any width from the same base.
-  [[nodiscard]] bool contain(double resolution, const VoxelCell& cell) const;
   /// False where no block is.
   [[nodiscard]] bool any() const;
 
  private:
+  friend class SparseSearch;
   /// Whole numbers; as doubles, because cells of a hostile file may be thousands of kilometres
   /// wide.
   using Key = std::array<double, 3>;
@@ -36,8 +36,24 @@ class SparseBlocks {
     [[nodiscard]] bool median_is_sparse() const { return 2 * sparse > all; }
   };
   static Key key_of(double resolution, const VoxelCell& cell);
+  [[nodiscard]] bool is_sparse(const Key& key) const;
 
   std::map<Key, Counts> blocks_;  // of the planar cells
+};
+
+/// Which cells lie in sparse blocks, asked for one after another: those of one block are looked up
+/// once.
+class SparseSearch {
+ public:
+  explicit SparseSearch(const SparseBlocks& blocks) : blocks_(blocks) {}
+
+  /// True for a cell in one; cells of any width from the same base.
+  [[nodiscard]] bool contain(double resolution, const VoxelCell& cell);
+
+ private:
+  const SparseBlocks& blocks_;
+  std::optional<SparseBlocks::Key> last_;
+  bool is_sparse_ = false;
 };
 
 }  // namespace pointflight

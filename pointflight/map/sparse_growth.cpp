@@ -58,12 +58,14 @@ std::uint64_t grow_sparse_surfels(const CellTiles& cells,
                                   const Executor& executor,
                                   const Progress& progress) {
   const std::vector<std::size_t> first = cells.first_numbers();
-  const auto is_thin = [&](const VoxelCell& cell) {
-    return cell.n < kSparsePoints && blocks.contain(cells.resolution(), cell);
+  const auto is_thin = [&](const VoxelCell& cell, SparseSearch& search) {
+    return cell.n < kSparsePoints && search.contain(cells.resolution(), cell);
   };
   std::vector<char> has_thin(cells.tiles().size(), 0);
   cells.for_each_tile(executor, [&](std::size_t t, std::span<VoxelCell> own) {
-    has_thin[t] = std::any_of(own.begin(), own.end(), is_thin) ? 1 : 0;
+    SparseSearch search(blocks);
+    const auto thin = [&](const VoxelCell& cell) { return is_thin(cell, search); };
+    has_thin[t] = std::any_of(own.begin(), own.end(), thin) ? 1 : 0;
   });
   std::vector<std::size_t> thin;
   for (std::size_t t = 0; t < has_thin.size(); ++t) {
@@ -72,10 +74,11 @@ std::uint64_t grow_sparse_surfels(const CellTiles& cells,
   std::atomic<std::uint64_t> grown{0};
   const auto widen = [&](TileView& view) {
     NeighbourWindow window(view.grid);
+    SparseSearch search(blocks);
     std::vector<double> squared;
     for (std::size_t i = 0; i < view.count; ++i) {
       const VoxelCell& cell = view.grid.cells()[i];
-      if (!is_thin(cell) || (!covered.empty() && covered[first[view.tile] + i])) continue;
+      if (!is_thin(cell, search) || (!covered.empty() && covered[first[view.tile] + i])) continue;
       if (const auto wide = widened(view.grid, window, cell, squared)) {
         surfels[first[view.tile] + i].word = encode(*wide);
         ++grown;

@@ -95,10 +95,7 @@ SurfelWord encode(const Surfel& surfel) {
 
 Surfel decode(SurfelWord word) {
   Surfel surfel;
-  for (int axis = 0; axis < 3; ++axis) {
-    const auto steps = static_cast<float>((word >> (10 * axis)) & 1023u);
-    surfel.center_voxels[axis] = (steps + 0.5f) / 64.0f;
-  }
+  surfel.center_voxels = center_voxels(word);
   const auto component = [word](int shift) {
     return static_cast<float>(static_cast<std::int8_t>(word >> shift)) * kQuaternionStep;
   };

@@ -39,6 +39,14 @@ SurfelWord encode(const Surfel& surfel);
 /// Axes come out as one of four that stand for the same ellipsoid.
 Surfel decode(SurfelWord word);
 
+/// The centre alone, as `decode` has it: from the leaf's origin, in voxels.
+inline Vector3f center_voxels(SurfelWord word) {
+  const auto part = [word](int axis) {
+    return (static_cast<float>((word >> (10 * axis)) & 1023u) + 0.5f) / 64.0f;
+  };
+  return {part(0), part(1), part(2)};
+}
+
 /// True for surfels of thickness class 0.
 inline bool is_planar(SurfelWord word) {
   return ((word >> 30) & 3u) == 0;

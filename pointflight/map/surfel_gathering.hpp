@@ -90,16 +90,11 @@ class SurfelGathering {
     edited.surfels = count;
     ScratchArray<BuildSurfel> surfels(scratch_, count);
     ScratchArray<std::uint8_t> intensity(scratch_, description.has_intensity ? count : 0);
-    Aabb bounds;
     for (std::size_t i = 0; i < count; ++i) {
       surfels[i] = entries_[i].surfel;
       if (description.has_intensity) intensity[i] = entries_[i].intensity;
-      const auto voxel = morton_decode(surfels[i].morton);
-      const Vector3d corner = Vector3d(voxel[0], voxel[1], voxel[2]).array() - kMaxVoxel;
-      bounds.add(base_ +
-                 resolution_ * (corner + decode(surfels[i].word).center_voxels.cast<double>()));
     }
-    edited.description.bounds_world = bounds;
+    edited.description.bounds_world = bounds_of(surfels.span(), base_, resolution_);
     TreeInput input{surfels, intensity, {}, resolution_};
     for (std::size_t axis = 0; axis < 3; ++axis) {
       input.low[axis] = static_cast<std::uint32_t>(base[axis] + kMaxVoxel);

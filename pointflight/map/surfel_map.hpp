@@ -94,6 +94,12 @@ class SurfelMap {
   /// False: `intensity` is 0 everywhere.
   [[nodiscard]] bool has_intensity() const { return !intensity_.empty(); }
 
+  /// Centre of a surfel of that leaf, m.
+  [[nodiscard]] Vector3d center_world(const LeafHeader& leaf, SurfelWord word) const {
+    return origin_ +
+           resolution_ * (Vector3d(leaf.x, leaf.y, leaf.z) + center_voxels(word).cast<double>());
+  }
+
   /// Codes of the intensities beside `words`, empty without: offset + step * code.
   [[nodiscard]] std::span<const std::uint8_t> intensity_codes() const { return intensity_; }
   /// In the cloud's own scale.
@@ -122,8 +128,7 @@ class SurfelMap {
   void for_each_surfel(const Visit& visit) const {
     pointflight::for_each_surfel(words_, [&](const LeafHeader& leaf, std::size_t word) {
       const Surfel surfel = decode(words_[word]);
-      const Vector3d leaf_origin = origin_ + resolution_ * Vector3d(leaf.x, leaf.y, leaf.z);
-      const Vector3d center = leaf_origin + resolution_ * surfel.center_voxels.cast<double>();
+      const Vector3d center = center_world(leaf, words_[word]);
       const Vector3d normal = surfel.axes.col(0).cast<double>();
       visit(center, normal, surfel.s[0] * resolution_, static_cast<std::uint32_t>(word));
     });

@@ -10,6 +10,7 @@
 #include "pointflight/core/hash.hpp"
 #include "pointflight/core/simd_targets.hpp"
 #include "pointflight/fidelity/exact_scene.hpp"
+#include "pointflight/geometry/shape_scene.hpp"
 #include "pointflight/map/map_builder.hpp"
 #include "pointflight/render/beam_renderer.hpp"
 #include "tests/support.hpp"
@@ -146,6 +147,30 @@ TEST_P(Bits, AreThoseRecorded) {
     }
   }
   use_kernel("");
+#else
+  GTEST_SKIP() << "recorded on x86-64";
+#endif
+}
+
+// of every compiler too: draws that are arguments of one call come in an order of its choice
+TEST(GeneratedForest, IsTheOneRecorded) {
+  std::vector<double> numbers;
+  const auto put = [&](const Vector3d& v) { numbers.insert(numbers.end(), v.begin(), v.end()); };
+  for (const Shape& shape : make_forest(ForestOptions{}).shapes) {
+    if (const auto* triangle = std::get_if<Triangle>(&shape)) {
+      for (const Vector3d& corner : {triangle->a, triangle->b, triangle->c}) put(corner);
+    } else if (const auto* cone = std::get_if<Cone>(&shape)) {
+      put(cone->from);
+      put(cone->to);
+      numbers.insert(numbers.end(), {cone->radius_from, cone->radius_to});
+    } else if (const auto* disc = std::get_if<Disc>(&shape)) {
+      put(disc->center);
+      put(disc->normal);
+      numbers.push_back(disc->radius);
+    }
+  }
+#if defined(__x86_64__)
+  EXPECT_EQ(hash64(as_bytes(numbers)), 15340897498394051763u);
 #else
   GTEST_SKIP() << "recorded on x86-64";
 #endif

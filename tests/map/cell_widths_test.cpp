@@ -1,6 +1,4 @@
 // Wide cells where points are thin, small ones where many lie on something that is not flat.
-#include "pointflight/map/surfel_scales.hpp"
-
 #include <gtest/gtest.h>
 
 #include <array>
@@ -9,7 +7,9 @@
 #include <vector>
 
 #include "pointflight/core/random.hpp"
+#include "pointflight/map/small_cells.hpp"
 #include "pointflight/map/surfel_fit.hpp"
+#include "pointflight/map/wide_cells.hpp"
 #include "pointflight/render/renderer.hpp"
 #include "tests/support.hpp"
 
@@ -170,6 +170,23 @@ TEST(SmallCells, TakeTheCellsPointsAndNoOthers) {
     EXPECT_NEAR(at->second.second, 5, 3) << "two to eight";
   });
   EXPECT_EQ(split, sums.size());
+}
+
+TEST(CellWidths, BoundsAreThoseOfTheSurfels) {
+  ShapeScene thin;  // its corners are cells of a point or two that a wide one stands for
+  thin.shapes.emplace_back(Triangle{{0, 0, 0}, {6, 0, 0}, {0, 6, 1}});
+  thin.shapes.emplace_back(Triangle{{6, 0, 0}, {6, 6, 1}, {0, 6, 1}});
+  ImportOptions options;
+  options.resolution = 0.1;
+  const ImportedMap imported = import_points(points_of(thin, 0.8, 0.1), options);
+  ASSERT_GT(imported.report.wide_surfels, 100u);
+  const auto map =
+      SurfelMap::from_bytes(map_bytes(imported.tree, imported.description), "thin.pfmap");
+  Aabb bounds;
+  map->for_each_surfel(
+      [&](const Vector3d& center, const Vector3d&, double, std::uint32_t) { bounds.add(center); });
+  EXPECT_LT((map->bounds_world().min - bounds.min).norm(), 1e-9);
+  EXPECT_LT((map->bounds_world().max - bounds.max).norm(), 1e-9);
 }
 
 }  // namespace
