@@ -45,6 +45,7 @@ class SparseBlocks {
 /// once.
 class SparseSearch {
  public:
+  /// `blocks` must outlive it.
   explicit SparseSearch(const SparseBlocks& blocks) : blocks_(blocks) {}
 
   /// True for a cell in one; cells of any width from the same base.

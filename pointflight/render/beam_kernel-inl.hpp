@@ -24,24 +24,41 @@ namespace pointflight::HWY_NAMESPACE {
 /// Rays that one thread follows at the same time: while one waits for its node, others compute.
 inline constexpr std::size_t kInFlight = 16;
 
+/// Visits after which a way is given up: more than children, so a cycle, a corrupt file.
+POINTFLIGHT_INLINE std::size_t most_steps(const KernelMap& map) {
+  return map.node_count * 8 + 8;
+}
+
+/// What one beam has met on its way, and where the way ends.
+struct BeamState {
+  float end;    ///< Nothing beyond matters.
+  float first;  ///< Where the surface begins, kNever before one is found.
+  HitLanes hits;
+};
+
 /// One beam on its way through the tree.
-struct RayState {
+struct RayState : BeamState {
   alignas(32) float enter[8];    ///< Where it enters the children of the present node.
   alignas(16) float start[4];    ///< Origin from the map's origin, for boxes.
   alignas(16) float inverse[4];  ///< 1 / direction.
   float direction[3];
   std::uint32_t near_side[3];  ///< Byte of the node at which the nearer planes begin, a axis.
   std::uint32_t far_side[3];
-  float end;    ///< Nothing beyond matters.
-  float first;  ///< Where the surface begins, kNever before one is found.
   double origin[3];
   std::uint32_t ray;
   const Bvh8Node* node;
-  std::size_t steps;  ///< More visits than children: a cycle, a corrupt file.
+  std::size_t steps;  ///< That are left.
   std::size_t depth;
   Entry stack[kStack];
-  HitLanes hits;
 };
+
+POINTFLIGHT_INLINE void start_beam(float range_max, BeamState& s) {
+  s.end = range_max;
+  s.first = kNever;
+  s.hits.count = 0;
+  s.hits.total = 0;
+  s.hits.nearest = kNever;
+}
 
 POINTFLIGHT_INLINE void start_ray(const KernelMap& map,
                                   const Ray& ray,
@@ -50,14 +67,10 @@ POINTFLIGHT_INLINE void start_ray(const KernelMap& map,
   s.start[3] = 0.0f;
   s.inverse[3] = 0.0f;
   s.ray = index;
-  s.end = ray.range_max;
-  s.first = kNever;
+  start_beam(ray.range_max, s);
   s.node = map.nodes;
-  s.steps = map.node_count * 8 + 8;
+  s.steps = most_steps(map);
   s.depth = 0;
-  s.hits.count = 0;
-  s.hits.total = 0;
-  s.hits.nearest = kNever;
   for (int axis = 0; axis < 3; ++axis) {
     s.origin[axis] = ray.origin_world[axis] - map.origin[axis];
     s.start[axis] = static_cast<float>(s.origin[axis]);
@@ -99,7 +112,7 @@ POINTFLIGHT_INLINE std::uint32_t test_node(RayState& s) {
 }
 
 /// Looks for the surface; what lies behind it no longer matters.
-POINTFLIGHT_INLINE void shorten(const KernelMap& map, RayState& s) {
+POINTFLIGHT_INLINE void shorten(const KernelMap& map, BeamState& s) {
   const float a = find_surface(map, s.hits);
   if (a == kNever) return;
   s.first = a;
@@ -114,7 +127,7 @@ enum class Meetings { kEndTheWay, kAllKept };
 /// Adds the hits among eight lanes; `hit` has a bit for each. `first_word` is the word of lane 0.
 template <Meetings kMeetings>
 POINTFLIGHT_INLINE void add_hits(const KernelMap& map,
-                                 RayState& s,
+                                 BeamState& s,
                                  std::uint32_t hit,
                                  const Meeting& meeting,
                                  std::uint32_t first_word,

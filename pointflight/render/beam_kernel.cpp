@@ -14,7 +14,7 @@
 #define HWY_TARGET_INCLUDE "pointflight/render/beam_kernel.cpp"
 #include <hwy/foreach_target.h>
 // after foreach_target
-#include "pointflight/render/beam_packets-inl.hpp"
+#include "pointflight/render/trace-inl.hpp"
 
 #if HWY_ONCE
 namespace pointflight {
@@ -39,7 +39,7 @@ KernelMap kernel_map_of(const SurfelMap& map) {
   k.weight_scale = kWeightOne * 36.0f / (static_cast<float>(kPi) * k.support_squared);
   k.scale = map.scale();
   k.window = m.window * static_cast<float>(map.resolution());
-  k.widest_group = std::min(0.06f, 0.26f * static_cast<float>(map.resolution()));
+  k.widest_group = std::min(0.06f, 0.16f * static_cast<float>(map.resolution()));
   k.tau = static_cast<std::int32_t>(m.tau * kWeightOne);
   return k;
 }

@@ -26,8 +26,8 @@ struct KernelMap {
   SurfelScale scale;
   float window = 0.0f;   ///< m
   std::int32_t tau = 0;  ///< In steps of kWeightOne.
-  /// Groups of eight beams that are wider (radius, rad) meet so many surfels apart that single rays
-  /// are faster: in proportion to r, measured from 0.02 to 0.2 m.
+  /// Groups of eight beams that are wider (radius, rad) meet so many surfels apart that bundles are
+  /// faster than packets: in proportion to r, measured from 0.02 to 0.2 m.
   float widest_group = 0.0f;
 };
 
@@ -41,16 +41,20 @@ struct KernelHit {
   std::uint32_t strongest = 0;  ///< Word of the surfel with the largest weight.
 };
 
-/// Which beams go through the tree together: what suits each, or each by itself.
-enum class BeamGrouping { kAsSuits, kSingly };
+/// Which beams go through the tree together.
+enum class BeamGrouping {
+  kAsSuits,  ///< Close ones as packets, others as bundles or by themselves, whatever is faster.
+  kSingly,   ///< Each by itself.
+  kBundles,  ///< Bundles wherever 64 neighbours lie within 0.4 rad.
+};
 
 KernelMap kernel_map_of(const SurfelMap& map);
 
 /// Traces the rays `order[0..]` of `rays` and writes `hits[order[i]]`, by the best kernel for this
 /// processor: AVX-512, AVX2, SSE4 or NEON. The results are the same bits on all of them, whatever
-/// the order, whatever else is traced in the same call, and however beams are grouped: 64
-/// neighbours in `order` that point nearly the same way go as a packet. Returns how many beams met
-/// more surfels than fit in their list (docs/architecture.md, "Hit rule").
+/// the order, whatever else is traced in the same call, and however beams are grouped: neighbours
+/// in `order` go together. Returns how many beams met more surfels than fit in their list
+/// (docs/architecture.md, "Hit rule").
 std::uint64_t trace_beams(const KernelMap& map,
                           std::span<const Ray> rays,
                           std::span<const std::uint32_t> order,

@@ -10,26 +10,10 @@
 #define POINTFLIGHT_RENDER_BEAM_PACKETS_INL_HPP
 #endif
 
-#include <memory>
-
 #include "pointflight/render/packet_leaf-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace pointflight::HWY_NAMESPACE {
-
-/// The hits of single rays. Returns how many lists overflowed.
-static std::uint64_t trace_singly(const KernelMap& map,
-                                  const Ray* rays,
-                                  const std::uint32_t* order,
-                                  std::size_t count,
-                                  KernelHit* hits) {
-  if (map.node_count == 0) {
-    for (std::size_t i = 0; i < count; ++i) hits[order[i]] = {};
-    return 0;
-  }
-  return follow_singly<Meetings::kEndTheWay>(
-      map, rays, order, count, [&](RayState& s) { hits[s.ray] = return_of(map, s.first, s.hits); });
-}
 
 static_assert(kRows <= 128, "shares_of: sums of whole numbers must fit 32 bits");
 
@@ -84,7 +68,8 @@ POINTFLIGHT_INLINE void shorten(const KernelMap& map, Packet& p, std::size_t g) 
   // where the nearest hit begins the surface, farther ones cannot move it
   const M8 open = load(group.nearest) < load(group.first);
   if (bits(open & (splat_int(map.tau - 1) < load(group.total))) == 0) return;
-  const F8 first = find_surfaces(map, group.rows);
+  HitRows& rows = p.rows[g];
+  const F8 first = find_surfaces(map, rows);
   const M8 found = first < splat(kNever);
   if (bits(found) == 0) return;
   store(first, group.first);
@@ -93,7 +78,7 @@ POINTFLIGHT_INLINE void shorten(const KernelMap& map, Packet& p, std::size_t g) 
   store(end, group.end);
   p.group_end[g] = greatest(end);
   p.end = greatest(load(p.group_end));
-  if (group.rows.count > 12) drop_behind(group.rows, end);
+  if (rows.count > 12) drop_behind(rows, end);
 }
 
 /// Tests the surfels of `which` against the eight beams of a group.
@@ -116,7 +101,7 @@ POINTFLIGHT_INLINE void meet_group(
   const F8 support = splat(map.support_squared);
   I8 total = load(group.total);
   F8 nearest = load(group.nearest);
-  HitRows& rows = group.rows;
+  HitRows& rows = p.rows[g];
   const std::size_t before = rows.count;
   for (; which != 0; which &= which - 1) {
     const auto i = static_cast<std::size_t>(std::countr_zero(which));
@@ -200,7 +185,7 @@ POINTFLIGHT_INLINE void walk(const KernelMap& map, Packet& p) {
   Entry stack[kStack];
   std::size_t depth = 0;
   stack[depth++] = {0.0f, 0, Bvh8Node::kInner};
-  std::size_t steps = map.node_count * 8 + 8;  // more visits than children: a cycle
+  std::size_t steps = most_steps(map);
   alignas(32) float distances[8];
   while (depth > 0 && steps-- > 0) {
     const Entry entry = stack[--depth];
@@ -218,6 +203,7 @@ POINTFLIGHT_INLINE void walk(const KernelMap& map, Packet& p) {
 
 POINTFLIGHT_INLINE void finish(const KernelMap& map,
                                const Group& group,
+                               const HitRows& rows,
                                const std::uint32_t* order,
                                KernelHit* hits) {
   const F8 first = load(group.first);
@@ -226,7 +212,6 @@ POINTFLIGHT_INLINE void finish(const KernelMap& map,
   I8 cosine = splat_int(0);
   I8 largest = splat_int(-1);
   I8 strongest = splat_int(0);
-  const HitRows& rows = group.rows;
   for (std::size_t i = 0; i < rows.count; ++i) {
     const F8 t = load(rows.t[i]);
     const I8 w = load(rows.weight[i]);
@@ -255,101 +240,6 @@ POINTFLIGHT_INLINE void finish(const KernelMap& map,
                                                           sums[2][i],
                                                           static_cast<std::uint32_t>(sums[3][i]));
   }
-}
-
-/// Beams that wait for single rays.
-struct Waiting {
-  std::uint32_t beams[256] = {};
-  std::size_t count = 0;
-};
-
-/// Fills a packet with groups of eight beams from `at` on, as far as they lie together; `taken`
-/// tells where each begins. Groups that are too wide go to those that wait. Returns the number of
-/// groups.
-POINTFLIGHT_INLINE std::size_t fill(const KernelMap& map,
-                                    const Ray* rays,
-                                    const std::uint32_t* order,
-                                    std::size_t count,
-                                    std::size_t& at,
-                                    Packet& p,
-                                    std::size_t (&taken)[kGroups],
-                                    Waiting& waiting) {
-  std::size_t groups = 0;
-  while (groups < kGroups && at + 8 <= count && waiting.count + 8 <= std::size(waiting.beams)) {
-    // beams lie scattered: those of the next packet are fetched meanwhile
-    for (std::size_t i = at + kPacket; i < std::min(at + kPacket + 8, count); ++i) {
-      hwy::Prefetch(rays + order[i]);
-    }
-    const bool together = take_beams(map, rays, order + at, p.groups[groups]);
-    if (together && groups > 0 && !lies_near(map, p.groups[groups], p.groups[0])) break;
-    if (together) {
-      taken[groups++] = at;
-    } else {
-      std::copy(order + at, order + at + 8, waiting.beams + waiting.count);
-      waiting.count += 8;
-    }
-    at += 8;
-  }
-  return groups;
-}
-
-/// True if most groups of eight lie close enough together: a look at a few of them.
-POINTFLIGHT_INLINE bool is_dense(const KernelMap& map,
-                                 const Ray* rays,
-                                 const std::uint32_t* order,
-                                 std::size_t count,
-                                 Packet& p) {
-  constexpr std::size_t kLooks = 8;
-  if (count < 8 * kLooks) return true;
-  std::size_t together = 0;
-  for (std::size_t i = 0; i < kLooks; ++i) {
-    const std::size_t at = (count - 8) * i / (kLooks - 1) / 8 * 8;
-    together += take_beams(map, rays, order + at, p.groups[0]) ? 1 : 0;
-  }
-  return 2 * together >= kLooks;
-}
-
-static std::uint64_t trace(const KernelMap& map,
-                           const Ray* rays,
-                           const std::uint32_t* order,
-                           std::size_t count,
-                           BeamGrouping grouping,
-                           KernelHit* hits) {
-  if (grouping != BeamGrouping::kAsSuits || map.node_count == 0) {
-    return trace_singly(map, rays, order, count, hits);
-  }
-  // 80 KB, too large for the small stacks that some shells and embedding programs give; filled by
-  // take_beams and set_up
-  thread_local const auto room = std::make_unique_for_overwrite<Packet>();
-  Packet& packet = *room;
-  if (!is_dense(map, rays, order, count, packet)) {
-    return trace_singly(map, rays, order, count, hits);
-  }
-  std::uint64_t overflows = 0;
-  std::size_t at = 0;
-  Waiting waiting;
-  std::size_t taken[kGroups];
-  const auto trace_waiting = [&] {
-    overflows += trace_singly(map, rays, waiting.beams, waiting.count, hits);
-    waiting.count = 0;
-  };
-  while (at + 8 <= count) {
-    const std::size_t groups = fill(map, rays, order, count, at, packet, taken, waiting);
-    if (waiting.count + kPacket > std::size(waiting.beams)) trace_waiting();
-    if (groups == 0) continue;
-    set_up(packet, groups);
-    walk(map, packet);
-    for (std::size_t g = 0; g < groups; ++g) {
-      const std::uint32_t* beams = order + taken[g];
-      if ((packet.failed >> g & 1u) != 0) {
-        overflows += trace_singly(map, rays, beams, 8, hits);
-      } else {
-        finish(map, packet.groups[g], beams, hits);
-      }
-    }
-  }
-  trace_waiting();
-  return overflows + trace_singly(map, rays, order + at, count - at, hits);
 }
 
 }  // namespace pointflight::HWY_NAMESPACE

@@ -132,6 +132,7 @@ TEST_P(Bits, AreThoseRecorded) {
   EXPECT_EQ(map_hash_, recorded.map) << "the map is another";
   EXPECT_EQ(hash_of(100000, 2, BeamGrouping::kAsSuits), recorded.beams_1e5);
   EXPECT_EQ(hash_of(100000, 1, BeamGrouping::kSingly), recorded.beams_1e5) << "singly";
+  EXPECT_EQ(hash_of(100000, 1, BeamGrouping::kBundles), recorded.beams_1e5) << "bundles";
   if (kAll) {
     EXPECT_EQ(hash_of(10000000, 2, BeamGrouping::kAsSuits), recorded.beams_1e7);
   }
@@ -140,6 +141,7 @@ TEST_P(Bits, AreThoseRecorded) {
     use_kernel(name);
     if (!kAll) {
       EXPECT_EQ(hash_of(100000, 3, BeamGrouping::kAsSuits), recorded.beams_1e5) << name;
+      EXPECT_EQ(hash_of(100000, 3, BeamGrouping::kBundles), recorded.beams_1e5) << name;
     } else if (!thorough) {
       EXPECT_EQ(hash_of(1000000, 3, BeamGrouping::kAsSuits), recorded.beams_1e6) << name;
     } else {
