@@ -39,7 +39,7 @@ KernelMap kernel_map_of(const SurfelMap& map) {
   k.weight_scale = kWeightOne * 36.0f / (static_cast<float>(kPi) * k.support_squared);
   k.scale = map.scale();
   k.window = m.window * static_cast<float>(map.resolution());
-  k.widest_group = std::min(0.06f, 0.16f * static_cast<float>(map.resolution()));
+  k.widest_group = std::min(0.036f, 0.23f * static_cast<float>(map.resolution()));
   k.tau = static_cast<std::int32_t>(m.tau * kWeightOne);
   return k;
 }

@@ -27,7 +27,7 @@ struct KernelMap {
   float window = 0.0f;   ///< m
   std::int32_t tau = 0;  ///< In steps of kWeightOne.
   /// Groups of eight beams that are wider (radius, rad) meet so many surfels apart that bundles are
-  /// faster than packets: in proportion to r, measured from 0.02 to 0.2 m.
+  /// faster than packets: in proportion to r up to a limit, measured from 0.02 to 0.2 m.
   float widest_group = 0.0f;
 };
 
