@@ -71,7 +71,7 @@ POINTFLIGHT_INLINE void set_up_bundle(Bundle& b, std::size_t count) {
 struct SeenBoxes {
   F8 low_u, high_u, low_v, high_v;  ///< Rectangles in the plane at distance 1 along w.
   F8 begin;                         ///< Along w, m: no beam is there earlier.
-  std::uint32_t in_frustum;         ///< A bit for each.
+  std::uint32_t in_frustum = 0;     ///< A bit for each.
 };
 
 /// The children's boxes: c + e with |e_k| <= h_k. Its points lie (e.(u - c_u w)) / ((c + e).w)
