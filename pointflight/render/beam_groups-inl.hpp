@@ -21,6 +21,7 @@ namespace pointflight::HWY_NAMESPACE {
 
 inline constexpr std::size_t kGroups = 8;
 inline constexpr std::size_t kTogether = 8 * kGroups;  ///< Beams.
+
 /// Eight beams.
 struct Group {
   alignas(32) float dx[8], dy[8], dz[8];

@@ -3,14 +3,18 @@
 // in what it prints; where it is not, the change has broken reproducibility.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <cstdlib>
 
+#include "pointflight/core/constants.hpp"
 #include "pointflight/core/hash.hpp"
+#include "pointflight/core/random.hpp"
 #include "pointflight/core/simd_targets.hpp"
 #include "pointflight/fidelity/exact_scene.hpp"
 #include "pointflight/geometry/shape_scene.hpp"
+#include "pointflight/lidar/beam_pattern.hpp"
 #include "pointflight/map/map_builder.hpp"
 #include "pointflight/render/beam_renderer.hpp"
 #include "tests/support.hpp"
@@ -152,6 +156,55 @@ TEST_P(Bits, AreThoseRecorded) {
 #else
   GTEST_SKIP() << "recorded on x86-64";
 #endif
+}
+
+std::uint64_t bits_of(const Renderer& renderer, const std::vector<Ray>& rays) {
+  std::vector<Hit> hits(rays.size());
+  RayBatch request;
+  request.rays = rays;
+  request.T_world_sensor.translation = rays.front().origin_world;
+  renderer.render(request, hits, Executor(2));
+  std::vector<float> numbers;
+  for (const Hit& hit : hits) {
+    numbers.insert(numbers.end(), {hit.range, hit.cos_incidence, hit.intensity});
+  }
+  return hash64(as_bytes(numbers));
+}
+
+// from dense to far apart, from rest to a sensor that moves by metres within a scan, in the open
+// and amid surfels that lie around the apex
+TEST(BeamRenderer, BundlesAreTheBitsOfSingleRays) {
+  ShapeScene scene;
+  scene.add_box({-4, -4, -2}, {4, 4, 2});
+  scene.shapes.emplace_back(Sphere{{2, 2, 0}, 0.5});
+  scene.shapes.emplace_back(Cone{{-1, 0.6, -2}, {-1, 0.6, 2}, 0.03, 0.03});
+  const auto map = testing::map_of(scene, 0.05, 8.0, 0.01);
+  const BeamRenderer bundles(Scene{map}, BeamGrouping::kBundles);
+  const BeamRenderer suits(Scene{map});
+  const BeamRenderer singly(Scene{map}, BeamGrouping::kSingly);
+  const RandomStream random(7, StreamId::kTest, 0);
+  std::uint64_t draw = 0;
+  const auto next = [&](double low, double high) { return random.uniform(draw++, low, high); };
+  for (const double width : {0.02, 0.2, 1.0, kPi}) {
+    for (const double motion : {0.0, 1e-4, 0.05, 3.0}) {
+      for (const Vector3d& at : {Vector3d(0.3, 0.2, 0.1), Vector3d(3.98, 3.99, -1.97)}) {
+        const double heading = next(-kPi, kPi);
+        const double elevation = next(-1.4, 1.4);
+        std::vector<Ray> rays(777);
+        for (Ray& ray : rays) {
+          const double azimuth = heading + next(-width, width);
+          const double up = std::clamp(elevation + next(-width, width), -1.57, 1.57);
+          ray.direction_world = direction_of(azimuth, up).cast<float>();
+          ray.origin_world = at;
+          for (int axis = 0; axis < 3; ++axis) ray.origin_world[axis] += motion * next(-0.5, 0.5);
+          ray.range_max = static_cast<float>(next(0.5, 20.0));
+        }
+        const auto expected = bits_of(singly, rays);
+        EXPECT_EQ(bits_of(bundles, rays), expected) << width << " rad, " << motion << " m";
+        EXPECT_EQ(bits_of(suits, rays), expected) << width << " rad, " << motion << " m";
+      }
+    }
+  }
 }
 
 // of every compiler too: draws that are arguments of one call come in an order of its choice

@@ -306,42 +306,6 @@ TEST(BeamRenderer, TheSameBitsOnEveryInstructionSetAndInEveryOrder) {
   }
 }
 
-// from dense to far apart, from rest to a sensor that moves by metres within a scan, in the open
-// and amid surfels that lie around the apex
-TEST(BeamRenderer, BundlesAreTheBitsOfSingleRays) {
-  ShapeScene scene;
-  scene.add_box({-4, -4, -2}, {4, 4, 2});
-  scene.shapes.emplace_back(Sphere{{2, 2, 0}, 0.5});
-  scene.shapes.emplace_back(Cone{{-1, 0.6, -2}, {-1, 0.6, 2}, 0.03, 0.03});
-  const auto map = map_of(scene, 0.05, 8.0, 0.01);
-  const BeamRenderer bundles(Scene{map}, BeamGrouping::kBundles);
-  const BeamRenderer suits(Scene{map});
-  const BeamRenderer singly(Scene{map}, BeamGrouping::kSingly);
-  const RandomStream random(7, StreamId::kTest, 0);
-  std::uint64_t draw = 0;
-  const auto next = [&](double low, double high) { return random.uniform(draw++, low, high); };
-  for (const double width : {0.02, 0.2, 1.0, kPi}) {
-    for (const double motion : {0.0, 1e-4, 0.05, 3.0}) {
-      for (const Vector3d& at : {Vector3d(0.3, 0.2, 0.1), Vector3d(3.98, 3.99, -1.97)}) {
-        const double heading = next(-kPi, kPi);
-        const double elevation = next(-1.4, 1.4);
-        std::vector<Ray> rays(777);
-        for (Ray& ray : rays) {
-          const double azimuth = heading + next(-width, width);
-          const double up = std::clamp(elevation + next(-width, width), -1.57, 1.57);
-          ray.direction_world = direction_of(azimuth, up).cast<float>();
-          ray.origin_world = at;
-          for (int axis = 0; axis < 3; ++axis) ray.origin_world[axis] += motion * next(-0.5, 0.5);
-          ray.range_max = static_cast<float>(next(0.5, 20.0));
-        }
-        const auto expected = bits_of(render(singly, rays));
-        EXPECT_EQ(bits_of(render(bundles, rays)), expected) << width << " rad, " << motion << " m";
-        EXPECT_EQ(bits_of(render(suits, rays)), expected) << width << " rad, " << motion << " m";
-      }
-    }
-  }
-}
-
 TEST(BeamRenderer, TheShapeOfTheTreeDoesNotShow) {
   ShapeScene scene;
   scene.add_box({-4, -4, -2}, {4, 4, 2});
