@@ -55,6 +55,9 @@ void print_report(const ImportReport& r, const ImportOptions& options) {
                     r.grown_surfels,
                     r.wide_surfels));
   }
+  if (r.merged_surfels > 0) {
+    log(fmt::format("planes        {} surfels for several cells each", r.merged_surfels));
+  }
   if (r.small_surfels > 0) {
     log(fmt::format("fine forms    {} surfels for parts of cells", r.small_surfels));
   }

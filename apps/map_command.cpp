@@ -26,6 +26,7 @@ namespace {
 struct InfoFlags {
   std::string map;
   std::string png;
+  std::vector<std::string> points;  ///< --at
   bool json = false;
   bool verify = false;
   bool force = false;
@@ -64,11 +65,60 @@ void print_findings(const nlohmann::ordered_json& metadata, double resolution) {
     fmt::print(
         "  thin scan   {} surfels widened to close gaps, {} for several cells each\n", grown, wide);
   }
+  const std::uint64_t merged = count_in(metadata, "merged_surfels");
+  if (merged > 0) fmt::print("  planes      {} surfels for several cells each\n", merged);
   const std::uint64_t small = count_in(metadata, "small_surfels");
   if (small > 0) fmt::print("  fine forms  {} surfels for parts of cells\n", small);
 }
 
+constexpr double kNearestReach = 1e3;  // m
+
+/// What is at a point: JSON for one, a line for the other.
+struct PlaceInfo {
+  Vector3d point_world;
+  std::optional<Nearest> nearest;
+  std::optional<bool> known;  ///< Nothing where the map does not say.
+};
+
+std::vector<PlaceInfo> places_of(const SurfelMap& map, const std::vector<std::string>& points) {
+  std::vector<PlaceInfo> places;
+  for (const std::string& text : points) {
+    const Vector3d point(parse_numbers(text, 3, "--at").data());
+    PlaceInfo place{point, map.nearest(point, kNearestReach), std::nullopt};
+    if (map.known_space() != nullptr) place.known = map.known_space()->known(point);
+    places.push_back(place);
+  }
+  return places;
+}
+
+nlohmann::ordered_json json_of(const std::vector<PlaceInfo>& places) {
+  auto list = nlohmann::ordered_json::array();
+  for (const PlaceInfo& place : places) {
+    nlohmann::ordered_json json;
+    json["point"] = {place.point_world.x(), place.point_world.y(), place.point_world.z()};
+    json["nearest"] = place.nearest ? nlohmann::ordered_json(place.nearest->distance) : nullptr;
+    json["known"] = place.known ? nlohmann::ordered_json(*place.known) : nullptr;
+    list.push_back(json);
+  }
+  return list;
+}
+
+void print_places(const std::vector<PlaceInfo>& places) {
+  for (const PlaceInfo& place : places) {
+    fmt::print("  at {}  {}, {}\n",
+               point_text(place.point_world),
+               place.nearest
+                   ? fmt::format("{:.2f} m to the nearest surfel", place.nearest->distance)
+                   : fmt::format("nothing within {:.0f} m", kNearestReach),
+               !place.known   ? "the map does not say whether it was seen"
+               : *place.known ? "seen by the survey"
+                              : "not seen by the survey");
+  }
+}
+
 void print_info(const SurfelMap& map, const InfoFlags& flags) {
+  const std::vector<PlaceInfo> places = places_of(map, flags.points);
+  const KnownSpace* known = map.known_space();
   std::uint64_t planar = 0;
   std::uint64_t surfels = 0;
   map.for_each_surfel([&](const Vector3d&, const Vector3d&, double, std::uint32_t word) {
@@ -92,6 +142,11 @@ void print_info(const SurfelMap& map, const InfoFlags& flags) {
     json["bytes"] = map.file_size();
     json["bytes_per_surfel"] = bytes_each;
     json["has_intensity"] = map.has_intensity();
+    if (known != nullptr) {
+      json["known_space"]["share"] = known->known_share();
+      json["known_space"]["cell"] = known->grid().cell;
+    }
+    if (!places.empty()) json["at"] = json_of(places);
     json["verified"] = flags.verify;
     json["made"] = metadata;
     print_json(json);
@@ -111,6 +166,15 @@ void print_info(const SurfelMap& map, const InfoFlags& flags) {
   print_findings(metadata, map.resolution());
   fmt::print("  coverage    {:.2f} makes a return\n", map.model().tau);
   fmt::print("  intensity   {}\n", map.has_intensity() ? "yes" : "no");
+  if (known != nullptr) {
+    fmt::print(
+        "  seen space  {:.0f} % of the box of map and survey, {:.0f} % unknown (cells of {:.2g} "
+        "m)\n",
+        100.0 * known->known_share(),
+        100.0 * (1.0 - known->known_share()),
+        known->grid().cell);
+  }
+  print_places(places);
   if (flags.verify) fmt::print("  checksums   match\n");
   fmt::print("  made\n");
   for (const auto& [key, value] : metadata.items())
@@ -135,6 +199,12 @@ void add_info(CLI::App& parent) {
   app->add_option("map", flags->map, "A .pfmap")->required();
   app->add_flag("--json", flags->json, "JSON on stdout");
   app->add_option("--png", flags->png, "Draw a top and a side view");
+  app->add_option(
+         "--at",
+         flags->points,
+         "x,y,z in the world, m: how far the nearest surfel is, and whether the survey saw "
+         "that place; as often as wanted")
+      ->allow_extra_args(false);
   app->add_flag("--verify", flags->verify, "Read all of it and check checksums and structure");
   add_force_flag(*app, flags->force);
   app->callback([flags] { show_info(*flags); });

@@ -20,32 +20,29 @@ struct MapFitFlags : EditFlags {
 
 void run_fit(const MapFitFlags& flags) {
   if (!check_edit(flags)) throw InputError("map fit: a .pfmap in and a .pfmap out are wanted");
+  if (!flags.format.empty()) throw InputError("map fit: --format is for clouds");
   refuse_to_overwrite(flags.fit.ghosts_out, flags.force);
   refuse_same_file(flags.output, flags.fit.files.poses);
+  refuse_same_file(flags.output, flags.fit.files.scans);
   if (!flags.fit.ghosts_out.empty()) {
     refuse_same_file(flags.fit.ghosts_out, flags.output);
     refuse_same_file(flags.fit.ghosts_out, flags.inputs.front());
   }
   const auto map = open_sound_map(flags.inputs.front());
-  const SurveyFolder survey(flags.fit.files);
   OutputFile output(flags.output);
   auto ghosts = open_ghosts(flags.fit);
   const Executor executor(flags.threads);
   const Progress progress = interruptible_progress();
-  const auto open_survey = [&] { return survey.open(); };
+  const auto survey = open_survey(flags.fit, progress);
+  const auto rays = [&] { return survey->open(); };
   FitReport report;
-  EditedMap fitted = fit_map(*map,
-                             open_survey,
-                             fit_options(flags.fit),
-                             edit_options(flags, {}),
-                             executor,
-                             report,
-                             progress);
-  append_note(fitted, fit_note(survey, report));
+  EditedMap fitted = fit_map(
+      *map, rays, fit_options(flags.fit), edit_options(flags, {}), executor, report, progress);
+  append_note(fitted, fit_note(*survey, report));
   const auto written =
       SurfelMap::from_bytes(map_bytes(fitted.tree, fitted.description), flags.output);
   const OwnRays after =
-      measure_rays(*written, open_survey, fit_options(flags.fit).right, {}, executor, progress);
+      measure_rays(*written, rays, fit_options(flags.fit).right, {}, executor, progress);
   end_progress();
   print_fit(report, after);
   finish_map(flags, std::move(output), fitted);
@@ -58,7 +55,7 @@ void add_fit(CLI::App& parent) {
   auto* app = parent.add_subcommand(
       "fit", "Fit a map to the scans that it was made of: what their rays passed is free");
   auto flags = std::make_shared<MapFitFlags>();
-  add_input(*app, *flags);
+  app->add_option("input", flags->inputs, "A .pfmap")->required()->expected(1);
   add_fit_flags(*app, flags->fit, true);
   add_edit_flags(*app, *flags, "The .pfmap to write", true);
   app->callback([flags] { run_fit(*flags); });

@@ -73,6 +73,7 @@ void print_end(const ImportFlags& flags,
 void refuse_same_files(const ImportFlags& flags) {
   std::vector<std::string> others = flags.inputs;
   others.push_back(flags.fit.files.poses);
+  others.push_back(flags.fit.files.scans);
   for (const std::string& output : {flags.output, flags.outliers_out, flags.fit.ghosts_out}) {
     if (output.empty()) continue;
     for (const std::string& other : others) refuse_same_file(output, other);
@@ -89,7 +90,6 @@ void import_survey(const ImportFlags& flags) {
         "--scans: --scale, --shift and --up would part points from rays; use 'map "
         "transform' afterwards");
   }
-  const SurveyFolder survey(flags.fit.files);
   refuse_to_overwrite(flags.output, flags.force);
   refuse_to_overwrite(flags.outliers_out, flags.force);
   refuse_to_overwrite(flags.fit.ghosts_out, flags.force);
@@ -100,6 +100,7 @@ void import_survey(const ImportFlags& flags) {
   if (!flags.outliers_out.empty()) outliers.emplace(flags.outliers_out);
   const Executor executor(flags.threads);
   const Progress progress = interruptible_progress();
+  const auto survey = open_survey(flags.fit, progress);
   const ImportOptions options = import_options(flags);
   const auto sources = cloud_sources(flags.inputs, flags.format, options.scratch_folder, progress);
   SurveyPoints points;
@@ -111,7 +112,7 @@ void import_survey(const ImportFlags& flags) {
   }
   points.open = [&](std::size_t i) { return sources[i].open(); };
   const SurveyMap made =
-      map_survey(survey, points, options, fit_options(flags.fit), executor, progress);
+      map_survey(*survey, points, options, fit_options(flags.fit), executor, progress);
   end_progress();
   write_map(std::move(output), made.map.tree, made.map.description);
   if (outliers) {
@@ -222,7 +223,7 @@ void add_import(CLI::App& parent) {
     if (!flags->fit.files.scans.empty()) {
       import_survey(*flags);
     } else if (flags->inputs.empty()) {
-      throw InputError("map import: a cloud, or --scans with --poses is wanted");
+      throw InputError("map import: a cloud, or --scans is wanted");
     } else {
       import_map(*flags);
     }

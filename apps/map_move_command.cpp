@@ -14,7 +14,7 @@
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/core/number_text.hpp"
 #include "pointflight/io/byte_cursor.hpp"
-#include "pointflight/io/tum.hpp"
+#include "pointflight/io/pose_files.hpp"
 
 namespace pointflight::apps {
 namespace {

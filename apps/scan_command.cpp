@@ -26,6 +26,7 @@ struct ScanFlags {
   std::uint64_t seed = 1;
   std::uint64_t index = 0;
   bool no_noise = false;
+  bool mark_unknown = false;
   std::string output;
   std::string png;
   bool json = false;
@@ -42,6 +43,8 @@ void print_scan(const Scan& scan, const ScanFlags& flags) {
                ? 0.0f
                : ranges[static_cast<std::size_t>(share * static_cast<double>(ranges.size() - 1))];
   };
+  const auto unknown = std::count_if(
+      scan.points.begin(), scan.points.end(), [](const ScanPoint& p) { return p.is_unknown; });
   if (flags.json) {
     nlohmann::ordered_json json;
     json["lidar"] = flags.lidar;
@@ -52,6 +55,7 @@ void print_scan(const Scan& scan, const ScanFlags& flags) {
     json["range_min"] = at(0.0);
     json["range_median"] = at(0.5);
     json["range_max"] = at(1.0);
+    if (scan.marks_unknown) json["unknown"] = unknown;
     if (!flags.output.empty()) json["file"] = flags.output;
     print_json(json);
     return;
@@ -62,6 +66,11 @@ void print_scan(const Scan& scan, const ScanFlags& flags) {
              at(0.0),
              at(1.0),
              at(0.5));
+  if (!scan.marks_unknown) return;
+  fmt::print("{} ({:.1f} %) came through space that no survey saw\n",
+             unknown,
+             100.0 * static_cast<double>(unknown) /
+                 static_cast<double>(std::max<std::size_t>(1, scan.points.size())));
 }
 
 void take_scan(const ScanFlags& flags) {
@@ -80,6 +89,7 @@ void take_scan(const ScanFlags& flags) {
   request.index = flags.index;
   request.noise = !flags.no_noise;
   request.seed = flags.seed;
+  if (flags.mark_unknown) request.known = &known_space_of(*map);
   const Scan scan = lidar.take(request, PoseTrack(pose), *renderer, executor);
   if (scan.points.empty()) {
     log("no beam met anything: is the pose inside the map? (pointflight map info shows its "
@@ -112,7 +122,11 @@ void add_scan_command(CLI::App& parent, int& /*exit_code*/) {
   app->add_flag("--no-noise", flags->no_noise, "Exact ranges");
   app->add_option("-o,--output",
                   flags->output,
-                  "PCD of the points in the sensor frame: x y z intensity range time ring");
+                  "PCD of the points in the sensor frame: x y z intensity range time ring label");
+  app->add_flag("--mark-unknown",
+                flags->mark_unknown,
+                "Points say whether they came through space that no survey saw (field unknown, 0 "
+                "or 1); for maps made or fitted with --scans");
   app->add_option("--png", flags->png, "Picture: range over azimuth and elevation");
   app->add_flag("--json", flags->json, "JSON on stdout");
   add_force_flag(*app, flags->force);

@@ -3,29 +3,119 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <filesystem>
+#include <optional>
+#include <system_error>
 #include <utility>
 #include <vector>
 
 #include "apps/flags.hpp"
+#include "apps/modules.hpp"
 #include "apps/terminal.hpp"
+#include "pointflight/core/input_error.hpp"
+#include "pointflight/core/mapped_file.hpp"
 #include "pointflight/io/pcd_writer.hpp"
+#include "recording/mcap_reader.hpp"
+#include "recording/recorded_survey.hpp"
 
 namespace pointflight::apps {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The MCAP files of a folder, in the order of their names.
+std::vector<std::string> recordings_in(const std::string& folder) {
+  std::vector<std::string> paths;
+  std::error_code error;
+  for (fs::directory_iterator at(folder, error); !error && at != fs::directory_iterator();
+       at.increment(error)) {
+    if (at->path().extension() == ".mcap") paths.push_back(at->path().string());
+    if (at->path().extension() == ".db3") {
+      throw InputError(fmt::format(
+          "{}: is stored by SQLite, which is not read; convert it: ros2 bag convert", folder));
+    }
+  }
+  std::sort(paths.begin(), paths.end());
+  return paths;
+}
+
+RecordingOpener recording_opener(const std::string& path, const std::vector<std::string>& paths) {
+  if (path.ends_with(".bag")) {
+    require_regular_file(path);
+    return [path](const std::vector<std::string>& topics) {
+      return ros1_module().bag_messages(path, topics);
+    };
+  }
+  return [paths](const std::vector<std::string>&) { return open_mcap(paths); };
+}
+
+}  // namespace
+
+std::unique_ptr<SurveySource> open_survey(const FitFlags& flags, const Progress& progress) {
+  SurveyFiles files = flags.files;
+  std::optional<Pose> T_pose_sensor;
+  if (!flags.sensor_pose.empty()) T_pose_sensor = parse_pose(flags.sensor_pose, "--sensor-pose");
+  std::vector<std::string> recordings;
+  std::error_code ignored;
+  if (fs::is_directory(files.scans, ignored)) {
+    recordings = recordings_in(files.scans);
+  } else {
+    recordings = {files.scans};
+  }
+  if (recordings.empty()) {
+    if (files.poses.empty()) throw InputError("--scans: a folder of clouds wants --poses");
+    if (!flags.scan_topic.empty() || !flags.pose_topic.empty()) {
+      throw InputError("--scan-topic and --pose-topic are for bags and MCAP files");
+    }
+    files.T_pose_sensor = T_pose_sensor.value_or(Pose{});
+    return std::make_unique<SurveyFolder>(std::move(files));
+  }
+  const bool is_recording = files.scans.ends_with(".bag") || recordings.front().ends_with(".mcap");
+  if (!is_recording) {
+    throw InputError(
+        fmt::format("{}: is no folder of clouds and no recording (.bag, .mcap)", files.scans));
+  }
+  if (!files.free.empty()) throw InputError("--free: is for folders of scans");
+  auto survey = std::make_unique<RecordedSurvey>(recording_opener(files.scans, recordings),
+                                                 RecordedSurveyOptions{files.scans,
+                                                                       flags.scan_topic,
+                                                                       flags.pose_topic,
+                                                                       files.poses,
+                                                                       T_pose_sensor,
+                                                                       files.is_deskewed},
+                                                 progress);
+  end_progress();
+  log(survey->about());
+  return survey;
+}
+
 void add_fit_flags(CLI::App& app, FitFlags& flags, bool required) {
   auto* scans = app.add_option("--scans",
                                flags.files.scans,
                                "Folder of the scans, points in the sensor frame; with times of "
-                               "their own (field time, t, timestamp) each gets a pose of its own");
+                               "their own (field time, t, timestamp) each gets a pose of its own; "
+                               "or a recording of them (.bag, .mcap, a folder of .mcap)");
   auto* poses = app.add_option("--poses",
                                flags.files.poses,
                                "Their poses (map <- sensor): TUM (time tx ty tz qx qy qz qw "
-                               "[file]) or KITTI (12 numbers)");
+                               "[file]) or KITTI (12 numbers); without it those of a recording");
   poses->check(CLI::ExistingFile)->needs(scans);
-  scans->check(CLI::ExistingDirectory)->needs(poses);
-  if (required) {
-    scans->required();
-    poses->required();
-  }
+  scans->check(CLI::ExistingPath);
+  if (required) scans->required();
+  app.add_option("--scan-topic",
+                 flags.scan_topic,
+                 "Clouds of a recording (PointCloud2, CustomMsg); without it the only ones")
+      ->needs(scans);
+  app.add_option("--pose-topic",
+                 flags.pose_topic,
+                 "Poses of a recording (Odometry, PoseStamped); without it the only ones")
+      ->excludes(poses)
+      ->needs(scans);
+  app.add_option("--sensor-pose",
+                 flags.sensor_pose,
+                 "x,y,z,roll,pitch,yaw of the sensor in the frame that the poses are of: metres, "
+                 "degrees; without it a recording's /tf_static is asked")
+      ->needs(scans);
   app.add_option("--free",
                  flags.files.free,
                  "Folder of clouds under the scans' names: shots without a return, up to where "
@@ -69,7 +159,7 @@ FitOptions fit_options(const FitFlags& flags) {
   return options;
 }
 
-std::string fit_note(const SurveyFolder& survey, const FitReport& report) {
+std::string fit_note(const SurveySource& survey, const FitReport& report) {
   return fmt::format("fit to {} rays of {} scans", report.rays, survey.scan_count());
 }
 
@@ -91,6 +181,7 @@ void print_fit(const FitReport& report, const OwnRays& after) {
 std::optional<OutputFile> open_ghosts(const FitFlags& flags) {
   if (flags.ghosts_out.empty()) return std::nullopt;
   refuse_same_file(flags.ghosts_out, flags.files.poses);
+  refuse_same_file(flags.ghosts_out, flags.files.scans);
   return OutputFile(flags.ghosts_out);
 }
 

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <array>
+#include <deque>
 #include <set>
 
 #include "pointflight/core/input_error.hpp"
@@ -62,22 +63,27 @@ class Reading {
   Reading(RecordingInfo& info, const std::function<void(const RecordedMessage&)>& on_message)
       : info_(info), on_message_(on_message) {}
 
-  /// All whole records of `bytes`; true where the last one ends where the bytes end.
-  bool records(std::span<const std::byte> bytes, bool in_chunk) {
+  /// All whole records of `bytes`.
+  void records(std::span<const std::byte> bytes, bool in_chunk) {
     std::size_t at = 0;
-    while (bytes.size() - at >= mcap::kRecordHead) {
-      const auto opcode = static_cast<Opcode>(bytes[at]);
-      std::uint64_t length = 0;
-      std::memcpy(&length, bytes.data() + at + 1, sizeof(length));
-      if (length > bytes.size() - at - mcap::kRecordHead) return false;
-      record(opcode, bytes.subspan(at + mcap::kRecordHead, length), in_chunk);
-      at += mcap::kRecordHead + length;
-      if (in_chunk) continue;
+    while (step(bytes, at, in_chunk)) {
+    }
+  }
+
+  /// The record at `at`, which moves on; false where there is no whole one, and after the footer.
+  bool step(std::span<const std::byte> bytes, std::size_t& at, bool in_chunk) {
+    if (ended_ || bytes.size() - at < mcap::kRecordHead) return false;
+    const auto opcode = static_cast<Opcode>(bytes[at]);
+    std::uint64_t length = 0;
+    std::memcpy(&length, bytes.data() + at + 1, sizeof(length));
+    if (length > bytes.size() - at - mcap::kRecordHead) return false;
+    record(opcode, bytes.subspan(at + mcap::kRecordHead, length), in_chunk);
+    at += mcap::kRecordHead + length;
+    if (!in_chunk) {
       data_ended_ = data_ended_ || opcode == Opcode::kDataEnd;
       ended_ = opcode == Opcode::kFooter;
-      if (ended_) return true;
     }
-    return at == bytes.size();
+    return true;
   }
 
   [[nodiscard]] bool ended() const { return ended_; }
@@ -179,15 +185,15 @@ class Reading {
     const std::string how = reader.text();
     const auto packed = reader.take(reader.number<std::uint64_t>());
     if (!reader.ok() || size > kLargestChunk) return;
-    const auto bytes = unpacked(packed, how, size);
-    const auto sum = crc32_z(0, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size());
-    if (bytes.size() != size || (crc != 0 && crc != sum)) {
+    chunk_ = unpacked(packed, how, size);
+    const auto sum = crc32_z(0, reinterpret_cast<const Bytef*>(chunk_.data()), chunk_.size());
+    if (chunk_.size() != size || (crc != 0 && crc != sum)) {
       info_.complete = false;
       return;
     }
     ++info_.chunks;
     compressions_.insert(how);
-    records(bytes, true);
+    records(chunk_, true);
   }
 
   RecordingInfo& info_;
@@ -195,24 +201,88 @@ class Reading {
   std::map<std::uint16_t, std::string> schemas_;
   std::map<std::uint16_t, Channel> channels_;
   std::set<std::string> compressions_;
+  std::vector<std::byte> chunk_;  ///< The last one: messages lie in it.
   bool ended_ = false;
   bool data_ended_ = false;
 };
 
+void check_magic(std::span<const std::byte> bytes, const std::string& name) {
+  const auto magic = std::as_bytes(std::span(mcap::kMagic));
+  if (bytes.size() >= magic.size() && std::equal(magic.begin(), magic.end(), bytes.begin())) return;
+  throw InputError(fmt::format("{}: is not an MCAP file (it does not begin with its magic)", name));
+}
+
+/// Record by record; the messages of a chunk wait in a queue.
+class McapMessages : public MessageReader {
+ public:
+  explicit McapMessages(const std::string& path) : file_(path) { check_magic(file_.bytes(), path); }
+
+  [[nodiscard]] Wire wire() const override { return Wire::kCdr; }
+  [[nodiscard]] double share_read() const override {
+    return static_cast<double>(at_) / static_cast<double>(file_.bytes().size());
+  }
+  bool next(Recorded& message) override {
+    while (waiting_.empty()) {
+      if (!reading_.step(file_.bytes(), at_, false)) return false;
+    }
+    message = waiting_.front();
+    waiting_.pop_front();
+    return true;
+  }
+
+ private:
+  MappedFile file_;
+  std::size_t at_ = mcap::kMagic.size();
+  std::deque<Recorded> waiting_;
+  RecordingInfo info_;
+  std::function<void(const RecordedMessage&)> keep_ = [this](const RecordedMessage& m) {
+    waiting_.push_back({m.topic, m.type, m.time, m.data.data(), m.data.size()});
+  };
+  Reading reading_{info_, keep_};
+};
+
+/// File after file.
+class McapSeries : public MessageReader {
+ public:
+  explicit McapSeries(const std::vector<std::string>& paths) {
+    for (const std::string& path : paths) {
+      files_.push_back(std::make_unique<McapMessages>(path));  // mapped: costs nothing
+    }
+  }
+
+  [[nodiscard]] Wire wire() const override { return Wire::kCdr; }
+  [[nodiscard]] double share_read() const override {
+    if (now_ == files_.size()) return 1.0;
+    return (static_cast<double>(now_) + files_[now_]->share_read()) /
+           static_cast<double>(files_.size());
+  }
+  bool next(Recorded& message) override {
+    while (now_ < files_.size()) {
+      if (files_[now_]->next(message)) return true;
+      ++now_;
+    }
+    return false;
+  }
+
+ private:
+  std::vector<std::unique_ptr<McapMessages>> files_;
+  std::size_t now_ = 0;
+};
+
 }  // namespace
+
+std::unique_ptr<MessageReader> open_mcap(const std::vector<std::string>& paths) {
+  return std::make_unique<McapSeries>(paths);
+}
 
 RecordingInfo read_mcap_bytes(std::span<const std::byte> bytes,
                               const std::string& name,
                               const std::function<void(const RecordedMessage&)>& on_message) {
-  const auto magic = std::as_bytes(std::span(mcap::kMagic));
-  if (bytes.size() < magic.size() || !std::equal(magic.begin(), magic.end(), bytes.begin())) {
-    throw InputError(
-        fmt::format("{}: is not an MCAP file (it does not begin with its magic)", name));
-  }
+  check_magic(bytes, name);
   RecordingInfo info;
   info.format = "MCAP";
   Reading reading(info, on_message);
-  reading.records(bytes.subspan(magic.size()), false);
+  reading.records(bytes.subspan(mcap::kMagic.size()), false);
   info.complete = info.complete && reading.ended();
   reading.finish();
   return info;

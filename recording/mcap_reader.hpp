@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <memory>
 #include <span>
 #include <string>
 #include <vector>
@@ -29,6 +30,10 @@ RecordingInfo read_mcap(const std::string& path,
 RecordingInfo read_mcap_bytes(std::span<const std::byte> bytes,
                               const std::string& name,
                               const std::function<void(const RecordedMessage&)>& on_message = {});
+
+/// The same messages one after the other, of several files as one: rosbag2 splits what is long.
+/// Throws InputError where one is no MCAP file.
+std::unique_ptr<MessageReader> open_mcap(const std::vector<std::string>& paths);
 
 /// The data of an attachment of a file. Throws InputError where there is none of this name.
 std::string read_mcap_attachment(const std::string& path, const std::string& attachment);

@@ -1,6 +1,8 @@
 #include "ros1/bag.hpp"
 
+#include <ros/serialization.h>
 #include <rosbag/bag.h>
+#include <rosbag/query.h>
 #include <rosbag/view.h>
 
 #include <cstdio>
@@ -105,14 +107,79 @@ class BagWriter : public Outlet {
   std::vector<boost::shared_ptr<ros::M_string>> headers_;
 };
 
+/// Runs `read`; rosbag's exceptions become words for the user.
+template <class Read>
+auto in_words(const std::string& path, const Read& read) {
+  try {
+    return read();
+  } catch (const rosbag::BagUnindexedException&) {
+    throw std::runtime_error(path + ": was cut short and has no index; run: rosbag reindex " +
+                             path);
+  } catch (const rosbag::BagException& error) {
+    throw std::runtime_error(path + ": is not a readable bag: " + error.what());
+  }
+}
+
+/// Messages by their times.
+class BagMessages : public MessageReader {
+ public:
+  BagMessages(const std::string& path, const std::vector<std::string>& topics)
+      : path_(path), bag_(path, rosbag::bagmode::Read) {
+    if (topics.empty()) {
+      view_.addQuery(bag_);
+    } else {
+      view_.addQuery(bag_, rosbag::TopicQuery(topics));
+    }
+    at_ = view_.begin();
+    count_ = view_.size();
+  }
+
+  Wire wire() const override { return Wire::kRos1; }
+  double share_read() const override {
+    return count_ == 0 ? 1.0 : static_cast<double>(read_) / static_cast<double>(count_);
+  }
+  bool next(Recorded& message) override {
+    return in_words(path_, [&] {
+      if (read_ == count_) return false;
+      if (read_ > 0) ++at_;
+      ++read_;
+      const rosbag::MessageInstance& found = *at_;
+      bytes_.resize(found.size());
+      ros::serialization::OStream stream(reinterpret_cast<std::uint8_t*>(bytes_.data()),
+                                         static_cast<std::uint32_t>(bytes_.size()));
+      found.write(stream);
+      message.topic = found.getTopic();
+      message.type = found.getDataType();
+      message.time = static_cast<std::int64_t>(found.getTime().toNSec());
+      message.data = bytes_.data();
+      message.size = bytes_.size();
+      return true;
+    });
+  }
+
+ private:
+  std::string path_;
+  rosbag::Bag bag_;
+  rosbag::View view_;
+  rosbag::View::iterator at_;
+  std::size_t count_ = 0;
+  std::size_t read_ = 0;
+  std::vector<std::byte> bytes_;
+};
+
 }  // namespace
+
+std::unique_ptr<MessageReader> read_bag_messages(const std::string& path,
+                                                 const std::vector<std::string>& topics) {
+  return in_words(path, [&] { return std::make_unique<BagMessages>(path, topics); });
+}
 
 std::unique_ptr<Outlet> make_bag_writer(const std::string& path, const std::string& compression) {
   return std::make_unique<BagWriter>(path, compression);
 }
 
 RecordingInfo read_bag(const std::string& path) {
-  try {
+  return in_words(path, [&] {
     const rosbag::Bag bag(path, rosbag::bagmode::Read);
     rosbag::View view(bag);
     RecordingInfo info;
@@ -132,12 +199,7 @@ RecordingInfo read_bag(const std::string& path) {
       info.end = static_cast<std::int64_t>(view.getEndTime().toNSec());
     }
     return info;
-  } catch (const rosbag::BagUnindexedException&) {
-    throw std::runtime_error(path + ": was cut short and has no index; run: rosbag reindex " +
-                             path);
-  } catch (const rosbag::BagException& error) {
-    throw std::runtime_error(path + ": is not a readable bag: " + error.what());
-  }
+  });
 }
 
 }  // namespace pointflight

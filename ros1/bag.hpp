@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "ros_common/wire.hpp"
 
@@ -13,5 +14,9 @@ std::unique_ptr<Outlet> make_bag_writer(const std::string& path, const std::stri
 
 /// What is in a bag. Throws std::runtime_error with words for the user.
 RecordingInfo read_bag(const std::string& path);
+
+/// Its messages of these topics by their times, of all without any. Throws as above, also later.
+std::unique_ptr<MessageReader> read_bag_messages(const std::string& path,
+                                                 const std::vector<std::string>& topics);
 
 }  // namespace pointflight

@@ -3,8 +3,10 @@
 
 namespace {
 
-const pointflight::Ros1Module kModule = {
-    pointflight::make_ros1_transport, pointflight::make_bag_writer, pointflight::read_bag};
+const pointflight::Ros1Module kModule = {pointflight::make_ros1_transport,
+                                         pointflight::make_bag_writer,
+                                         pointflight::read_bag,
+                                         pointflight::read_bag_messages};
 
 }  // namespace
 

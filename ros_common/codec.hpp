@@ -238,9 +238,9 @@ std::vector<std::byte> encode(const M& message) {
 }
 
 /// The message that the bytes stand for; nothing where they are malformed or left over (CDR allows
-/// three of padding).
+/// three of padding). `is_head`: any number may follow, for a message's header by itself.
 template <Wire W, class M>
-std::optional<M> decode(std::span<const std::byte> bytes) {
+std::optional<M> decode(std::span<const std::byte> bytes, bool is_head = false) {
   bool big_endian = false;
   std::size_t spare = 0;
   if constexpr (W == Wire::kCdr) {
@@ -254,7 +254,7 @@ std::optional<M> decode(std::span<const std::byte> bytes) {
   M message;
   WireReader<W> reader(bytes, big_endian);
   reader.read(message);
-  if (!reader.ok() || reader.left() > spare) return std::nullopt;
+  if (!reader.ok() || (!is_head && reader.left() > spare)) return std::nullopt;
   return message;
 }
 

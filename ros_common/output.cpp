@@ -72,6 +72,20 @@ std::vector<std::size_t> lidars_for(const RosOutput& output,
   return all;
 }
 
+/// Throws where a stream is to say what its points do not know.
+void check_marks(const OutputStream& stream) {
+  const std::string& layout = stream.settings.layout;
+  if (layout.empty() || layout == kLivoxCustom) return;
+  if (!point_layout(layout).has(PointLayout::Source::kUnknown)) return;
+  const VehicleSetup& setup = stream.ros.run.vehicles[stream.vehicle].setup;
+  if (stream.type.per == Per::kLidar && setup.lidars[stream.lidar].mark_unknown) return;
+  throw InputError(
+      fmt::format("{}: {} is to have the layout {}, which wants a LiDAR with mark_unknown: true",
+                  stream.ros.profile.path,
+                  stream.settings.topic,
+                  layout));
+}
+
 }  // namespace
 
 RosNames RosRun::names(std::size_t vehicle, std::size_t lidar) const {
@@ -121,6 +135,7 @@ OutputStream::OutputStream(RosRun& run,
   s.topic = absolute(with_names(s.topic, ros.names(vehicle, lidar)));
   if (s.layout.empty()) s.layout = type.layout;
   topic = {s.topic, type.make.type(), type.latched, type.depth, type.large};
+  check_marks(*this);
   if (s.layout == kLivoxCustom) {
     topic.type = message_type<msg::CustomMsg>();
     topic.type.package = ros.profile.livox_package;

@@ -67,6 +67,19 @@ constexpr Field kXyzit[] = {kX,
                             {"intensity", 12, Type::kFloat32, Source::kIntensity},
                             {"t", 16, Type::kUint32, Source::kNanosAfter},
                             {"ring", 20, Type::kUint16, Source::kRing}};
+// what a planner wants to know of a simulated point and no driver says
+constexpr Field kXyzitUnknown[] = {kX,
+                                   kY,
+                                   kZ,
+                                   {"intensity", 12, Type::kFloat32, Source::kIntensity},
+                                   {"t", 16, Type::kUint32, Source::kNanosAfter},
+                                   {"ring", 20, Type::kUint16, Source::kRing},
+                                   {"unknown", 22, Type::kUint8, Source::kUnknown}};
+constexpr Field kXyziUnknown[] = {kX,
+                                  kY,
+                                  kZ,
+                                  {"intensity", 12, Type::kFloat32, Source::kIntensity},
+                                  {"unknown", 16, Type::kUint8, Source::kUnknown}};
 constexpr Field kXyz[] = {kX, kY, kZ};
 // FAST_LIO_ROS2 (Ericsii), lidar_type 4
 constexpr Field kReflectivity[] = {kX,
@@ -87,6 +100,8 @@ constexpr PointLayout kLayouts[] = {
     {"xyzi_padded", "the same as PCL's PointXYZI (MARSIM)", 32, kXyziPadded, false},
     {"xyz", "x, y, z", 12, kXyz, false},
     {"xyz_padded", "the same as PCL's PointXYZ (maps of MARSIM)", 16, kXyz, false},
+    {"xyzit_unknown", "xyzit and 1 where no survey saw what lies before", 23, kXyzitUnknown, true},
+    {"xyzi_unknown", "xyzi and the same", 17, kXyziUnknown, false},
     {"reflectivity", "x, y, z, reflectivity, tag, line (FAST_LIO_ROS2)", 18, kReflectivity, false},
 };
 
@@ -96,6 +111,7 @@ struct Values {
   float intensity = 0.0f;
   std::uint16_t ring = 0;
   float range = 0.0f;
+  bool is_unknown = false;
   Duration after{0};          ///< After the stamp.
   std::int64_t absolute = 0;  ///< ns since the epoch.
 };
@@ -151,6 +167,8 @@ double number_for(Source source, const Values& v) {
       return static_cast<double>(v.absolute) * 1e-9;
     case Source::kRangeMillimetres:
       return 1e3 * static_cast<double>(v.range);
+    case Source::kUnknown:
+      return v.is_unknown ? 1.0 : 0.0;
     case Source::kZero:
       return 0.0;
   }
@@ -226,6 +244,7 @@ msg::PointCloud2 cloud_of(const Scan& scan,
     values.intensity = point.intensity == 0.0f ? plain : point.intensity;
     values.ring = point.ring;
     values.range = point.range;
+    values.is_unknown = point.is_unknown;
     const SimTime fired = scan.start + point.time_offset;
     values.after = fired - time;
     values.absolute = (fired.time_since_epoch() + epoch).count();

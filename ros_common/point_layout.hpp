@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <span>
 #include <string>
 #include <vector>
@@ -27,6 +28,7 @@ struct PointLayout {
     kAbsoluteNanos,  ///< Since the epoch.
     kAbsoluteSeconds,
     kRangeMillimetres,
+    kUnknown,  ///< 1: came through space no survey saw; wants a LiDAR with `mark_unknown`.
     kZero,
   };
   /// One value of a point.
@@ -41,6 +43,12 @@ struct PointLayout {
   std::uint32_t step;             ///< Bytes per point.
   std::span<const Field> fields;  ///< By rising offset; bytes between them are 0.
   bool timed;                     ///< Points have times: stamped with the first one.
+
+  /// True if one of its fields holds that.
+  [[nodiscard]] bool has(Source source) const {
+    return std::any_of(
+        fields.begin(), fields.end(), [&](const Field& f) { return f.source == source; });
+  }
 };
 
 /// In profiles: not a PointCloud2 but Livox' own message.

@@ -178,6 +178,29 @@ struct RecordingInfo {
   bool complete = true;                 ///< False: cut short, what is counted is what can be read.
 };
 
+/// A message of a recording, as it lies there.
+struct Recorded {
+  /// "/quad_0/imu" and "sensor_msgs/msg/Imu" (ROS 1: "sensor_msgs/Imu").
+  ///@{
+  std::string topic, type;
+  ///@}
+  std::int64_t time = 0;            ///< ns since the Unix epoch, when it was recorded.
+  const std::byte* data = nullptr;  ///< Valid until the next one is read.
+  std::size_t size = 0;             ///< Bytes.
+};
+
+/// Reads a recording front to back.
+class MessageReader {
+ public:
+  virtual ~MessageReader() = default;
+  /// How its messages became bytes.
+  virtual Wire wire() const = 0;
+  /// The next message; false where there are none left.
+  virtual bool next(Recorded& message) = 0;
+  /// Share of the recording that was read, 0 to 1.
+  virtual double share_read() const = 0;
+};
+
 /// What the ROS 1 module gives; errors are std::runtime_error with words for the user.
 struct Ros1Module {
   /// Joins ROS 1; its master may come later.
@@ -186,6 +209,9 @@ struct Ros1Module {
   std::unique_ptr<Outlet> (*bag_writer)(const std::string& path, const std::string& compression);
   /// Errors as above; counts without decoding.
   RecordingInfo (*read_bag)(const std::string& path);
+  /// The messages of these topics in the order of their times, of all without any; errors as above.
+  std::unique_ptr<MessageReader> (*bag_messages)(const std::string& path,
+                                                 const std::vector<std::string>& topics);
 };
 
 /// What the ROS 2 module gives.

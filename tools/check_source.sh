@@ -25,7 +25,7 @@ allowed() {
     ros_common) echo "core geometry io map render lidar vehicle world sim run ros_common" ;;
     ros1) echo "ros_common ros1" ;;
     ros2) echo "core ros_common ros2" ;;
-    recording) echo "core ros_common recording" ;;
+    recording) echo "core geometry io fit ros_common recording" ;;
   esac
 }
 for folder in core geometry io map render lidar vehicle world fit fidelity sim run ros_common recording ros1 ros2; do

@@ -11,7 +11,7 @@
 
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/io/cloud_reader.hpp"
-#include "pointflight/io/tum.hpp"
+#include "pointflight/io/pose_files.hpp"
 
 namespace pointflight {
 namespace {

@@ -15,7 +15,7 @@
 #include "pointflight/geometry/morton.hpp"
 #include "pointflight/geometry/rotation.hpp"
 #include "pointflight/io/pcd_writer.hpp"
-#include "pointflight/io/tum.hpp"
+#include "pointflight/io/pose_files.hpp"
 #include "pointflight/lidar/lidar.hpp"
 
 namespace pointflight {

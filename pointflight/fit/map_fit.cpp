@@ -8,12 +8,14 @@
 #include <cmath>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <utility>
 
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/math.hpp"
 #include "pointflight/fit/surfel_evidence.hpp"
+#include "pointflight/map/known_space.hpp"
 #include "pointflight/map/map_file.hpp"
 #include "pointflight/map/surfel_gathering.hpp"
 #include "pointflight/render/direction_order.hpp"
@@ -256,9 +258,30 @@ std::optional<std::array<double, 3>> factors_of(const SurfelEvidence& evidence,
   return factors;
 }
 
+/// Reads a survey and keeps where its rays began.
+class OriginKeeper : public SurveyReader {
+ public:
+  OriginKeeper(std::unique_ptr<SurveyReader> survey, Aabb& origins)
+      : survey_(std::move(survey)), origins_(origins) {}
+
+  bool read(std::vector<SurveyRay>& batch) override {
+    const bool more = survey_->read(batch);
+    for (const SurveyRay& ray : batch) origins_.add(ray.origin_world);
+    return more;
+  }
+  [[nodiscard]] bool has_intensity() const override { return survey_->has_intensity(); }
+  [[nodiscard]] double share_read() const override { return survey_->share_read(); }
+
+ private:
+  std::unique_ptr<SurveyReader> survey_;
+  Aabb& origins_;
+};
+
 EditedMap correct_by_blame(const SurfelMap& map,
                            const SurveyOpener& survey,
                            const FitOptions& fit,
+                           KnownSpaceBuilder* known,
+                           OwnRays& before,
                            const EditOptions& options,
                            const Executor& executor,
                            FitReport& report,
@@ -269,6 +292,10 @@ EditedMap correct_by_blame(const SurfelMap& map,
   const auto right = static_cast<float>(fit.right);
   const float window = kernel_map_of(map).window;
   const auto visit = [&](const SurveyRay& ray, const RayMeetings& way) {
+    if (known != nullptr) {
+      known->cross(
+          ray.origin_world, ray.direction_world.cast<double>(), static_cast<double>(ray.range));
+    }
     const Fate fate = fate_of(ray, way.range, right);
     fates.add(ray, fate);
     if (fate == Fate::kFree) return;
@@ -286,7 +313,7 @@ EditedMap correct_by_blame(const SurfelMap& map,
   };
   report.overflows += follow_survey(
       map, survey, fit.right, executor, "fitting sizes to rendered rays", progress, visit);
-  report.between = fates.rays();
+  before = fates.rays();
   const auto change = [&](const LeafHeader&, std::size_t at) -> std::optional<SurfelWord> {
     const auto factors = factors_of(evidence, at, fit);
     if (factors) return resized(map.words()[at], *factors);
@@ -306,12 +333,28 @@ EditedMap fit_map(const SurfelMap& map,
                   FitReport& report,
                   const Progress& progress) {
   report = {};
-  EditedMap first = shrink_by_passes(map, survey, fit, options, executor, report, progress);
-  const auto between =
-      SurfelMap::from_bytes(map_bytes(first.tree, first.description), "the map half fitted");
-  first = {};  // room for the second
-  EditedMap fitted = correct_by_blame(*between, survey, fit, options, executor, report, progress);
+  Aabb box = map.bounds_world();
+  const SurveyOpener kept = [&] { return std::make_unique<OriginKeeper>(survey(), box); };
+  EditedMap fitted = shrink_by_passes(map, kept, fit, options, executor, report, progress);
+  std::optional<KnownSpaceBuilder> known;
+  if (fit.known_space) known.emplace(box, map.resolution(), fitted.surfels);
+  for (int pass = 0; pass < fit.blame_passes; ++pass) {
+    const auto before =
+        SurfelMap::from_bytes(map_bytes(fitted.tree, fitted.description), "the map half fitted");
+    fitted = {};  // room for the next
+    OwnRays rays;
+    KnownSpaceBuilder* marks = known && pass == 0 ? &*known : nullptr;
+    fitted =
+        correct_by_blame(*before, survey, fit, marks, rays, options, executor, report, progress);
+    if (pass == 0) report.between = rays;
+  }
   fitted.surfels_before = map.surfel_count();
+  if (known) {
+    if (const KnownSpace* old = map.known_space()) {
+      known->add([&](const Vector3d& center) { return old->known(center); });
+    }
+    set_section(fitted.description, KnownSpace::kSection, known->section());
+  }
   return fitted;
 }
 

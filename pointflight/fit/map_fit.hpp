@@ -27,6 +27,8 @@ struct FitOptions {
   double ghost_passes = 12.0;  ///< As full weights.
   /// Pass 2: a surfel with three early rays or more that make up this share of its weight goes.
   double blame_share = 0.9;
+  int blame_passes = 2;  ///< How often pass 2 is made; each sees what the one before has changed.
+  bool known_space = true;  ///< Write down which space the rays crossed.
 };
 
 /// How a survey's rays fare in a map.
@@ -57,14 +59,15 @@ struct FitReport {
   std::uint64_t overflows = 0;
 };
 
-/// Two passes over the rays, in memory that depends on the map alone: some 90 bytes per surfel.
+/// Passes over the rays, in memory that depends on the map alone: some 90 bytes per surfel.
 ///
 /// Pass 1 sums for each surfel the weights (of the hit rule) of rays that passed it, ending `right`
 /// behind it or farther, and of those that ended at it, and makes it smaller by their share. Pass 2
 /// renders the rays and sums for each surfel that had a part in it dw / d(ln s_k), of rays rendered
 /// early, right, and late or not at all: ln s_k changes by -step (E - L) / (E + L + C + doubt) with
-/// the leaks L weighed. Planar surfels stay planar. All sums are of whole numbers: the same bytes
-/// for any number of threads and any order of the rays.
+/// the leaks L weighed. Planar surfels stay planar. Pass 2 also marks the space that rays crossed,
+/// in the box of the surfels and the sensor's places, beside what the map knew. All sums are of
+/// whole numbers: the same bytes for any number of threads and any order of the rays.
 EditedMap fit_map(const SurfelMap& map,
                   const SurveyOpener& survey,
                   const FitOptions& fit,

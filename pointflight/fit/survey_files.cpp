@@ -15,75 +15,14 @@
 #include "pointflight/core/mapped_file.hpp"
 #include "pointflight/io/byte_cursor.hpp"
 #include "pointflight/io/cloud_reader.hpp"
-#include "pointflight/io/tum.hpp"
 
 namespace pointflight {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kNearest = 0.01;     // m: the sensor itself
-constexpr double kFarthest = 1e6;     // m: no sensor sees so far
-constexpr double kWorld = 1e9;        // m
-constexpr double kLatest = 4.5e9;     // s, the year 2112: differences stay within SimTime
-constexpr double kOffsetsEnd = 1000;  // s: larger times of points are no offsets
-
-SimTime time_of(double seconds, const std::string& place) {
-  if (!(std::abs(seconds) < kLatest)) {
-    throw InputError(fmt::format("{}: {} is no time in seconds", place, seconds));
-  }
-  return SimTime(from_seconds(seconds));
-}
-
-bool is_kitti(const std::string& path) {
-  const MappedFile file(path);
-  LineCursor lines(as_text(file.bytes()));
-  std::string_view line;
-  while (lines.next(line)) {
-    std::size_t words = 0;
-    for (auto word = take_word(line); !word.empty(); word = take_word(line)) {
-      if (words == 0 && word.front() == '#') break;
-      ++words;
-    }
-    if (words > 0) return words == 12;
-  }
-  return false;
-}
-
-/// Rows of R | t, of scans one second apart, for the file has no times.
-std::vector<TimedPose> read_kitti(const std::string& path) {
-  const MappedFile file(path);
-  LineCursor lines(as_text(file.bytes()));
-  std::vector<TimedPose> poses;
-  std::string_view line;
-  while (lines.next(line)) {
-    std::string_view word = take_word(line);
-    if (word.empty() || word.front() == '#') continue;
-    std::array<double, 12> v{};
-    for (double& value : v) {
-      if (!parse_number(word, value) || !std::isfinite(value)) {
-        throw InputError(fmt::format("{}:{}: '{}' is no number; twelve are wanted (KITTI)",
-                                     path,
-                                     lines.number(),
-                                     excerpt(word)));
-      }
-      word = take_word(line);
-    }
-    Matrix3d rotation;
-    rotation << v[0], v[1], v[2], v[4], v[5], v[6], v[8], v[9], v[10];
-    if (!((rotation * rotation.transpose() - Matrix3d::Identity()).norm() <= 0.01) ||
-        !(rotation.determinant() > 0.0)) {
-      throw InputError(
-          fmt::format("{}:{}: the first three columns are no rotation", path, lines.number()));
-    }
-    TimedPose pose;
-    pose.time = SimTime(std::chrono::seconds(poses.size()));
-    pose.pose = {Quaterniond(rotation).normalized(), {v[3], v[7], v[11]}};
-    poses.push_back(pose);
-  }
-  if (poses.empty()) throw InputError(fmt::format("{}: no poses", path));
-  return poses;
-}
+constexpr double kNearest = 0.01;  // m: the sensor itself
+constexpr double kFarthest = 1e6;  // m: no sensor sees so far
 
 /// By the numbers that the names are, where all are; else as text.
 void sort_names(std::vector<std::string>& names) {
@@ -180,53 +119,35 @@ class SurveyFolderReader : public SurveyReader {
     cloud_ = nullptr;
     if (next_ == scans_.size()) return;
     ++next_;
-    cloud_ = open_cloud((fs::path(files.scans) / scan().file).string());
+    cloud_ = open_cloud(path());
     has_intensity_ = cloud_->has_intensity();
   }
 
   [[nodiscard]] const SurveyFolder::Scan& scan() const { return folder_.scans_[scans_[next_ - 1]]; }
-
-  /// Of a point with a time of its own: an offset from the scan's, or a time of the trajectory.
-  [[nodiscard]] SimTime time_of_point(SimTime start, double time) const {
-    const bool is_offset = std::abs(time) < kOffsetsEnd;
-    const auto& poses = folder_.poses_;
-    const double at = is_offset ? to_seconds(start) + time : time;
-    const Duration last =
-        poses.size() < 2 ? Duration(0) : poses.back().time - poses[poses.size() - 2].time;
-    const double slack = std::max(1.0, to_seconds(last));
-    if (!(at >= to_seconds(poses.front().time) - slack &&
-          at <= to_seconds(poses.back().time) + slack)) {
-      throw InputError(fmt::format(
-          "{}: a point's time, {} s, is not within the poses of {} ({} to {} s); --deskewed leaves "
-          "times of points aside",
-          (fs::path(folder_.files_.scans) / scan().file).string(),
-          time,
-          folder_.files_.poses,
-          to_seconds(poses.front().time),
-          to_seconds(poses.back().time)));
-    }
-    return is_offset ? start + from_seconds(time) : SimTime(from_seconds(time));
+  [[nodiscard]] std::string path() const {
+    return (fs::path(folder_.files_.scans) / scan().file).string();
   }
 
   void add_points(std::vector<SurveyRay>& batch) {
     const SimTime start = scan().time;
     const std::span<const double> times = cloud_->times();
     const bool has_times = !times.empty() && !folder_.files_.is_deskewed;
-    if (has_times && !folder_.poses_have_times_) {
+    if (has_times && !folder_.trajectory_.has_times) {
       throw InputError(
           fmt::format("{}: its points have times and the poses of {} have none; give a "
                       "TUM trajectory, or --deskewed where motion was taken out",
-                      (fs::path(folder_.files_.scans) / scan().file).string(),
+                      path(),
                       folder_.files_.poses));
     }
-    const Pose at_start = pose_on(folder_.poses_, start);
+    const std::vector<TimedPose>& poses = folder_.trajectory_.poses;
+    const Pose at_start = pose_on(poses, start);
     for (std::size_t i = 0; i < points_.size(); ++i) {
       const Vector3d& p = points_[i].position;
       const double range = p.norm();
       if (!(range >= kNearest && range < kFarthest)) continue;
       Pose pose = at_start;
       if (has_times && std::isfinite(times[i])) {
-        pose = pose_on(folder_.poses_, time_of_point(start, times[i]));
+        pose = pose_on(poses, time_of_point(poses, start, times[i], path()));
       }
       batch.push_back(survey_ray(pose, p, is_return_));
       batch.back().intensity = points_[i].intensity;
@@ -242,41 +163,18 @@ class SurveyFolderReader : public SurveyReader {
   std::vector<CloudPoint> points_;
 };
 
-SurveyFolder::SurveyFolder(SurveyFiles files) : files_(std::move(files)) {
-  std::vector<std::string> named;
-  if (is_kitti(files_.poses)) {
-    poses_ = read_kitti(files_.poses);
-    poses_have_times_ = false;
-  } else {
-    for (const TumPose& pose : read_tum(files_.poses)) {
-      poses_.push_back({time_of(pose.time, files_.poses), pose.T_world_sensor});
-      if (!pose.file.empty()) named.push_back(pose.file);
-    }
-  }
-  for (std::size_t i = 0; i < poses_.size(); ++i) {
-    if (poses_[i].pose.translation.cwiseAbs().maxCoeff() < kWorld) continue;
-    throw InputError(fmt::format("{}: pose {} is not in this world", files_.poses, i + 1));
-  }
-  for (std::size_t i = 1; i < poses_.size(); ++i) {
-    if (poses_[i].time > poses_[i - 1].time) continue;
-    throw InputError(
-        fmt::format("{}: pose {} is not later than the one before it", files_.poses, i + 1));
-  }
-  if (!named.empty() && named.size() != poses_.size()) {
-    throw InputError(fmt::format("{}: {} of {} poses name their scan; all or none may",
-                                 files_.poses,
-                                 named.size(),
-                                 poses_.size()));
-  }
-  match_scans(named);
+SurveyFolder::SurveyFolder(SurveyFiles files)
+    : files_(std::move(files)), trajectory_(read_survey_poses(files_.poses, files_.T_pose_sensor)) {
+  match_scans();
 }
 
-void SurveyFolder::match_scans(const std::vector<std::string>& named) {
+void SurveyFolder::match_scans() {
+  const std::vector<TimedPose>& poses = trajectory_.poses;
   const std::vector<std::string> names =
-      named.empty() ? clouds_of(files_.scans, files_.poses) : named;
+      trajectory_.files.empty() ? clouds_of(files_.scans, files_.poses) : trajectory_.files;
   check_free(files_, names);
-  if (names.size() == poses_.size()) {
-    for (std::size_t i = 0; i < names.size(); ++i) scans_.push_back({names[i], poses_[i].time});
+  if (names.size() == poses.size()) {
+    for (std::size_t i = 0; i < names.size(); ++i) scans_.push_back({names[i], poses[i].time});
     return;
   }
   constexpr double kSecondsEnd = 1e11;
@@ -288,19 +186,19 @@ void SurveyFolder::match_scans(const std::vector<std::string>& named) {
           "{}: {} poses for {} scans in {}; name the scan of each pose in a ninth column, or name "
           "the scans by their times",
           files_.poses,
-          poses_.size(),
+          poses.size(),
           names.size(),
           files_.scans));
     }
     if (time > kSecondsEnd) time *= 1e-9;
     const std::string path = (fs::path(files_.scans) / name).string();
     const SimTime at = time_of(time, path);
-    if (at < poses_.front().time || at > poses_.back().time) {
+    if (at < poses.front().time || at > poses.back().time) {
       throw InputError(fmt::format("{}: its time is not within the poses of {} ({} to {} s)",
                                    path,
                                    files_.poses,
-                                   to_seconds(poses_.front().time),
-                                   to_seconds(poses_.back().time)));
+                                   to_seconds(poses.front().time),
+                                   to_seconds(poses.back().time)));
     }
     scans_.push_back({name, at});
   }

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "pointflight/fit/survey_poses.hpp"
 #include "pointflight/fit/survey_rays.hpp"
 
 namespace pointflight {
@@ -21,25 +22,22 @@ struct SurveyFiles {
   std::string free;
   /// Times of points are left aside: motion within a scan was taken out of it.
   bool is_deskewed = false;
+  Pose T_pose_sensor = {};  ///< Where the sensor is in the frame that the poses are of.
 };
 
-/// A survey on disk. Which pose is which scan's: by the file's ninth column; else as many poses as
-/// there are clouds in the folder, in the order of their names (numbers by size); else the names of
-/// the clouds are their times (s or ns) and the poses a trajectory. Points with times of their own
-/// get poses between: offsets from the scan's time, or, where they are large, times of the
+/// A survey in a folder. Which pose is which scan's: by the file's ninth column; else as many poses
+/// as there are clouds in the folder, in the order of their names (numbers by size); else the names
+/// of the clouds are their times (s or ns) and the poses a trajectory. Points with times of their
+/// own get poses between: offsets from the scan's time, or, where they are large, times of the
 /// trajectory.
-class SurveyFolder {
+class SurveyFolder : public SurveySource {
  public:
   /// Reads the poses. Throws InputError.
   explicit SurveyFolder(SurveyFiles files);
 
-  /// Scans in it.
-  [[nodiscard]] std::size_t scan_count() const { return scans_.size(); }
-
-  /// Reads the scans that `chosen` accepts by their number, all without it. Callable as often as
-  /// wanted; the folder must outlive the reader.
+  [[nodiscard]] std::size_t scan_count() const override { return scans_.size(); }
   [[nodiscard]] std::unique_ptr<SurveyReader> open(
-      const std::function<bool(std::size_t scan)>& chosen = {}) const;
+      const std::function<bool(std::size_t scan)>& chosen = {}) const override;
 
  private:
   friend class SurveyFolderReader;
@@ -48,11 +46,10 @@ class SurveyFolder {
     SimTime time;      ///< By the poses' clock.
   };
 
-  void match_scans(const std::vector<std::string>& named);
+  void match_scans();
 
   SurveyFiles files_;
-  std::vector<TimedPose> poses_;
-  bool poses_have_times_ = true;
+  SurveyPoses trajectory_;
   std::vector<Scan> scans_;
 };
 

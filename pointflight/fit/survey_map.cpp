@@ -94,6 +94,9 @@ std::vector<TriedResolution> try_resolutions(const ScanOpener& survey,
   };
   ImportOptions chosen = options;
   chosen.quality = TreeQuality::kNormal;  // of use for minutes
+  FitOptions quick = fit;
+  quick.known_space = false;
+  quick.blame_passes = 1;  // a second one would take half as long again
   std::vector<TriedResolution> tried;
   const auto try_one = [&](const std::optional<double>& resolution) {
     chosen.resolution = resolution;
@@ -101,7 +104,7 @@ std::vector<TriedResolution> try_resolutions(const ScanOpener& survey,
     FitReport report;
     const EditedMap fitted = fit_map(*opened(imported.tree, imported.description),
                                      learnt,
-                                     fit,
+                                     quick,
                                      edit_options_of(chosen),
                                      executor,
                                      report,
@@ -134,7 +137,7 @@ double best_resolution(const std::vector<TriedResolution>& tried) {
       ->resolution;
 }
 
-SurveyMap map_survey(const SurveyFolder& survey,
+SurveyMap map_survey(const SurveySource& survey,
                      const SurveyPoints& points,
                      const ImportOptions& options,
                      const FitOptions& fit,

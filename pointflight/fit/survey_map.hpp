@@ -55,7 +55,7 @@ double best_resolution(const std::vector<TriedResolution>& tried);
 
 /// Makes the map of a survey. Without a resolution in
 /// `options` the best one is found.
-SurveyMap map_survey(const SurveyFolder& survey,
+SurveyMap map_survey(const SurveySource& survey,
                      const SurveyPoints& points,
                      const ImportOptions& options,
                      const FitOptions& fit,

@@ -1,6 +1,7 @@
 // A survey as rays: each says that the space up to its return is free.
 #pragma once
 
+#include <cstddef>
 #include <functional>
 #include <memory>
 #include <span>
@@ -48,6 +49,18 @@ class SurveyReader {
 
 /// Opens a survey at its beginning, as often as it takes.
 using SurveyOpener = std::function<std::unique_ptr<SurveyReader>()>;
+
+/// A survey as scans that can be read as often as wanted.
+class SurveySource {
+ public:
+  virtual ~SurveySource() = default;
+  /// Scans in it.
+  [[nodiscard]] virtual std::size_t scan_count() const = 0;
+  /// Reads the scans that `chosen` accepts by their number, all without it. The survey must outlive
+  /// the reader. Throws InputError.
+  [[nodiscard]] virtual std::unique_ptr<SurveyReader> open(
+      const std::function<bool(std::size_t scan)>& chosen = {}) const = 0;
+};
 
 /// The returns of a survey as a cloud in the world.
 std::unique_ptr<CloudReader> cloud_of(std::unique_ptr<SurveyReader> survey);

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/random.hpp"
-#include "pointflight/render/direction_order.hpp"
 
 namespace pointflight {
 namespace {
@@ -23,12 +23,32 @@ float measured(float range,
   return sigma > 0.0 ? static_cast<float>(r + sigma * random.normal(index)) : range;
 }
 
+/// By the true range: noise takes no point into a wall.
+void mark_unknown(const KnownSpace& known,
+                  std::span<const Ray> rays,
+                  std::span<const Hit> hits,
+                  Scan& scan,
+                  const Executor& executor) {
+  scan.marks_unknown = true;
+  executor.parallel_for(scan.points.size(), kChunk, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      ScanPoint& point = scan.points[i];
+      const Ray& ray = rays[point.beam];
+      point.is_unknown = !known.is_seen_through(ray.origin_world,
+                                                ray.direction_world.cast<double>(),
+                                                static_cast<double>(hits[point.beam].range));
+    }
+  });
+}
+
 }  // namespace
 
-Lidar::Lidar(const LidarSettings& settings, std::uint32_t sensor)
+Lidar::Lidar(const LidarSettings& settings,
+             std::uint32_t sensor,
+             std::shared_ptr<const ScanBeams> beams)
     : settings_(settings),
       sensor_(sensor),
-      pattern_(make_pattern(settings)),
+      beams_(beams ? std::move(beams) : std::make_shared<const ScanBeams>(settings)),
       measures_depth_(settings.pattern == ScanPattern::kGrid &&
                       settings.grid.projection == GridProjection::kPinhole) {}
 
@@ -58,24 +78,6 @@ SimTime Lidar::middle_of(SimTime start, std::span<const Beam> beams, bool snapsh
 
 Duration Lidar::period() const {
   return from_seconds(1.0 / settings_.rate);
-}
-
-std::shared_ptr<const Lidar::OrderedBeams> Lidar::ordered_beams(std::uint64_t scan_index,
-                                                                const Executor& executor) const {
-  {
-    const std::lock_guard lock(kept_->mutex);
-    if (kept_->beams) return kept_->beams;
-  }
-  auto made = std::make_shared<OrderedBeams>();
-  made->beams = pattern_->beams(scan_index, executor);
-  if (!pattern_->repeats()) return made;
-  std::vector<Vector3f> directions;
-  directions.reserve(made->beams.size());
-  for (const Beam& beam : made->beams) directions.push_back(beam.direction_sensor);
-  made->order = direction_order(directions, executor);
-  const std::lock_guard lock(kept_->mutex);  // another thread may have made the same
-  kept_->beams = made;
-  return made;
 }
 
 /// Beams in the world, each from the pose at its own time, those of a snapshot from the one in the
@@ -116,7 +118,7 @@ Scan Lidar::take(const ScanRequest& request,
   scan.sensor = sensor_;
   scan.start = request.start;
   scan.end = request.start + period();
-  const auto ordered = ordered_beams(request.index, executor);
+  const auto ordered = beams_->of(request.index, executor);
   const std::vector<Beam>& beams = ordered->beams;
   scan.beams = beams.size();
 
@@ -165,6 +167,7 @@ Scan Lidar::take(const ScanRequest& request,
                            static_cast<std::uint32_t>(i),
                            hits[i].label});
   }
+  if (request.known != nullptr) mark_unknown(*request.known, rays, hits, scan, executor);
   return scan;
 }
 

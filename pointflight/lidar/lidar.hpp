@@ -1,32 +1,38 @@
 #pragma once
 
 #include <memory>
-#include <mutex>
 
 #include "pointflight/core/parallel.hpp"
 #include "pointflight/geometry/motion.hpp"
 #include "pointflight/lidar/beam_pattern.hpp"
 #include "pointflight/lidar/lidar_settings.hpp"
 #include "pointflight/lidar/scan.hpp"
+#include "pointflight/lidar/scan_beams.hpp"
+#include "pointflight/map/known_space.hpp"
 #include "pointflight/render/renderer.hpp"
 
 namespace pointflight {
 
 /// Which scan to take.
 struct ScanRequest {
-  std::uint64_t index = 0;       ///< Scan number: its pattern, and its place in the noise stream.
-  SimTime start;                 ///< When it starts in the run.
-  bool snapshot = false;         ///< All beams from the pose at the scan's middle, as in the paper.
-  bool noise = true;             ///< Range noise of the sensor file.
-  std::uint64_t seed = 0;        ///< Of the range noise.
+  std::uint64_t index = 0;  ///< Scan number: its pattern, and its place in the noise stream.
+  SimTime start;            ///< When it starts in the run.
+  bool snapshot = false;    ///< All beams from the pose at the scan's middle, as in the paper.
+  bool noise = true;        ///< Range noise of the sensor file.
+  std::uint64_t seed = 0;   ///< Of the range noise.
+  /// Points get `is_unknown` by it; null: they do not.
+  const KnownSpace* known = nullptr;
   std::span<const Body> bodies;  ///< What moves in the map, without what carries the sensor.
 };
 
 /// A LiDAR: pattern, renderer, noise.
 class Lidar {
  public:
-  /// `sensor` numbers it within the run: the entity of its random streams.
-  Lidar(const LidarSettings& settings, std::uint32_t sensor);
+  /// `sensor` numbers it within the run: the entity of its random streams. LiDARs of the same
+  /// settings may share their beams; null: it has its own.
+  Lidar(const LidarSettings& settings,
+        std::uint32_t sensor,
+        std::shared_ptr<const ScanBeams> beams = nullptr);
 
   /// As given to the constructor.
   [[nodiscard]] const LidarSettings& settings() const { return settings_; }
@@ -46,18 +52,10 @@ class Lidar {
 
   /// The beams of a scan.
   [[nodiscard]] std::vector<Beam> beams(std::uint64_t scan_index, const Executor& executor) const {
-    return pattern_->beams(scan_index, executor);
+    return beams_->of(scan_index, executor)->beams;
   }
 
  private:
-  /// Beams of a scan and their order by direction.
-  struct OrderedBeams {
-    std::vector<Beam> beams;
-    std::vector<std::uint32_t> order;  ///< Empty for patterns that do not repeat.
-  };
-  [[nodiscard]] std::shared_ptr<const OrderedBeams> ordered_beams(std::uint64_t scan_index,
-                                                                  const Executor& executor) const;
-
   [[nodiscard]] std::vector<Ray> rays_of(std::span<const Beam> beams,
                                          SimTime start,
                                          const PoseTrack& T_world_sensor,
@@ -68,14 +66,8 @@ class Lidar {
 
   LidarSettings settings_;
   std::uint32_t sensor_;
-  std::unique_ptr<BeamPattern> pattern_;
+  std::shared_ptr<const ScanBeams> beams_;
   bool measures_depth_ = false;  ///< Limits and noise are of the depth along the axis.
-  /// Of a pattern that repeats, after its first scan.
-  struct Kept {
-    std::mutex mutex;
-    std::shared_ptr<const OrderedBeams> beams;
-  };
-  std::unique_ptr<Kept> kept_ = std::make_unique<Kept>();
 };
 
 }  // namespace pointflight

@@ -10,11 +10,20 @@
 #include "pointflight/io/pcd_writer.hpp"
 
 namespace pointflight {
+namespace {
+
+constexpr std::size_t kFloats = 6;
+
+/// Bytes per point.
+constexpr std::size_t row_size(bool marks_unknown) {
+  return kFloats * sizeof(float) + 2 * sizeof(std::uint16_t) + (marks_unknown ? 1 : 0);
+}
+
+}  // namespace
 
 void write_scan_pcd(const std::string& path, const Scan& scan) {
-  constexpr std::size_t kFloats = 6;
-  constexpr std::size_t kRow = kFloats * sizeof(float) + 2 * sizeof(std::uint16_t);
-  std::vector<std::byte> rows(scan.points.size() * kRow);
+  const std::size_t row = row_size(scan.marks_unknown);
+  std::vector<std::byte> rows(scan.points.size() * row);
   std::byte* at = rows.data();
   for (const ScanPoint& point : scan.points) {
     const float values[kFloats] = {point.position_sensor.x(),
@@ -26,43 +35,48 @@ void write_scan_pcd(const std::string& path, const Scan& scan) {
     std::memcpy(at, values, sizeof values);
     const std::uint16_t integers[2] = {point.ring, static_cast<std::uint16_t>(point.label)};
     std::memcpy(at + sizeof values, integers, sizeof integers);
-    at += kRow;
+    if (scan.marks_unknown) at[row - 1] = std::byte{point.is_unknown};
+    at += row;
   }
-  write_pcd(OutputFile(path),
-            {{"x", 'F', 4},
-             {"y", 'F', 4},
-             {"z", 'F', 4},
-             {"intensity", 'F', 4},
-             {"range", 'F', 4},
-             {"time", 'F', 4},
-             {"ring", 'U', 2},
-             {"label", 'U', 2}},
-            scan.points.size(),
-            rows);
+  std::vector<PcdField> columns = {{"x", 'F', 4},
+                                   {"y", 'F', 4},
+                                   {"z", 'F', 4},
+                                   {"intensity", 'F', 4},
+                                   {"range", 'F', 4},
+                                   {"time", 'F', 4},
+                                   {"ring", 'U', 2},
+                                   {"label", 'U', 2}};
+  if (scan.marks_unknown) columns.push_back({"unknown", 'U', 1});
+  write_pcd(OutputFile(path), columns, scan.points.size(), rows);
 }
 
-std::vector<ScanPoint> read_scan_points(const std::string& path, std::span<const Beam> beams) {
-  constexpr std::size_t kRow = 6 * sizeof(float) + 2 * sizeof(std::uint16_t);
-  constexpr std::string_view kFields = "FIELDS x y z intensity range time ring label\n";
+std::vector<ScanPoint> read_scan_points(const std::string& path,
+                                        std::span<const Beam> beams,
+                                        bool marks_unknown) {
+  const std::size_t row = row_size(marks_unknown);
+  const std::string_view fields = marks_unknown
+                                      ? "FIELDS x y z intensity range time ring label unknown\n"
+                                      : "FIELDS x y z intensity range time ring label\n";
   constexpr std::string_view kBody = "DATA binary\n";
   const MappedFile file(path);
   const std::string_view text(reinterpret_cast<const char*>(file.bytes().data()),
                               file.bytes().size());
   const std::size_t body = text.find(kBody);
   const std::size_t size = body == std::string_view::npos ? 1 : text.size() - body - kBody.size();
-  const bool own = text.substr(0, body).find(kFields) != std::string_view::npos;
-  if (!own || size % kRow != 0) {
+  const bool own = text.substr(0, body).find(fields) != std::string_view::npos;
+  if (!own || size % row != 0) {
     throw InputError(fmt::format("{}: is no scan of a run, or cut off", path));
   }
-  std::vector<ScanPoint> points(size / kRow);
+  std::vector<ScanPoint> points(size / row);
   const char* at = text.data() + body + kBody.size();
   std::size_t beam = 0;
   for (ScanPoint& point : points) {
-    float values[6];
+    float values[kFloats];
     std::uint16_t integers[2];
     std::memcpy(values, at, sizeof values);
     std::memcpy(integers, at + sizeof values, sizeof integers);
-    at += kRow;
+    point.is_unknown = marks_unknown && at[row - 1] != 0;
+    at += row;
     point.position_sensor = {values[0], values[1], values[2]};
     point.intensity = values[3];
     point.range = values[4];

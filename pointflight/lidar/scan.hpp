@@ -21,6 +21,9 @@ struct ScanPoint {
   std::uint16_t ring = 0;    ///< As the maker's driver numbers it.
   std::uint32_t beam = 0;    ///< Index of the beam in the scan's pattern.
   Label label = kMapLabel;   ///< What it is of: the map, a vehicle, an obstacle.
+  /// Its beam came through space that no survey saw: something may stand there in the real place.
+  /// Told only where `Scan::marks_unknown`.
+  bool is_unknown = false;
 };
 
 /// What a LiDAR delivers for one scan: the returns in firing order.
@@ -33,6 +36,7 @@ struct Scan {
   std::size_t beams = 0;          ///< Fired, whether they returned or not.
   bool snapshot = false;          ///< All beams left from the sensor's pose at `middle`.
   SimTime middle;                 ///< Between first and last beam (a camera's: its start).
+  bool marks_unknown = false;     ///< The points say `is_unknown`.
   std::vector<ScanPoint> points;  ///< In firing order; beams without a return have none.
 
   /// When the sensor was where it saw a point from.
@@ -42,11 +46,15 @@ struct Scan {
 };
 
 /// Writes x y z intensity range time (float32; time in seconds after the scan's start), ring
-/// (uint16) and label (uint16) as binary PCD. Throws InputError.
+/// (uint16), label (uint16) and, where the scan marks it, unknown (uint8: 0, 1) as binary PCD.
+/// Throws InputError.
 void write_scan_pcd(const std::string& path, const Scan& scan);
 
 /// The points of such a file, taken with `beams`; their times and numbers are those of the beams,
-/// to the nanosecond. Throws InputError, also where the points are not those of the beams.
-std::vector<ScanPoint> read_scan_points(const std::string& path, std::span<const Beam> beams);
+/// to the nanosecond. With `marks_unknown` it is read as well. Throws InputError, also where the
+/// points are not those of the beams.
+std::vector<ScanPoint> read_scan_points(const std::string& path,
+                                        std::span<const Beam> beams,
+                                        bool marks_unknown = false);
 
 }  // namespace pointflight

@@ -11,7 +11,7 @@ namespace pointflight {
 namespace {
 
 constexpr std::size_t kPartSurfels = 1 << 15;
-constexpr std::size_t kHighPartSurfels = 1 << 17;  // few nodes are left to the simpler rule
+constexpr std::size_t kHighPartSurfels = 1 << 20;  // few nodes are left to the simpler rule
 
 /// The upper nodes, down to ranges that one thread builds at a stroke.
 class TreeBuilder {

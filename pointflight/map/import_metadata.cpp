@@ -33,6 +33,7 @@ std::string import_metadata(const ImportReport& report, const ImportOptions& opt
                         {"projected", report.projection.projected},
                         {"too_thick", report.projection.too_thick}};
   json["surfels"] = report.surfels;
+  json["merged_surfels"] = report.merged_surfels;
   json["wide_surfels"] = report.wide_surfels;
   json["small_surfels"] = report.small_surfels;
   json["planar_surfels"] = report.planar_surfels;

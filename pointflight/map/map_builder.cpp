@@ -237,21 +237,22 @@ class Import {
     const auto surfels = fit_surfels(cells_, executor_, scratch_, progress_);
     pointflight::report(progress_, "closing gaps of thin scans", 0.0);
     const SparseBlocks sparse(cells_, surfels, executor_);
-    std::vector<bool> covered;
-    const auto wide =
-        surfels_of_wide_cells(cells_, sparse, covered, executor_, scratch_, progress_);
-    report.wide_surfels = wide.size();
+    const WideSurfels wide = surfels_of_wide_cells(
+        cells_, surfels, sparse, report.noise, executor_, scratch_, progress_);
+    report.wide_surfels = wide.thin;
+    report.merged_surfels = wide.merged;
     report.grown_surfels =
-        grow_sparse_surfels(cells_, surfels, covered, sparse, executor_, progress_);
+        grow_sparse_surfels(cells_, surfels, wide.covered, sparse, executor_, progress_);
     ScratchArray<SurfelPiece> small;
-    SmallCells splitting(cells_, surfels, covered, executor_, scratch_, options_.cells_memory);
+    SmallCells splitting(cells_, surfels, wide.covered, executor_, scratch_, options_.cells_memory);
     if (!splitting.empty()) {
       for_each_batch("splitting cells",
                      [&](std::span<const CloudPoint> points) { splitting.add(points); });
       small = splitting.finish(progress_);
     }
     report.small_surfels = small.size();
-    return choose_surfels(cells_, surfels, covered, wide, small, report.has_intensity, scratch_);
+    return choose_surfels(
+        cells_, surfels, wide.covered, wide.pieces, small, report.has_intensity, scratch_);
   }
 
   /// Where the map lies, in voxels.

@@ -49,6 +49,7 @@ struct ImportReport {
   std::uint64_t outlier_cells = 0;        ///< Dropped.
   std::uint64_t outlier_points = 0;       ///< In the dropped cells.
   std::uint64_t surfels = 0;              ///< In the map.
+  std::uint64_t merged_surfels = 0;       ///< Those that stand for several cells amid a plane.
   std::uint64_t wide_surfels = 0;         ///< Of them, those that stand for several thin cells.
   std::uint64_t small_surfels = 0;        ///< Of them, those that stand for part of a cell.
   std::uint64_t planar_surfels = 0;       ///< Of them, those of thickness class 0.

@@ -54,6 +54,12 @@ void check_pose(const Pose& pose) {
   throw InputError("a map is moved by finite metres and a unit quaternion");
 }
 
+/// The same space where the map lies now.
+void move_known_space(const SurfelMap& map, const Pose& T_new_old, MapDescription& description) {
+  if (map.known_space() == nullptr) return;
+  set_section(description, KnownSpace::kSection, map.known_space()->moved(T_new_old));
+}
+
 /// The tree and its words as they are.
 EditedMap shifted(const SurfelMap& map, const Vector3d& by, const EditOptions& options) {
   Scratch scratch(options.scratch_folder, options.scratch_memory);
@@ -69,9 +75,38 @@ EditedMap shifted(const SurfelMap& map, const Vector3d& by, const EditOptions& o
   edited.description.origin_world += by;
   edited.description.bounds_world.min += by;
   edited.description.bounds_world.max += by;
+  move_known_space(map, {Quaterniond::Identity(), by}, edited.description);
   edited.surfels = edited.surfels_before = count_surfels(map);
   append_note(edited, options.note);
   return edited;
+}
+
+/// What one of them knows; nothing where one does not say.
+void join_known_space(const std::vector<PlacedMap>& maps, EditedMap& joined) {
+  std::vector<std::byte> section;
+  const bool all_say = std::all_of(maps.begin(), maps.end(), [](const PlacedMap& placed) {
+    return placed.map->known_space() != nullptr;
+  });
+  if (all_say) {
+    Aabb box;
+    for (const PlacedMap& placed : maps) {
+      const CellGrid& grid = placed.map->known_space()->grid();
+      for (unsigned corner = 0; corner < 8; ++corner) {
+        const Vector3d at(corner & 1u ? grid.size[0] : 0.0,
+                          corner & 2u ? grid.size[1] : 0.0,
+                          corner & 4u ? grid.size[2] : 0.0);
+        box.add(placed.T_world_map * (grid.T_world_grid * (grid.cell * at)));
+      }
+    }
+    KnownSpaceBuilder known(box, joined.description.resolution, joined.surfels);
+    known.add([&](const Vector3d& center) {
+      return std::any_of(maps.begin(), maps.end(), [&](const PlacedMap& placed) {
+        return placed.map->known_space()->known(placed.T_world_map.inverse() * center);
+      });
+    });
+    section = known.section();
+  }
+  set_section(joined.description, KnownSpace::kSection, std::move(section));
 }
 
 /// One scale of intensities for several maps.
@@ -116,7 +151,16 @@ MapDescription description_of(const SurfelMap& map) {
   d.intensity_step = map.intensity_step();
   d.surfel_count = map.surfel_count();
   d.metadata = std::string(map.metadata());
+  if (map.known_space() != nullptr) {
+    const auto bytes = map.section(KnownSpace::kSection);
+    d.extra.push_back({KnownSpace::kSection, {bytes.begin(), bytes.end()}});
+  }
   return d;
+}
+
+void set_section(MapDescription& description, const char* name, std::vector<std::byte> bytes) {
+  std::erase_if(description.extra, [&](const ExtraSection& extra) { return extra.name == name; });
+  if (!bytes.empty()) description.extra.push_back({name, std::move(bytes)});
 }
 
 void append_note(EditedMap& edited, const std::string& note) {
@@ -143,12 +187,19 @@ EditedMap crop_map(const SurfelMap& map,
   });
   SurfelGathering gathering(map.origin_world(), map.resolution(), count, options);
   std::size_t at = 0;
+  std::vector<Vector3d> gone;  // where space is not known any more
   for_each_surfel(map.words(), [&](const LeafHeader& leaf, std::size_t word) {
-    if (!kept[at++]) return;
+    if (!kept[at++]) {
+      if (map.known_space() != nullptr) gone.push_back(map.center_world(leaf, map.words()[word]));
+      return;
+    }
     gathering.add_as_is(leaf, map.words()[word], intensity_code(map, word));
   });
   EditedMap edited = gathering.build(description_of(map), true, "crop", executor);
   edited.surfels_before = kept.size();
+  if (map.known_space() != nullptr) {
+    set_section(edited.description, KnownSpace::kSection, map.known_space()->without(gone));
+  }
   append_note(edited, options.note);
   return edited;
 }
@@ -172,6 +223,7 @@ EditedMap transform_map(const SurfelMap& map,
     }
   });
   EditedMap edited = gathering.build(description_of(map), false, "transform", executor);
+  move_known_space(map, T_new_old, edited.description);
   edited.surfels_before = count;
   append_note(edited, options.note);
   return edited;
@@ -239,6 +291,7 @@ EditedMap merge_maps(const std::vector<PlacedMap>& maps,
   EditedMap edited = gathering.build(description, false, "merge", executor);
   edited.surfels_before = most;
   edited.doubles = doubles;
+  join_known_space(maps, edited);
   append_note(edited, options.note);
   return edited;
 }

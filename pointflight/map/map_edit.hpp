@@ -32,14 +32,17 @@ struct EditOptions {
   std::string note = {};  ///< What was done, appended to the metadata's list "edited".
 };
 
-/// What `write_map` needs to write the same map again.
+/// What `write_map` needs to write the same map again; of further sections the known space.
 MapDescription description_of(const SurfelMap& map);
+
+/// Puts a section in the place of what has its name; empty bytes take it away.
+void set_section(MapDescription& description, const char* name, std::vector<std::byte> bytes);
 
 /// Appends what was done to the metadata's list "edited".
 void append_note(EditedMap& edited, const std::string& note);
 
-/// Keeps the surfels whose centre in the world `keep` accepts; it is called from one thread. Throws
-/// InputError where none is left.
+/// Keeps the surfels whose centre in the world `keep` accepts; it is called from one thread. Space
+/// that held what goes is not known any more. Throws InputError where none is left.
 EditedMap crop_map(const SurfelMap& map,
                    const std::function<bool(const Vector3d& center_world)>& keep,
                    const EditOptions& options,
@@ -58,8 +61,9 @@ struct PlacedMap {
 };
 
 /// Joins maps of one resolution. A surfel of a later one that lies within the cell of an earlier
-/// one's is left out: twice the coverage would make edges fat. Throws InputError where resolutions
-/// differ or the whole is too wide.
+/// one's is left out: twice the coverage would make edges fat. Space is known where one of them
+/// knows it, if all say what they know. Throws InputError where resolutions differ or the whole is
+/// too wide.
 EditedMap merge_maps(const std::vector<PlacedMap>& maps,
                      const EditOptions& options,
                      const Executor& executor,

@@ -284,6 +284,12 @@ void SurfelMap::attach(std::span<const std::byte> bytes, const std::string& name
   if (words_.size() < kLeafPadding || (!intensity_.empty() && intensity_.size() != words_.size())) {
     fail(kMapHeaderSize, "section lengths do not fit each other");
   }
+  if (const auto known = section(KnownSpace::kSection); !known.empty()) {
+    known_ = KnownSpace::from_section(known);
+    if (!known_)
+      fail(static_cast<std::size_t>(known.data() - bytes.data()),
+           "the section 'known_space' is corrupt");
+  }
   name_ = name;
   file_size_ = bytes.size();
   resolution_ = header.resolution;
@@ -297,6 +303,14 @@ void SurfelMap::attach(std::span<const std::byte> bytes, const std::string& name
   surfel_count_ = header.surfel_count;
   intensity_offset_ = header.intensity_offset;
   intensity_step_ = header.intensity_step;
+}
+
+const KnownSpace& known_space_of(const SurfelMap& map) {
+  if (map.known_space() != nullptr) return *map.known_space();
+  throw InputError(
+      fmt::format("{} does not say what its survey saw: make it with 'map import --scans', or fit "
+                  "it with 'map fit --scans'",
+                  map.name()));
 }
 
 std::span<const std::byte> SurfelMap::section(std::string_view name) const {

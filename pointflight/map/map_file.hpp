@@ -18,6 +18,7 @@
 ///   ...         section: intensity  u8[], one per word; optional
 ///   ...         section: metadata   JSON: how the map was made, from what, with which version;
 ///   optional
+///   ...         section: known_space  which space a survey saw (known_space.hpp); optional
 ///   ...         any others, which readers that do not know them leave alone
 ///
 /// Version 1 had these four sections and no names for them: its table is four MapSectionV1.
@@ -66,7 +67,7 @@ static_assert(sizeof(MapHeader) == 128 && sizeof(MapSection) == 40 && sizeof(Map
 inline constexpr std::size_t kMapSectionsMax =
     (kMapHeaderSize - 8 - sizeof(MapHeader)) / sizeof(MapSection);
 
-/// A section that this program does not know.
+/// A section beside those that every map has.
 struct ExtraSection {
   std::string name;              ///< Up to 16 bytes, not one of `kMapSectionNames`.
   std::vector<std::byte> bytes;  ///< Its content.
@@ -83,7 +84,7 @@ struct MapDescription {
   float intensity_step = 0.0f;               ///< From one byte's value to the next.
   std::uint64_t surfel_count = 0;            ///< For `map info`.
   std::string metadata;                      ///< JSON.
-  std::vector<ExtraSection> extra;           ///< Further sections; edits drop them.
+  std::vector<ExtraSection> extra;           ///< Further sections; edits keep what they know.
 };
 
 /// Writes and commits a map: it appears under its name only when complete. Throws InputError.

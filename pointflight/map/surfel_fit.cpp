@@ -21,6 +21,7 @@ constexpr double kTrustedPoints = 40.0;
 // within a surface, where no edge can grow fat
 constexpr double kWithin = 0.32;      // r
 constexpr double kSameSurface = 0.4;  // r across the plane
+constexpr double kFlatAround = 0.05;  // r, deviation across the plane of 3 x 3 x 3 cells
 
 /// Frame with the plane's normal first and the direction within it last in which the cell's own
 /// points spread most.
@@ -132,6 +133,18 @@ Surfel fit_surfel(const VoxelGrid& grid, NeighbourWindow& window, const VoxelCel
   const Vector3d center = own.mean() / r;
   surfel.center_voxels = (center.array() + 0.5).max(0.0).min(1.0).matrix().cast<float>();
   return surfel;
+}
+
+bool lies_amid_plane(const VoxelGrid& grid,
+                     NeighbourWindow& window,
+                     const VoxelCell& cell,
+                     double thickness) {
+  const double r = grid.resolution();
+  const CovarianceAxes inside = covariance_axes(cell.moments().covariance());
+  if (!(inside.lambda[0] <= thickness * thickness)) return false;
+  const CovarianceAxes around = covariance_axes(window.moments(cell, 1).covariance());
+  if (!(around.lambda[0] <= kFlatAround * kFlatAround * r * r)) return false;
+  return lies_within_surface(window, cell, cell.moments().mean(), around.vectors, r);
 }
 
 ScratchArray<BuildSurfel> fit_surfels(const CellTiles& cells,

@@ -10,6 +10,13 @@ namespace pointflight {
 /// cell's own points, shrunk to a prior worth 8 points (docs/architecture.md, "Surfels").
 Surfel fit_surfel(const VoxelGrid& grid, NeighbourWindow& window, const VoxelCell& cell);
 
+/// True for a cell amid a plane: its points lie within `thickness` (m, one standard deviation) of
+/// one, those of the cells around within 0.05 of a cell's width, and it goes on to all sides.
+bool lies_amid_plane(const VoxelGrid& grid,
+                     NeighbourWindow& window,
+                     const VoxelCell& cell,
+                     double thickness);
+
 /// Fits one surfel to each cell, in the cells' order.
 ScratchArray<BuildSurfel> fit_surfels(const CellTiles& cells,
                                       const Executor& executor,

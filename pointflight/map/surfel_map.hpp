@@ -11,6 +11,7 @@
 
 #include "pointflight/geometry/types.hpp"
 #include "pointflight/map/bvh8.hpp"
+#include "pointflight/map/known_space.hpp"
 #include "pointflight/map/surfel_scale.hpp"
 
 namespace pointflight {
@@ -74,6 +75,8 @@ class SurfelMap {
   [[nodiscard]] const SurfelScale& scale() const { return scale_; }
   /// As its header says.
   [[nodiscard]] std::uint64_t surfel_count() const { return surfel_count_; }
+  /// As it was opened, for messages.
+  [[nodiscard]] const std::string& name() const { return name_; }
   /// Bytes.
   [[nodiscard]] std::uint64_t file_size() const { return file_size_; }
 
@@ -83,6 +86,9 @@ class SurfelMap {
 
   /// A section of the file by its name, empty without one: for what this class does not know.
   [[nodiscard]] std::span<const std::byte> section(std::string_view name) const;
+
+  /// What space the survey saw that the map was fitted to; null where the file does not say.
+  [[nodiscard]] const KnownSpace* known_space() const { return known_ ? &*known_ : nullptr; }
 
   /// How the map was made, as JSON text.
   [[nodiscard]] std::string_view metadata() const { return metadata_; }
@@ -147,6 +153,7 @@ class SurfelMap {
   std::span<const SurfelWord> words_;
   std::span<const std::uint8_t> intensity_;
   std::string_view metadata_;
+  std::optional<KnownSpace> known_;
   double resolution_ = 0.0;
   SurfelScale scale_;
   Vector3d origin_ = Vector3d::Zero();
@@ -157,5 +164,8 @@ class SurfelMap {
   float intensity_offset_ = 0.0f;
   float intensity_step_ = 0.0f;
 };
+
+/// What space the map's survey saw. Throws InputError where the map does not say.
+const KnownSpace& known_space_of(const SurfelMap& map);
 
 }  // namespace pointflight

@@ -9,12 +9,15 @@
 namespace pointflight {
 namespace {
 
-constexpr double kWidest = 0.45;      // m
-constexpr int kDoublingsMax = 3;      // wider ones are more than a surfel's 1.8 r
-constexpr std::uint32_t kPlane = 4;   // points of a wide cell
-constexpr double kThin = 3.5;         // points per cell
-constexpr double kThinAround = 16.0;  // points per wide cell
-constexpr double kSurface = 6.0;      // occupied cells in 3 x 3 x 3 where a surface goes on
+constexpr double kWidest = 0.45;       // m
+constexpr int kDoublingsMax = 3;       // wider ones are more than a surfel's 1.8 r
+constexpr std::uint32_t kPlane = 4;    // points of a wide cell
+constexpr double kThin = 3.5;          // points per cell
+constexpr double kOnePlane = 0.005;    // r, standard deviation across it
+constexpr double kNoisyPlane = 0.02;   // r, the same where points are noisier
+constexpr double kMergedPoints = 4.0;  // points per cell
+constexpr double kThinAround = 16.0;   // points per wide cell
+constexpr double kSurface = 6.0;       // occupied cells in 3 x 3 x 3 where a surface goes on
 
 using Voxel = std::array<std::int32_t, 3>;
 
@@ -43,6 +46,7 @@ VoxelCell in_wider(const VoxelCell& cell, double resolution) {
 /// Surfel of a wide cell that may stand for the cells in it, by the number of that cell.
 struct Candidate {
   std::size_t number = 0;
+  bool is_thin = true;  ///< Else one plane's.
   SurfelPiece piece;
 };
 
@@ -50,6 +54,7 @@ struct Candidate {
 struct Level {
   CellTiles cells;
   std::vector<std::uint8_t> children;
+  std::vector<std::uint8_t> planar;    ///< Of them; empty where planes are not looked for.
   ScratchArray<Candidate> candidates;  ///< Those of a tile from `first` on; the tiles ascend.
   struct OfTile {
     std::size_t tile, first, count;
@@ -93,6 +98,16 @@ bool lies_in_thin(NeighbourWindow& window, const VoxelCell& cell) {
   return n < kThinAround * occupied && occupied >= kSurface;
 }
 
+/// True for a cell with enough points for its width, all in planar cells.
+bool may_lie_amid_plane(const Level& level,
+                        std::size_t number,
+                        const VoxelCell& cell,
+                        SparseSearch& sparse) {
+  return !level.planar.empty() && level.planar[number] == level.children[number] &&
+         cell.n >= kMergedPoints * level.children[number] &&
+         !sparse.contain(level.cells.resolution(), cell);
+}
+
 /// Room for the candidates of each tile that may have any.
 void make_room(Level& level,
                const SparseBlocks& sparse,
@@ -104,7 +119,11 @@ void make_room(Level& level,
   level.cells.for_each_tile(executor, [&](std::size_t t, std::span<VoxelCell> own) {
     SparseSearch search(sparse);
     for (std::size_t i = 0; i < own.size(); ++i) {
-      thin[t] += is_thin(own[i], level.children[first[t] + i], resolution, search) ? 1 : 0;
+      const std::size_t number = first[t] + i;
+      thin[t] += is_thin(own[i], level.children[number], resolution, search) ||
+                         may_lie_amid_plane(level, number, own[i], search)
+                     ? 1
+                     : 0;
     }
   });
   std::size_t room = 0;
@@ -120,11 +139,15 @@ void make_room(Level& level,
 void find_candidates(Level& level,
                      const SparseBlocks& sparse,
                      const VoxelFrame& map,
+                     double noise,
                      const Executor& executor,
                      const Progress& progress) {
   const std::vector<std::size_t> first = level.cells.first_numbers();
   const double resolution = level.cells.resolution();
   const auto factor = static_cast<float>(resolution / map.resolution);
+  // a form that noise hides anyway may be lost
+  const double thickness =
+      map.resolution * std::clamp(0.25 * noise / map.resolution, kOnePlane, kNoisyPlane);
   std::vector<std::size_t> tiles;
   for (const Level::OfTile& tile : level.of_tile) tiles.push_back(tile.tile);
   const auto visit = [&](TileView& view) {
@@ -138,15 +161,21 @@ void find_candidates(Level& level,
     std::size_t number = first[view.tile];
     for (const VoxelCell& cell : view.own()) {
       const std::size_t i = number++;
-      if (!is_thin(cell, level.children[i], resolution, search)) continue;
-      if (!lies_in_thin(window, cell)) continue;
+      const bool thin = is_thin(cell, level.children[i], resolution, search);
+      if (thin ? !lies_in_thin(window, cell)
+               : !may_lie_amid_plane(level, i, cell, search) ||
+                     !lies_amid_plane(view.grid, window, cell, thickness)) {
+        continue;
+      }
       const SurfelWord word = encode(fit_surfel(view.grid, window, cell));
       if (!is_planar(word)) continue;
       const Vector3d center = level.cells.frame().centroid_world(cell);
       const auto place = map.place_of(center);
       if (!place) continue;
+      // merged ones are as dense as what they stand for
+      const std::uint32_t n = thin ? cell.n : cell.n / level.children[i];
       level.candidates[of_tile.first + of_tile.count++] = {
-          i, {rescaled(word, factor, map, center, place->voxel), cell.n, mean_intensity(cell)}};
+          i, thin, {rescaled(word, factor, map, center, place->voxel), n, mean_intensity(cell)}};
     }
   };
   level.cells.for_each_view_of(tiles, executor, 1, visit, progress, "fitting wide surfels");
@@ -188,35 +217,36 @@ CellTiles wider_cells(const CellTiles& cells, const Executor& executor, Scratch&
   return {frame, std::move(wide), std::move(tiles)};
 }
 
-ScratchArray<SurfelPiece> surfels_of_wide_cells(const CellTiles& cells,
-                                                const SparseBlocks& sparse,
-                                                std::vector<bool>& covered,
-                                                const Executor& executor,
-                                                Scratch& scratch,
-                                                const Progress& progress) {
+WideSurfels surfels_of_wide_cells(const CellTiles& cells,
+                                  const ScratchArray<BuildSurfel>& surfels,
+                                  const SparseBlocks& sparse,
+                                  double noise,
+                                  const Executor& executor,
+                                  Scratch& scratch,
+                                  const Progress& progress) {
   std::vector<Level> levels;
   const auto below = [&](std::size_t level) -> const CellTiles& {
     return level == 0 ? cells : levels[level - 1].cells;
   };
-  if (!sparse.any()) {
-    covered.assign(cells.count(), false);
-    return ScratchArray<SurfelPiece>(scratch, 0);
-  }
   std::size_t most = 0;
-  for (int i = 0; i < kDoublingsMax && below(levels.size()).resolution() <= 0.5 * kWidest; ++i) {
+  const int doublings = sparse.any() ? kDoublingsMax : 1;  // planes are merged once
+  for (int i = 0; i < doublings && below(levels.size()).resolution() <= 0.5 * kWidest; ++i) {
     Level level;
     level.cells = wider_cells(below(levels.size()), executor, scratch);
     level.children.assign(level.cells.count(), 0);
-    for_each_child(below(levels.size()),
-                   [&](std::size_t, std::size_t wide) { ++level.children[wide]; });
+    if (i == 0) level.planar.assign(level.cells.count(), 0);
+    for_each_child(below(levels.size()), [&](std::size_t child, std::size_t wide) {
+      ++level.children[wide];
+      if (i == 0 && is_planar(surfels[child].word)) ++level.planar[wide];
+    });
     make_room(level, sparse, executor, scratch);
-    find_candidates(level, sparse, cells.frame(), executor, progress);
+    find_candidates(level, sparse, cells.frame(), noise, executor, progress);
     for (const Level::OfTile& tile : level.of_tile) most += tile.count;
     levels.push_back(std::move(level));
   }
   // from the widest down: one that is taken covers what lies in it
-  ScratchArray<SurfelPiece> pieces(scratch, most);
-  std::size_t size = 0;
+  WideSurfels wide;
+  wide.pieces = ScratchArray<SurfelPiece>(scratch, most);
   std::vector<bool> taken(levels.empty() ? 0 : levels.back().cells.count(), false);
   for (std::size_t l = levels.size(); l-- > 0;) {
     for (const Level::OfTile& tile : levels[l].of_tile) {
@@ -224,21 +254,24 @@ ScratchArray<SurfelPiece> surfels_of_wide_cells(const CellTiles& cells,
            levels[l].candidates.span().subspan(tile.first, tile.count)) {
         if (taken[candidate.number]) continue;
         taken[candidate.number] = true;
-        pieces[size++] = candidate.piece;
+        wide.pieces[wide.thin + wide.merged] = candidate.piece;
+        ++(candidate.is_thin ? wide.thin : wide.merged);
       }
     }
     std::vector<bool> inside(below(l).count(), false);
     for_each_child(below(l),
-                   [&](std::size_t child, std::size_t wide) { inside[child] = taken[wide]; });
+                   [&](std::size_t child, std::size_t cell) { inside[child] = taken[cell]; });
     taken = std::move(inside);
   }
-  covered = std::move(taken);
-  covered.resize(cells.count(), false);
-  std::sort(pieces.begin(), pieces.begin() + size, [](const SurfelPiece& a, const SurfelPiece& b) {
-    return a.surfel.morton < b.surfel.morton;
-  });
-  pieces.shrink(size);
-  return pieces;
+  wide.covered = std::move(taken);
+  wide.covered.resize(cells.count(), false);
+  const std::size_t size = wide.thin + wide.merged;
+  std::sort(
+      wide.pieces.begin(),
+      wide.pieces.begin() + size,
+      [](const SurfelPiece& a, const SurfelPiece& b) { return a.surfel.morton < b.surfel.morton; });
+  wide.pieces.shrink(size);
+  return wide;
 }
 
 }  // namespace pointflight

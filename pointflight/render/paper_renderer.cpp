@@ -128,7 +128,8 @@ PaperPoints points_of(const Solid& solid, double spacing) {
 
 /// How wide the cells are that surfels stand for. The paper knows one width; maps have several, and
 /// what they store is only the spread: small cells share a voxel of the map, and the spread of a
-/// filled cell is its width / sqrt(12).
+/// filled cell is its width / sqrt(12). A wide cell, which is flat, becomes the points on it that
+/// the paper's one width would have given.
 class CellWidths {
   static constexpr double kWide = 1.8;
 
@@ -141,21 +142,30 @@ class CellWidths {
     std::sort(voxels_.begin(), voxels_.end());
   }
 
-  /// `visit(point in the world, its PaperPoints::Point but for the place, index in words)`
+  /// `visit(point in the world, its PaperPoints::Point but for the place)`
   template <class Visit>
   void for_each_point(double gamma_threshold, const Visit& visit) const {
     const double r = map_.resolution();
     for_each_surfel(map_.words(), [&](const LeafHeader& leaf, std::size_t word) {
       const Surfel surfel = decode(map_.words()[word]);
-      const double width = r * cells_wide(leaf, surfel);
-      const Vector3d at = map_.origin_world() + r * (Vector3d(leaf.x, leaf.y, leaf.z) +
-                                                     surfel.center_voxels.cast<double>());
-      visit(at,
-            PaperPoints::Point{Vector3f::Zero(),
-                               surfel.axes.col(0),
-                               static_cast<double>(surfel.s[0]) * r < gamma_threshold * width,
-                               map_.intensity(static_cast<std::uint32_t>(word)),
-                               static_cast<float>(radius_of(width))});
+      const double whole = r * cells_wide(leaf, surfel);
+      const int side = std::max(1, static_cast<int>(std::lround(whole / r)));  // points
+      const double width = whole / side;
+      const Vector3d center = map_.origin_world() + r * (Vector3d(leaf.x, leaf.y, leaf.z) +
+                                                         surfel.center_voxels.cast<double>());
+      const PaperPoints::Point point{Vector3f::Zero(),
+                                     surfel.axes.col(0),
+                                     static_cast<double>(surfel.s[0]) * r < gamma_threshold * width,
+                                     map_.intensity(static_cast<std::uint32_t>(word)),
+                                     static_cast<float>(radius_of(width))};
+      for (int i = 0; i < side * side; ++i) {
+        const double u = width * (i % side - 0.5 * (side - 1));
+        const double v =
+            width * (i / side - 0.5 * (side - 1));  // NOLINT(bugprone-integer-division)
+        visit(
+            center + u * surfel.axes.col(1).cast<double>() + v * surfel.axes.col(2).cast<double>(),
+            point);
+      }
     });
   }
 

@@ -235,8 +235,9 @@ struct RecordedRun::Files {
     const PoseTrack track = tracks[scan.vehicle].with_mount(mounted.T_body_sensor());
     const std::vector<Beam> beams = mounted.lidar().beams(scan.index, executor);
     scan.snapshot = mounted.takes_snapshots();
+    scan.marks_unknown = mounted.marks_unknown();
     scan.middle = mounted.lidar().middle_of(scan.start, beams, scan.snapshot);
-    scan.points = read_scan_points(path, beams);
+    scan.points = read_scan_points(path, beams, mounted.marks_unknown());
     return ScanSample{std::make_shared<const Scan>(std::move(scan)), track};
   }
 

@@ -1,19 +1,13 @@
 #include "pointflight/sim/onboard_sensors.hpp"
 
+#include <utility>
+
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/random.hpp"
 #include "pointflight/geometry/rotation.hpp"
 #include "pointflight/sim/vehicle_agent.hpp"
 
 namespace pointflight {
-namespace {
-
-std::uint32_t entity_of(const SensorSite& site) {
-  return site.vehicle << 8 | site.sensor;
-}
-
-}  // namespace
-
 Sample OdometrySource::measure(const InstantInput& input, std::any& /*memory*/) const {
   OdometrySample sample;
   sample.vehicle = input.vehicle.number();
@@ -45,16 +39,18 @@ Sample OnboardImu::measure(const InstantInput& input, std::any& memory) const {
 }
 
 MountedLidar::MountedLidar(const LidarMount& mount,
-                           const LidarSettings& settings,
+                           Lidar lidar,
                            const SensorSite& site,
                            std::shared_ptr<const Renderer> renderer,
+                           const SurfelMap& map,
                            const Faults& faults)
-    : IntervalSensor(settings.rate),
+    : IntervalSensor(lidar.settings().rate),
       site_(site),
-      lidar_(settings, entity_of(site)),
+      lidar_(std::move(lidar)),
       renderer_(std::move(renderer)),
       snapshot_(mount.snapshot),
       noise_(mount.noise),
+      known_(mount.mark_unknown ? &known_space_of(map) : nullptr),
       faults_(faults) {
   const Vector3d rpy = mount.rotation_rpy_deg * kDegree;
   T_body_sensor_ = {quaternion_from_rpy(rpy.x(), rpy.y(), rpy.z()), mount.position};
@@ -78,6 +74,7 @@ Sample MountedLidar::measure(const IntervalInput& input) const {
   request.start = input.start;
   request.snapshot = snapshot_;
   request.noise = noise_;
+  request.known = known_;
   request.seed = site_.seed;
   request.bodies = input.bodies;
   const PoseTrack track = input.T_world_body.with_mount(T_body_sensor_);

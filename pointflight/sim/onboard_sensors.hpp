@@ -44,12 +44,17 @@ class OnboardImu : public InstantSensor {
 /// A LiDAR on a vehicle. Measurement k covers [at(k), at(k + 1)) of its schedule.
 class MountedLidar : public IntervalSensor {
  public:
-  /// `mount` of the scenario; `site.sensor`: its number among the vehicle's LiDARs. The faults must
-  /// outlive it.
+  /// Of a LiDAR: vehicle << 8 | its number on the vehicle.
+  static std::uint32_t entity_of(const SensorSite& site) { return site.vehicle << 8 | site.sensor; }
+
+  /// `mount` of the scenario; `site.sensor`: its number among the vehicle's LiDARs, of which
+  /// `lidar` has been told. Map and faults
+  /// must outlive it. Throws InputError where it is to mark what the map does not say.
   MountedLidar(const LidarMount& mount,
-               const LidarSettings& settings,
+               Lidar lidar,
                const SensorSite& site,
                std::shared_ptr<const Renderer> renderer,
+               const SurfelMap& map,
                const Faults& faults);
 
   /// Pattern and noise; its number is vehicle << 8 | LiDAR.
@@ -59,6 +64,9 @@ class MountedLidar : public IntervalSensor {
 
   /// True where all beams of a scan leave from one pose.
   [[nodiscard]] bool takes_snapshots() const { return snapshot_ || renderer_->is_snapshot(); }
+
+  /// Its points say whether they came through unknown space.
+  [[nodiscard]] bool marks_unknown() const { return known_ != nullptr; }
 
   [[nodiscard]] double reach() const override;
   [[nodiscard]] bool loses(std::int64_t index) const override;
@@ -71,6 +79,7 @@ class MountedLidar : public IntervalSensor {
   Pose T_body_sensor_;
   bool snapshot_;
   bool noise_;
+  const KnownSpace* known_ = nullptr;  ///< Null: points are not marked.
   const Faults& faults_;
 };
 

@@ -37,6 +37,11 @@ void describe_lidar(SettingsVisitor& v, LidarMount& s) {
             s.snapshot);
   });
   v.value({"noise", "", "range noise of the sensor file"}, s.noise);
+  v.value({"mark_unknown",
+           "",
+           "points say whether their beams crossed space that no survey saw (a map made or fitted "
+           "with `--scans`)"},
+          s.mark_unknown);
 }
 
 void describe_mission(SettingsVisitor& v, MissionSettings& s) {

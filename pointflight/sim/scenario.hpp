@@ -29,6 +29,7 @@ struct LidarMount {
   Choice<RendererKind> renderer{};               ///< "beam", "paper" or an own one.
   bool snapshot = false;                         ///< One pose per scan, as in the paper.
   bool noise = true;                             ///< Range noise of the sensor file.
+  bool mark_unknown = false;  ///< Points say whether they came through space no survey saw.
 };
 
 /// Limits of the vehicle file that a scenario tightens or widens; 0: the file's.

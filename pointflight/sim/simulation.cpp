@@ -61,12 +61,7 @@ Simulation::Simulation(const Scenario& scenario,
   setup->step = from_seconds(scenario.physics_step);
   setup->obstacle_schedule = Schedule(scenario.output.obstacle_rate);
 
-  std::map<const RendererKind*, std::shared_ptr<const Renderer>> renderers;
-  const RendererByKind renderer = [&](const Choice<RendererKind>& kind) {
-    auto& made = renderers[&*kind];
-    if (!made) made = kind->make(Scene{setup->map});
-    return made;
-  };
+  SharedParts shared(setup->map, scenario.folder());
   const auto fleet = scenario.fleet();
   if (fleet.empty() || fleet.size() >= kFirstObstacle) {
     throw InputError(fmt::format(
@@ -85,7 +80,7 @@ Simulation::Simulation(const Scenario& scenario,
   };
   double busy = 0.0;
   for (std::size_t i = 0; i < fleet.size(); ++i) {
-    setup->agents.push_back(std::make_unique<VehicleAgent>(scenario, i, fleet[i], renderer));
+    setup->agents.push_back(std::make_unique<VehicleAgent>(scenario, i, fleet[i], shared));
     const VehicleAgent& agent = *setup->agents.back();
     state_.vehicles.push_back(agent.start());
     world.keep_free.push_back({fleet[i].start, bounding_radius(agent.hull()) + kStartRoom});

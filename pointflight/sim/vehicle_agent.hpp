@@ -11,6 +11,7 @@
 #include "pointflight/sim/proximity.hpp"
 #include "pointflight/sim/samples.hpp"
 #include "pointflight/sim/scenario.hpp"
+#include "pointflight/sim/shared_parts.hpp"
 #include "pointflight/sim/state_history.hpp"
 #include "pointflight/vehicle/autopilot.hpp"
 #include "pointflight/vehicle/battery.hpp"
@@ -107,18 +108,15 @@ struct MountedSensor {
   const IntervalSensor* interval;        ///< The same, where it takes time.
 };
 
-/// Gives renderers; vehicles share them.
-using RendererByKind =
-    std::function<std::shared_ptr<const Renderer>(const Choice<RendererKind>& kind)>;
-
 /// One vehicle of a run: everything that does not change, and how its status advances.
 class VehicleAgent {
  public:
-  /// `number` in the fleet. Throws InputError (unknown models, commands that it cannot take).
+  /// `number` in the fleet. Throws InputError (unknown models, commands
+  /// that it cannot take).
   VehicleAgent(const Scenario& scenario,
                std::size_t number,
                const VehicleSetup& setup,
-               const RendererByKind& renderer);
+               SharedParts& shared);
 
   VehicleAgent(const VehicleAgent&) = delete;  // its sensors know its faults
   VehicleAgent& operator=(const VehicleAgent&) = delete;
@@ -196,7 +194,7 @@ class VehicleAgent {
   void watch_battery(VehicleStatus& status, SimTime now) const;
   [[nodiscard]] bool touches_down(const VehicleStatus& status) const;
   [[nodiscard]] double ground_below(const VehicleStatus& status) const;
-  void mount_sensors(const Scenario& scenario, const RendererByKind& renderer);
+  void mount_sensors(const Scenario& scenario, SharedParts& shared);
   void mount(const SensorKind* kind, std::unique_ptr<const Sensor> sensor);
   void check_faults(const Scenario& scenario) const;
   [[nodiscard]] SimTime next_instant(const VehicleStatus& status) const;

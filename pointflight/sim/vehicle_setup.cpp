@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <stdexcept>
+#include <utility>
 
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/input_error.hpp"
@@ -57,7 +58,7 @@ VehicleSettings settings_of(const Scenario& scenario,
 VehicleAgent::VehicleAgent(const Scenario& scenario,
                            std::size_t number,
                            const VehicleSetup& setup,
-                           const RendererByKind& renderer)
+                           SharedParts& shared)
     : number_(static_cast<std::uint32_t>(number)),
       setup_(setup),
       seed_(static_cast<std::uint64_t>(setup.seed >= 0 ? setup.seed : scenario.seed)),
@@ -71,15 +72,15 @@ VehicleAgent::VehicleAgent(const Scenario& scenario,
       mission_(
           std::make_shared<Mission>(setup.start, setup.start_yaw_deg * kDegree, setup.mission)),
       state_schedule_(scenario.output.trajectory_rate) {
-  mount_sensors(scenario, renderer);
+  mount_sensors(scenario, shared);
   if (scenario.air.ground_effect && settings().rotor.radius > 0.0) {
-    ground_sensor_ = renderer("beam");
+    ground_sensor_ = shared.renderer("beam");
   }
   check_faults(scenario);
   read_commands(scenario);
 }
 
-void VehicleAgent::mount_sensors(const Scenario& scenario, const RendererByKind& renderer) {
+void VehicleAgent::mount_sensors(const Scenario& scenario, SharedParts& shared) {
   if (setup_.sensors.size() > kLidarsMax - 2) {
     throw InputError(fmt::format("{}: {} sensors on one vehicle; {} at most",
                                  scenario.place(scenario.vehicle_key(number_, "sensors")),
@@ -115,11 +116,10 @@ void VehicleAgent::mount_sensors(const Scenario& scenario, const RendererByKind&
     const LidarMount& entry = setup_.lidars[i];
     const std::string key = scenario.vehicle_key(number_, fmt::format("lidars[{}].model", i));
     auto lidar = scenario.at(key, [&] {
-      return std::make_unique<MountedLidar>(entry,
-                                            load_lidar(entry.model, scenario.folder()),
-                                            site(i),
-                                            renderer(entry.renderer),
-                                            faults_);
+      const SharedParts::LidarModel& model = shared.lidar(entry.model);
+      Lidar made(model.settings, MountedLidar::entity_of(site(i)), model.beams);
+      return std::make_unique<MountedLidar>(
+          entry, std::move(made), site(i), shared.renderer(entry.renderer), shared.map(), faults_);
     });
     lidars_.push_back(lidar.get());
     mount(nullptr, std::move(lidar));

@@ -9,7 +9,7 @@
 
 #include "pointflight/core/constants.hpp"
 #include "pointflight/fidelity/survey_report.hpp"
-#include "pointflight/io/tum.hpp"
+#include "pointflight/io/pose_files.hpp"
 #include "tests/support.hpp"
 
 namespace pointflight {

@@ -170,6 +170,22 @@ TEST(MapFit, WhatNoRayMeetsKeepsEveryBit) {
   EXPECT_EQ(forms_of(*after), forms_of(*map));
 }
 
+TEST(MapFit, WritesDownWhichSpaceRaysCrossed) {
+  const auto map = map_of(wall_and_ghost(), 0.1);
+  FitReport report;
+  const auto after = fitted(*map, rays_at_the_wall(40000), report);
+  ASSERT_NE(after->known_space(), nullptr);
+  EXPECT_TRUE(after->known_space()->known({2.0, 0.0, 0.0})) << "where the ghost was";
+  EXPECT_TRUE(after->known_space()->known({3.95, 1.0, 1.0})) << "the wall";
+  EXPECT_FALSE(after->known_space()->known({0.5, 1.9, 1.9})) << "beside the rays";
+  // another survey, from another side, adds to it
+  std::vector<SurveyRay> rays;
+  for (int i = -19; i < 20; ++i) rays.push_back(ray_between({0, 1.9, 1.9}, {4, 0.1 * i, 1.9}));
+  const auto both = fitted(*after, rays, report);
+  EXPECT_TRUE(both->known_space()->known({0.5, 1.9, 1.9}));
+  EXPECT_TRUE(both->known_space()->known({2.0, 0.0, 0.0}));
+}
+
 TEST(MapFit, NothingLeftIsAnErrorOfOneLine) {
   ShapeScene scene;
   scene.shapes.emplace_back(Sphere{{2, 0, 0}, 0.3});

@@ -45,7 +45,10 @@ std::vector<std::byte> good_map() {
   ImportOptions options;
   options.resolution = 0.2;
   const auto open = [&](std::size_t) { return std::make_unique<MemoryCloud>(points); };
-  const ImportedMap map = build_map({"memory"}, open, options, Executor(1));
+  ImportedMap map = build_map({"memory"}, open, options, Executor(1));
+  KnownSpaceBuilder known(map.description.bounds_world, map.description.resolution, 20000);
+  known.cross({-1.5, -1.5, 0.5}, Vector3d(1, 1, -0.2).normalized(), 3.0);
+  map.description.extra = {{KnownSpace::kSection, known.section()}};
   return map_bytes(map.tree, map.description);
 }
 
@@ -82,6 +85,12 @@ void ask_everything(const SurfelMap& map, const std::shared_ptr<const SurfelMap>
   const Solid box = Cuboid{{0.3, 0.2, 0.1}};
   const Pose turned{Quaterniond(0.8, 0.1, 0.5, 0.3).normalized(), {0.2, 0.1, 0.3}};
   surfels += contact_with_map(map, box, turned, 2.0) ? 1 : 0;
+  if (const KnownSpace* known = map.known_space()) {
+    for (const Ray& ray : rays) {
+      surfels += known->known(ray.origin_world) ? 1 : 0;
+      surfels += known->known_along(ray.origin_world, ray.direction_world.cast<double>(), 30.0) > 1;
+    }
+  }
   map.for_each_surfel([&](const Vector3d&, const Vector3d&, double, std::uint32_t) { ++surfels; });
 }
 

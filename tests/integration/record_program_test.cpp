@@ -63,6 +63,72 @@ std::string scenario_in(const std::string& folder, const std::string& map, const
   return path;
 }
 
+TEST_F(Program, MakesAMapOfARecordingAndSaysWhatItSaw) {
+  const TemporaryFolder folder;
+  const auto in = [&](const char* name) { return folder / name; };
+  const std::string yaml = scenario_in(folder.path(), map());
+  const Result fly = run(fmt::format(
+      "fly {} -o {} --record {} --record {}", yaml, in("run"), in("run.mcap"), in("run.bag")));
+  ASSERT_EQ(fly.code, 0) << fly.err;
+  expect_user_error(run(fmt::format("map import --scans {} -o {}", in("run.mcap"), in("x.pfmap"))),
+                    "choose one by --scan-topic");
+  expect_user_error(run(fmt::format("map import --scans {0} --scan-topic /drone0/mid360/points "
+                                    "--resolution 0.1 -o {0} --force",
+                                    in("run.mcap"))),
+                    "run.mcap");
+  for (const char* recording : {"run.mcap", "run.bag"}) {
+    const Result made =
+        run(fmt::format("map import --scans {} --scan-topic /drone0/mid360/points "
+                        "--resolution 0.1 -o {} --force",
+                        in(recording),
+                        in("seen.pfmap")));
+    ASSERT_EQ(made.code, 0) << made.err;
+    expect_contains(made.err, "poses of /drone0/odom (drone0/base_link in world)");
+    // what it shows stands in the map that was flown through
+    const Result diff = run(fmt::format("map diff {} {} --json", in("seen.pfmap"), map()));
+    const Json only = Json::parse(diff.out)["only_in_first"];
+    EXPECT_GT(only["surfels"].get<int>(), 5000);
+    EXPECT_LT(only["share"].get<double>(), 0.002) << diff.out;
+  }
+  const Json info = Json::parse(
+      run(fmt::format("map info {} --json --at 2,5,-3 --at 0,0,99", in("seen.pfmap"))).out);
+  EXPECT_GT(info["known_space"]["share"].get<double>(), 0.1);
+  EXPECT_FALSE(info["at"][0]["known"].get<bool>()) << "below the ground";
+  // a point for each return, marked or not
+  const std::string scan = "--pose 5,5,2,0,0,0 -o " + in("scan.pcd");
+  const Result marked = run(fmt::format("scan {} {} --mark-unknown", in("seen.pfmap"), scan));
+  ASSERT_EQ(marked.code, 0) << marked.err;
+  expect_contains(marked.out, "came through space that no survey saw");
+  expect_contains(read_file(in("scan.pcd")), "label unknown\n");
+  expect_user_error(run(fmt::format("scan {} {} --mark-unknown --force", map(), scan)),
+                    "map import --scans");
+}
+
+TEST_F(Program, MarksOfUnknownSpaceGoOutOnRosAndIntoTheFolder) {
+  const TemporaryFolder folder;
+  const auto in = [&](const char* name) { return folder / name; };
+  const std::string yaml = scenario_in(folder.path(), map());
+  ASSERT_EQ(run(fmt::format("fly {} -o {} --record {}", yaml, in("run"), in("a.mcap"))).code, 0);
+  ASSERT_EQ(run(fmt::format("map import --scans {} --scan-topic /drone0/mid360/points "
+                            "--resolution 0.1 -o {}",
+                            in("a.mcap"),
+                            in("seen.pfmap")))
+                .code,
+            0);
+  const std::string ros =
+      "duration: 0.5\nros:\n  outputs:\n    - {kind: cloud, topic: /p, layout: xyzit_unknown}\n";
+  const std::string head = "map: seen.pfmap\nvehicle: {start: [2, 5, 2]}\nlidars:\n";
+  write_file(in("marks.yaml"), head + "  - {model: mid360, mark_unknown: true}\n" + ros);
+  write_file(in("plain.yaml"), head + "  - {model: mid360}\n" + ros);
+  expect_user_error(
+      run(fmt::format("fly {} -o {} --record {}", in("plain.yaml"), in("x"), in("x.mcap"))),
+      "mark_unknown: true");
+  const Result fly =
+      run(fmt::format("fly {} -o {} --record {}", in("marks.yaml"), in("b"), in("b.mcap")));
+  ASSERT_EQ(fly.code, 0) << fly.err;
+  expect_contains(read_file(in("b/scans/0_000000.pcd")), "label unknown\n");
+}
+
 TEST_F(Program, RecordsAFlightAndSaysWhatIsInIt) {
   const TemporaryFolder folder;
   const std::string yaml = scenario_in(folder.path(), map());

@@ -101,6 +101,10 @@ TEST_F(Program, FitsAMapToTheScansItWasMadeOf) {
   ASSERT_EQ(fit.code, 0) << fit.err;
   EXPECT_NE(fit.err.find("% right"), std::string::npos) << fit.err;
   EXPECT_TRUE(std::filesystem::exists(folder / "ghosts.pcd"));
+  expect_user_error(
+      run(fmt::format(
+          "map fit {} {} --format pcd -o {}", folder / "bare.pfmap", scans, folder / "x.pfmap")),
+      "--format is for clouds");
   const Result info = run(fmt::format("map info {} --json --verify", folder / "fit.pfmap"));
   ASSERT_EQ(info.code, 0) << info.err;
   EXPECT_NE(info.out.find("rays of 15 scans"), std::string::npos) << info.out;

@@ -152,6 +152,78 @@ TEST(Lidar, DropsReturnsNearerThanItsMinimum) {
   }
 }
 
+TEST(Lidar, SharedBeamsGiveTheSameScans) {
+  ShapeScene scene;
+  scene.add_box({-6, -6, -2}, {6, 6, 4});
+  const auto renderer = make_renderer("beam", Scene{map_of(scene, 0.2)});
+  const PoseTrack still;
+  const Executor executor(2);
+  for (const char* model : {"mid360", "os1_32"}) {
+    const LidarSettings settings = load_lidar(model);
+    const auto beams = std::make_shared<const ScanBeams>(settings);
+    const Lidar first(settings, 0, beams);
+    const Lidar second(settings, 1, beams);
+    const Lidar alone(settings, 1);
+    // in any order, also of scans that are not kept any more
+    for (const std::uint64_t index : {0u, 5u, 2u, 3u, 0u, 3u}) {
+      ScanRequest request;
+      request.index = index;
+      EXPECT_GT(first.take(request, still, *renderer, executor).points.size(), 0u);
+      const Scan shared = second.take(request, still, *renderer, executor);
+      const Scan own = alone.take(request, still, *renderer, executor);
+      ASSERT_EQ(shared.points.size(), own.points.size()) << model;
+      for (std::size_t i = 0; i < own.points.size(); ++i) {
+        ASSERT_EQ(shared.points[i].range, own.points[i].range);
+        ASSERT_EQ(shared.points[i].beam, own.points[i].beam);
+        ASSERT_EQ(shared.points[i].time_offset, own.points[i].time_offset);
+      }
+    }
+  }
+}
+
+TEST(Lidar, MarksWhatCameThroughSpaceThatNoSurveySaw) {
+  ShapeScene scene;
+  scene.add_box({-6, -6, -2}, {6, 6, 4});
+  const auto renderer = make_renderer("beam", Scene{map_of(scene, 0.1)});
+  const Lidar lidar(exact_lidar("mid360"), 0);
+  Aabb box;
+  box.add({-7, -7, -3});
+  box.add({7, 7, 5});
+  KnownSpaceBuilder builder(box, 0.1, 1000000);
+  builder.add([](const Vector3d& p) { return p.y() < 0.0; });  // half of the room
+  const auto section = builder.section();
+  const auto known = KnownSpace::from_section(section);
+  ScanRequest request;
+  const PoseTrack still(Pose{Quaterniond::Identity(), {0.0, -1.0, 0.0}});
+  const Scan plain = lidar.take(request, still, *renderer, Executor(2));
+  request.known = &*known;
+  const Scan marked = lidar.take(request, still, *renderer, Executor(2));
+  EXPECT_FALSE(plain.marks_unknown);
+  EXPECT_TRUE(marked.marks_unknown);
+  ASSERT_EQ(marked.points.size(), plain.points.size());
+  std::size_t unknown = 0;
+  for (std::size_t i = 0; i < marked.points.size(); ++i) {
+    EXPECT_EQ(marked.points[i].range, plain.points[i].range);
+    const float y = marked.points[i].position_sensor.y() - 1.0f;
+    unknown += marked.points[i].is_unknown ? 1 : 0;
+    const bool is_beside = y > -0.1f && y < 0.3f;
+    EXPECT_TRUE(is_beside || marked.points[i].is_unknown == (y > 0.0f)) << y;
+  }
+  EXPECT_GT(unknown, marked.points.size() / 5);
+  // in files, and back
+  const testing::TemporaryFolder folder;
+  write_scan_pcd(folder / "s.pcd", marked);
+  testing::expect_contains(testing::read_file(folder / "s.pcd"), "ring label unknown\n");
+  const auto beams = lidar.beams(0, Executor(1));
+  const auto back = read_scan_points(folder / "s.pcd", beams, true);
+  ASSERT_EQ(back.size(), marked.points.size());
+  for (std::size_t i = 0; i < back.size(); ++i) {
+    EXPECT_EQ(back[i].is_unknown, marked.points[i].is_unknown);
+  }
+  testing::expect_contains(
+      testing::error_of([&] { read_scan_points(folder / "s.pcd", beams, false); }), "no scan");
+}
+
 TEST(Scan, PcdHasAllFields) {
   const testing::TemporaryFolder folder;
   Scan scan;

@@ -137,6 +137,53 @@ TEST(SurfelScales, AThinWallIsTightAndItsEdgeWhereItIs) {
   }
 }
 
+TEST(MergedCells, StandForTheMiddleOfAPlaneAndNotForItsEdge) {
+  for (const double noise : {0.0, 0.004}) {
+    SCOPED_TRACE(noise);
+    ShapeScene scene;
+    scene.add_rectangle({3, -2, -2}, {0, 4, 0}, {0, 0, 4});
+    std::vector<CloudPoint> points;
+    scene.sample(12.0 / (0.05 * 0.05), noise, 3, [&](const Vector3d& p) {
+      points.push_back({p, 7.0f});
+    });
+    ImportOptions options;
+    options.resolution = 0.05;
+    const ImportedMap imported = import_points(points, options);
+    const ImportReport& report = imported.report;
+    // noise leaves steps between the cells' planes
+    EXPECT_GT(report.merged_surfels, report.surfels / (noise > 0.0 ? 8 : 3));
+    EXPECT_LT(report.surfels, noise > 0.0 ? 3 * report.cells / 4 : report.cells / 2);
+    EXPECT_EQ(report.wide_surfels, 0u);
+    EXPECT_NEAR(report.points_per_cell, 12.0, 3.0) << "as if none were merged";
+    const auto map = SurfelMap::from_bytes(map_bytes(imported.tree, imported.description), "wall");
+    const auto renderer = make_renderer("beam", Scene{map});
+    const RandomStream random(9, StreamId::kTest, 0);
+    for (std::uint64_t i = 0; i < testing::repeats(std::uint64_t{20000}); ++i) {
+      const auto [u, v] = random.uniform2(i);
+      const auto trace = [&](const Vector3d& at) {
+        return renderer->trace({Vector3d::Zero(), at.normalized().cast<float>(), 10.0f});
+      };
+      const Vector3d inside(3.0, 3.9 * u - 1.95, 3.9 * v - 1.95);
+      const Hit hit = trace(inside);
+      ASSERT_TRUE(hit.is_return()) << inside.transpose();
+      EXPECT_NEAR(static_cast<double>(hit.range), inside.norm(), 0.002 + noise);
+      EXPECT_FALSE(trace({3.0, 2.06, 3.8 * v - 1.9}).is_return());
+    }
+  }
+}
+
+TEST(MergedCells, BentSurfacesAndCornersKeepTheirCells) {
+  ShapeScene round;
+  round.shapes.emplace_back(Cone{{0, 0, 0}, {0, 0, 5}, 0.6, 0.6});
+  ShapeScene crates;  // all within three wide cells of an edge
+  for (int i = 0; i < 6; ++i) crates.add_box({i * 1.0, 0, 0}, {i * 1.0 + 0.4, 0.4, 0.4});
+  for (const ShapeScene& scene : {round, crates}) {
+    ImportOptions options;
+    options.resolution = 0.1;
+    EXPECT_EQ(import_points(points_of(scene, 30.0, 0.1), options).report.merged_surfels, 0u);
+  }
+}
+
 TEST(SmallCells, TakeTheCellsPointsAndNoOthers) {
   ShapeScene scene;
   for (int i = 0; i < 10; ++i) {

@@ -74,7 +74,7 @@ TEST(Import, OnlyWhereASurfaceGoesOnSurfelsAreWidened) {
       ++edge_count;
     }
   });
-  ASSERT_GT(within_count, 250u);
+  ASSERT_GT(within_count, 80u);  // most stand for four cells
   ASSERT_GT(edge_count, 50u);
   EXPECT_GT(within / static_cast<double>(within_count), 1.1 / 12.0);
   EXPECT_LT(at_edge / static_cast<double>(edge_count), 1.0 / 12.0);

@@ -32,6 +32,7 @@ Scan scan_of_three() {
     p.intensity = 100.0f + 100.0f * k;
     p.time_offset = std::chrono::microseconds(500 + 40000 * i);
     p.ring = static_cast<std::uint16_t>(i);
+    p.is_unknown = i == 1;
     scan.points.push_back(p);
   }
   return scan;
@@ -83,6 +84,9 @@ TEST(PointLayouts, FieldsLieWhereDriversPutThem) {
   EXPECT_EQ(text("hesai"), "x:7@0 y:7@4 z:7@8 intensity:7@16 timestamp:8@24 ring:4@32 48");
   EXPECT_EQ(text("xyzi"), "x:7@0 y:7@4 z:7@8 intensity:7@12 16");
   EXPECT_EQ(text("xyzi_padded"), "x:7@0 y:7@4 z:7@8 intensity:7@16 32");
+  EXPECT_EQ(text("xyzi_unknown"), "x:7@0 y:7@4 z:7@8 intensity:7@12 unknown:2@16 17");
+  EXPECT_EQ(text("xyzit_unknown"),
+            "x:7@0 y:7@4 z:7@8 intensity:7@12 t:6@16 ring:4@20 unknown:2@22 23");
   EXPECT_EQ(text("xyz_padded"), "x:7@0 y:7@4 z:7@8 16");
   expect_contains(error_of([] { point_layout("velo"); }), "velodyne_padded");
 }
@@ -112,6 +116,7 @@ TEST(PointLayouts, HoldTheScan) {
       const double after = 0.04 * static_cast<double>(i);
       or_absent("intensity", intensity, 0.0);
       or_absent("ring", static_cast<double>(i), 0.0);
+      or_absent("unknown", i == 1 ? 1.0 : 0.0, 0.0);
       or_absent("line", static_cast<double>(i), 0.0);
       or_absent("tag", 16.0, 0.0);
       or_absent("time", after, 1e-8);

@@ -1,3 +1,4 @@
+// Files of poses: TUM's and KITTI's.
 #pragma once
 
 #include <string>
@@ -19,7 +20,14 @@ struct TumPose {
 /// InputError with file and line.
 std::vector<TumPose> read_tum(const std::string& path);
 
-/// Writes one, with a head line.
+/// Reads KITTI's poses, rows of the twelve numbers of R | t, which have no times. Lines that start
+/// with # are comments. Throws InputError with file and line.
+std::vector<Pose> read_kitti(const std::string& path);
+
+/// True where the file's first row has twelve words: KITTI's.
+bool is_kitti(const std::string& path);
+
+/// Writes a TUM trajectory, with a head line.
 void write_tum(OutputFile file, const std::vector<TumPose>& poses);
 
 }  // namespace pointflight
