@@ -51,7 +51,7 @@ nlohmann::ordered_json to_json(const std::vector<FidelityRow>& rows) {
   return json;
 }
 
-void print_report(const FidelityReport& report) {
+void print_fidelity(const FidelityReport& report) {
   kTable.print_heading();
   kTable.print_row("all", report.all);
   kTable.print_row("interior", report.interior);
@@ -151,7 +151,7 @@ void run_scene(const ExactScene& scene,
                                               name);
         if (!flags.json) {
           fmt::print("{}\n", title);
-          print_report(report);
+          print_fidelity(report);
         }
         cases.push_back({{"scene", scene.name},
                          {"resolution", resolution},

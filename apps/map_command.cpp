@@ -80,7 +80,7 @@ struct PlaceInfo {
   std::optional<bool> known;  ///< Nothing where the map does not say.
 };
 
-std::vector<PlaceInfo> places_of(const SurfelMap& map, const std::vector<std::string>& points) {
+std::vector<PlaceInfo> places_at(const SurfelMap& map, const std::vector<std::string>& points) {
   std::vector<PlaceInfo> places;
   for (const std::string& text : points) {
     const Vector3d point(parse_numbers(text, 3, "--at").data());
@@ -117,7 +117,7 @@ void print_places(const std::vector<PlaceInfo>& places) {
 }
 
 void print_info(const SurfelMap& map, const InfoFlags& flags) {
-  const std::vector<PlaceInfo> places = places_of(map, flags.points);
+  const std::vector<PlaceInfo> places = places_at(map, flags.points);
   const KnownSpace* known = map.known_space();
   std::uint64_t planar = 0;
   std::uint64_t surfels = 0;

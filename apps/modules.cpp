@@ -15,7 +15,7 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Where a module's library may lie: in a build and where it is installed.
-std::vector<fs::path> places_of(const std::string& name) {
+std::vector<fs::path> places_for(const std::string& name) {
   std::error_code error;
   const fs::path program = fs::read_symlink("/proc/self/exe", error);
   const fs::path root = program.parent_path().parent_path();
@@ -31,7 +31,7 @@ std::vector<fs::path> places_of(const std::string& name) {
 template <class Module>
 const Module& load(const std::string& name, const std::string& what, const std::string& packages) {
   std::string reason = "this build has none";
-  for (const fs::path& path : places_of(name)) {
+  for (const fs::path& path : places_for(name)) {
     // stays loaded: what it made lives until the program ends
     void* library = dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL);
     if (library == nullptr) {
@@ -49,7 +49,7 @@ const Module& load(const std::string& name, const std::string& what, const std::
 }  // namespace
 
 bool has_module(const std::string& name) {
-  return !places_of(name).empty();
+  return !places_for(name).empty();
 }
 
 const Ros1Module& ros1_module() {

@@ -13,7 +13,7 @@
 namespace pointflight::apps {
 namespace {
 
-constexpr double kRightMargin = 24.0;
+constexpr double kRightRoom = 24.0;
 
 struct AngleRange {
   double azimuth_min = 180.0, azimuth_max = -180.0;
@@ -189,10 +189,10 @@ std::unique_ptr<Canvas> lidar_page(const LidarSettings& lidar) {
                    kCurve,
                    {0.0, kLong, "time (s)", Steps::kDecimal},
                    {0.0, 100.0, "covered (%)", Steps::kDecimal}};
-  auto canvas = std::make_unique<Canvas>(
-      static_cast<int>(std::max(curve.right(), left + 460.0) + kRightMargin),
-      static_cast<int>(curve.bottom() + kBottomRoom + 12.0),
-      kPaper);
+  auto canvas =
+      std::make_unique<Canvas>(static_cast<int>(std::max(curve.right(), left + 460.0) + kRightRoom),
+                               static_cast<int>(curve.bottom() + kBottomRoom + 12.0),
+                               kPaper);
   canvas->text_within(left,
                       28.0,
                       lidar.title.empty() ? lidar.path : lidar.title,

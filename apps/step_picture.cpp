@@ -11,8 +11,8 @@ namespace {
 
 constexpr double kWidth = 430.0;  // of a panel's plot, pixels
 constexpr double kHeight = 150.0;
-constexpr double kLeft = kLeftRoom + 6.0;
-constexpr double kGap = 78.0;
+constexpr double kPlotLeft = kLeftRoom + 6.0;
+constexpr double kRowGap = 78.0;
 constexpr double kTop = 92.0;
 constexpr double kMargin = 24.0;
 constexpr double kHighest = 1.4;  // of the step
@@ -60,12 +60,12 @@ void draw_step_responses(const VehicleSettings& vehicle,
                          const std::vector<StepResponse>& responses,
                          const std::string& path) {
   const std::size_t rows = (responses.size() + 1) / 2;
-  const double column_width = kLeft + kWidth;
+  const double column_width = kPlotLeft + kWidth;
   Canvas canvas(static_cast<int>(2.0 * column_width + kMargin),
-                static_cast<int>(kTop + static_cast<double>(rows) * (kHeight + kGap)),
+                static_cast<int>(kTop + static_cast<double>(rows) * (kHeight + kRowGap)),
                 kPaper);
-  const double room = 2.0 * column_width - kLeft;
-  canvas.text_within(kLeft, 30.0, vehicle.title, kTitleText, room, kInk);
+  const double room = 2.0 * column_width - kPlotLeft;
+  canvas.text_within(kPlotLeft, 30.0, vehicle.title, kTitleText, room, kInk);
   const auto stroke = [](double width, Color color) {
     return [=](Canvas& c, double x, double y) { c.line({{x, y}, {x + 24.0, y}}, width, color); };
   };
@@ -73,15 +73,15 @@ void draw_step_responses(const VehicleSettings& vehicle,
       canvas,
       {{fmt::format("flown ({})", vehicle.controller.kind->name), 24.0, stroke(2.0, kFlown)},
        {"the loop's design by itself, without rotor lag", 24.0, stroke(1.5, kDesign)}},
-      kLeft,
+      kPlotLeft,
       50.0,
       room);
   for (std::size_t i = 0; i < responses.size(); ++i) {
     const std::size_t row = i / 2;
     draw_panel(canvas,
                responses[i],
-               kLeft + static_cast<double>(i % 2) * column_width,
-               kTop + static_cast<double>(row) * (kHeight + kGap));
+               kPlotLeft + static_cast<double>(i % 2) * column_width,
+               kTop + static_cast<double>(row) * (kHeight + kRowGap));
   }
   canvas.save(path);
 }

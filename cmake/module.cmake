@@ -28,6 +28,10 @@ function(pointflight_module name)
   endif()
   file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/${ARG_FOLDER}/*.cpp)
   add_library(pointflight_${name} STATIC ${sources})
+  # Highway includes a kernel's source once per instruction set
+  set(kernels ${sources})
+  list(FILTER kernels INCLUDE REGEX "_kernel\\.cpp$")
+  set_source_files_properties(${kernels} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
   add_library(pointflight::${name} ALIAS pointflight_${name})
   set_target_properties(pointflight_${name} PROPERTIES EXPORT_NAME ${name}
                                                        POSITION_INDEPENDENT_CODE ON)

@@ -12,13 +12,13 @@ namespace {
 constexpr std::size_t kMostSteps = 20000;  // of a definition that nests itself, or of long arrays
 constexpr int kMostDepth = 32;
 
-struct Field {
+struct MessageField {
   std::string type, name;
   bool is_array = false;
   std::optional<std::size_t> length;  ///< Of an array; nothing: it has its length in front.
 };
 /// Fields of each type, "" for the message itself.
-using Types = std::map<std::string, std::vector<Field>>;
+using Types = std::map<std::string, std::vector<MessageField>>;
 
 std::string trimmed(const std::string& text) {
   const auto first = text.find_first_not_of(" \t\r");
@@ -32,13 +32,13 @@ std::string package_of(const std::string& type) {
 }
 
 /// "float64[3] kx # gains" as a field; nothing for comments and constants.
-std::optional<Field> field_of(std::string line, const std::string& package) {
+std::optional<MessageField> field_of(std::string line, const std::string& package) {
   line = trimmed(line.substr(0, line.find('#')));
   const auto space = line.find_first_of(" \t");
   if (line.empty() || space == std::string::npos || line.find('=') != std::string::npos) {
     return std::nullopt;
   }
-  Field field;
+  MessageField field;
   field.type = line.substr(0, space);
   field.name = trimmed(line.substr(space));
   const auto bracket = field.type.find('[');
@@ -99,7 +99,7 @@ class Walk {
   bool message(const std::string& type, const std::string& prefix, bool keep, int depth) {
     const auto fields = types_.find(type);
     if (fields == types_.end() || depth > kMostDepth) return false;
-    for (const Field& field : fields->second) {
+    for (const MessageField& field : fields->second) {
       if (!this->field(
               field, prefix.empty() ? field.name : prefix + "." + field.name, keep, depth)) {
         return false;
@@ -112,7 +112,7 @@ class Walk {
   std::map<std::string, double> numbers;
 
  private:
-  bool field(const Field& field, const std::string& name, bool keep, int depth) {
+  bool field(const MessageField& field, const std::string& name, bool keep, int depth) {
     if (!field.is_array) return one(field.type, name, keep, depth);
     std::uint64_t length = 0;
     if (field.length) {

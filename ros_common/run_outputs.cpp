@@ -16,7 +16,7 @@ namespace {
 using Per = OutputType::Per;
 
 constexpr std::size_t kMapPointsMax = 1'000'000;
-constexpr double kSurfaceSpacing = 0.1;    // m between points on obstacles
+constexpr double kObstacleSpacing = 0.1;   // m between points on obstacles
 constexpr double kCollisionRadius = 0.15;  // m
 constexpr msg::ColorRGBA kObstacleColor{0.55f, 0.25f, 0.65f, 0.8f};
 constexpr msg::ColorRGBA kCollisionColor{0.85f, 0.1f, 0.1f, 0.9f};
@@ -175,7 +175,7 @@ msg::MarkerArray obstacle_markers(const OutputStream& stream, const ObstacleSamp
 msg::PointCloud2 obstacle_points(const OutputStream& stream, const ObstacleSample& sample) {
   std::vector<Vector3f> points;
   for (const auto& [label, pose, shape] : sample.obstacles) {
-    append_surface(shape, pose, kSurfaceSpacing, points);
+    append_surface(shape, pose, kObstacleSpacing, points);
   }
   return points_message(stream, points, sample.time);
 }

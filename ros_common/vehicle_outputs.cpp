@@ -7,8 +7,8 @@ namespace pointflight {
 namespace {
 
 constexpr std::size_t kPathPosesMax = 2000;
-constexpr double kSurfaceSpacing = 0.1;  // m between points on a hull
-constexpr double kRpm = 30.0 / kPi;      // of a rad/s
+constexpr double kHullSpacing = 0.1;  // m between points on a hull
+constexpr double kRpm = 30.0 / kPi;   // of a rad/s
 constexpr msg::ColorRGBA kVehicleColor{0.0f, 0.45f, 0.70f, 0.9f};
 
 // lockstep runs in bursts: what comes between two scans must fit
@@ -86,7 +86,7 @@ class VehicleCloud : public Output {
     std::vector<Vector3f> points;
     append_surface(stream_.ros.run.vehicles[odometry->vehicle].shape,
                    odometry->state.T_world_body(),
-                   kSurfaceSpacing,
+                   kHullSpacing,
                    points);
     stream_.send(points_message(stream_, points, odometry->time), odometry->time);
   }

@@ -19,7 +19,7 @@
 namespace pointflight {
 namespace {
 
-constexpr std::size_t kPage = 4096;
+constexpr std::size_t kMemoryPage = 4096;
 
 std::string error_text(int error) {
   return std::generic_category().message(error);
@@ -89,9 +89,9 @@ void on_bus_error(int signal, siginfo_t* info, void* /*context*/) {
   for (Mapping& mapping : mappings().list) {
     const std::uintptr_t begin = mapping.begin;
     if (begin == 0 || address < begin || address >= mapping.end) continue;
-    const std::uintptr_t page = address / kPage * kPage;
+    const std::uintptr_t page = address / kMemoryPage * kMemoryPage;
     if (::mmap(reinterpret_cast<void*>(page),
-               kPage,
+               kMemoryPage,
                PROT_READ,
                MAP_PRIVATE | MAP_ANONYMOUS | MAP_FIXED,
                -1,
@@ -200,7 +200,7 @@ void MappedFile::will_read_sequentially() const {
 }
 
 void MappedFile::release_before(std::size_t offset) const {
-  const std::size_t length = offset / kPage * kPage;
+  const std::size_t length = offset / kMemoryPage * kMemoryPage;
   if (data_ != nullptr && length > 0 && length <= size_) {
     ::madvise(const_cast<std::byte*>(data_), length, MADV_DONTNEED);
   }

@@ -24,7 +24,7 @@ std::string list_text(const std::vector<double>& values) {
   return fmt::format("[{}]", fmt::join(texts, ", "));
 }
 
-std::string range_text(const Key& key) {
+std::string interval_text(const Key& key) {
   const bool low = std::isfinite(key.min);
   const bool high = std::isfinite(key.max);
   if (low && high) return fmt::format("{} .. {}", key.min, key.max);
@@ -143,10 +143,10 @@ void SettingsTable::row(const Key& key, const std::string& value, const std::str
 }
 
 void SettingsTable::value(const Key& key, double& value) {
-  row(key, number_text(value), range_text(key));
+  row(key, number_text(value), interval_text(key));
 }
 void SettingsTable::value(const Key& key, std::int64_t& value) {
-  row(key, fmt::format("{}", value), range_text(key));
+  row(key, fmt::format("{}", value), interval_text(key));
 }
 void SettingsTable::value(const Key& key, bool& value) {
   row(key, value ? "true" : "false", "true, false");
@@ -155,10 +155,10 @@ void SettingsTable::value(const Key& key, std::string& value) {
   row(key, value, "text");
 }
 void SettingsTable::value(const Key& key, Eigen::Vector3d& value) {
-  row(key, vector_text(value), range_text(key));
+  row(key, vector_text(value), interval_text(key));
 }
 void SettingsTable::value(const Key& key, std::vector<double>& value) {
-  row(key, list_text(value), range_text(key));
+  row(key, list_text(value), interval_text(key));
 }
 void SettingsTable::value(const Key& key, std::vector<Eigen::Vector3d>& value) {
   row(key, value.empty() ? "[]" : "", "list of [x, y, z]");

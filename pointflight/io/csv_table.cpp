@@ -12,7 +12,7 @@
 namespace pointflight {
 namespace {
 
-std::string_view trimmed(std::string_view text) {
+std::string_view unquoted(std::string_view text) {
   const std::size_t begin = text.find_first_not_of(" \t\"");
   if (begin == std::string_view::npos) return {};
   return text.substr(begin, text.find_last_not_of(" \t\"") - begin + 1);
@@ -22,7 +22,7 @@ std::vector<std::string_view> cells_of(std::string_view line) {
   std::vector<std::string_view> cells;
   for (;;) {
     const std::size_t comma = line.find(',');
-    cells.push_back(trimmed(line.substr(0, comma)));
+    cells.push_back(unquoted(line.substr(0, comma)));
     if (comma == std::string_view::npos) return cells;
     line.remove_prefix(comma + 1);
   }
@@ -43,7 +43,7 @@ void CsvTable::parse(std::string_view text) {
   LineCursor lines(text);
   std::string_view line;
   while (lines.next(line)) {
-    if (trimmed(line).empty() || trimmed(line).front() == '#') continue;
+    if (unquoted(line).empty() || unquoted(line).front() == '#') continue;
     const auto cells = cells_of(line);
     if (names_.empty()) {
       for (const std::string_view cell : cells) {

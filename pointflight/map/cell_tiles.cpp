@@ -6,12 +6,12 @@
 namespace pointflight {
 namespace {
 
-using Voxel = std::array<std::int32_t, 3>;
+using SignedVoxel = std::array<std::int32_t, 3>;
 
 struct VoxelBox {
-  Voxel min;
-  Voxel max;  // exclusive
-  [[nodiscard]] bool meets(const Voxel& low, std::int32_t width) const {
+  SignedVoxel min;
+  SignedVoxel max;  // exclusive
+  [[nodiscard]] bool meets(const SignedVoxel& low, std::int32_t width) const {
     bool meets = true;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       meets = meets && low[axis] < max[axis] && low[axis] + width > min[axis];
@@ -23,7 +23,7 @@ struct VoxelBox {
 constexpr int kTileBits = CellTile::kKeyBits / 3;
 
 /// Low corner of the aligned cube of 2^bits voxels a side around a voxel.
-Voxel corner_of(Voxel voxel, int bits) {
+SignedVoxel corner_of(SignedVoxel voxel, int bits) {
   for (std::int32_t& x : voxel) x = x >> bits << bits;
   return voxel;
 }
@@ -39,9 +39,9 @@ Iterator first_behind(Iterator at, Iterator end, const Predicate& holds) {
   return std::partition_point(at, at + std::min(step, end - at), holds);
 }
 
-Voxel low_voxel(std::uint64_t tile_key) {
+SignedVoxel low_voxel(std::uint64_t tile_key) {
   const auto decoded = morton_decode(tile_key);
-  Voxel voxel{};
+  SignedVoxel voxel{};
   for (std::size_t axis = 0; axis < 3; ++axis) {
     voxel[axis] = static_cast<std::int32_t>(decoded[axis]) * CellTile::kWidth - kMaxVoxel;
   }
@@ -76,7 +76,7 @@ TileView CellTiles::view(std::size_t tile, std::int32_t halo) const {
   const CellTile& middle = tiles_[tile];
   TileView view{tile, VoxelGrid(frame_), middle.count(), middle.begin, {}};
   for (const VoxelCell& cell : cells_of(middle)) view.grid.add(cell);
-  const Voxel low = low_voxel(middle.key);
+  const SignedVoxel low = low_voxel(middle.key);
   VoxelBox reach{};
   for (std::size_t axis = 0; axis < 3; ++axis) {
     reach.min[axis] = low[axis] - halo;
@@ -105,9 +105,9 @@ TileView CellTiles::view(std::size_t tile, std::int32_t halo) const {
     for (const std::int32_t dy : {-1, 0, 1}) {
       for (const std::int32_t dz : {-1, 0, 1}) {
         if (dx == 0 && dy == 0 && dz == 0) continue;
-        const Voxel there = {low[0] + dx * CellTile::kWidth,
-                             low[1] + dy * CellTile::kWidth,
-                             low[2] + dz * CellTile::kWidth};
+        const SignedVoxel there = {low[0] + dx * CellTile::kWidth,
+                                   low[1] + dy * CellTile::kWidth,
+                                   low[2] + dz * CellTile::kWidth};
         bool inside = true;
         for (const std::int32_t x : there) inside = inside && x >= -kMaxVoxel && x < kMaxVoxel;
         if (!inside) continue;

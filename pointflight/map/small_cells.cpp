@@ -8,7 +8,7 @@ namespace {
 
 constexpr double kEnough = 4.0;  // points per small cell
 
-using Voxel = std::array<std::int32_t, 3>;
+using SignedVoxel = std::array<std::int32_t, 3>;
 
 /// Voxels by bricks of 4 x 4 x 4: some are wanted, and what lies around those is looked at.
 class VoxelSet {
@@ -19,17 +19,18 @@ class VoxelSet {
     std::uint64_t around = 0;
   };
 
-  void add_wanted(const Voxel& voxel) {
+  void add_wanted(const SignedVoxel& voxel) {
     brick_at(voxel).wanted |= bit(voxel);
     for (std::int32_t i = 0; i < 27; ++i) {
-      const Voxel near = {voxel[0] + i % 3 - 1, voxel[1] + i / 3 % 3 - 1, voxel[2] + i / 9 - 1};
+      const SignedVoxel near = {
+          voxel[0] + i % 3 - 1, voxel[1] + i / 3 % 3 - 1, voxel[2] + i / 9 - 1};
       brick_at(near).around |= bit(near);
     }
   }
-  [[nodiscard]] bool is_wanted(const Voxel& voxel) const {
+  [[nodiscard]] bool is_wanted(const SignedVoxel& voxel) const {
     return (slots_[slot_of(key_of(voxel))].wanted & bit(voxel)) != 0;
   }
-  [[nodiscard]] bool is_around(const Voxel& voxel) const {
+  [[nodiscard]] bool is_around(const SignedVoxel& voxel) const {
     return (slots_[slot_of(key_of(voxel))].around & bit(voxel)) != 0;
   }
   [[nodiscard]] bool empty() const { return count_ == 0; }
@@ -37,12 +38,12 @@ class VoxelSet {
  private:
   static constexpr std::uint64_t kNone = ~0ull;
 
-  static std::uint64_t key_of(const Voxel& voxel) {
+  static std::uint64_t key_of(const SignedVoxel& voxel) {
     constexpr std::uint64_t kMask = (1u << 21) - 1;
     const auto part = [](std::int32_t v) { return static_cast<std::uint64_t>(v >> 2) & kMask; };
     return part(voxel[0]) | part(voxel[1]) << 21 | part(voxel[2]) << 42;
   }
-  static std::uint64_t bit(const Voxel& voxel) {
+  static std::uint64_t bit(const SignedVoxel& voxel) {
     const int place = (voxel[0] & 3) | (voxel[1] & 3) << 2 | (voxel[2] & 3) << 4;
     return std::uint64_t{1} << place;
   }
@@ -52,7 +53,7 @@ class VoxelSet {
     while (slots_[slot].key != kNone && slots_[slot].key != key) slot = (slot + 1) & mask;
     return slot;
   }
-  Brick& brick_at(const Voxel& voxel) {
+  Brick& brick_at(const SignedVoxel& voxel) {
     const std::uint64_t key = key_of(voxel);
     std::size_t slot = slot_of(key);
     if (slots_[slot].key == kNone) {
@@ -83,7 +84,7 @@ struct SmallCells::Chosen {
   template <class Visit>
   void for_each_split(std::span<const VoxelCell> small, const Visit& visit) const {
     for (std::size_t begin = 0, end = 0; begin < small.size(); begin = end) {
-      const Voxel voxel = wider_voxel(small[begin].voxel);
+      const SignedVoxel voxel = wider_voxel(small[begin].voxel);
       double n = 0.0;
       for (end = begin; end < small.size() && wider_voxel(small[end].voxel) == voxel; ++end) {
         n += small[end].n;

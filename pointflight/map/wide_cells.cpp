@@ -9,7 +9,7 @@
 namespace pointflight {
 namespace {
 
-constexpr double kWidest = 0.45;       // m
+constexpr double kWidestCell = 0.45;   // m
 constexpr int kDoublingsMax = 3;       // wider ones are more than a surfel's 1.8 r
 constexpr std::uint32_t kPlane = 4;    // points of a wide cell
 constexpr double kThin = 3.5;          // points per cell
@@ -230,7 +230,7 @@ WideSurfels surfels_of_wide_cells(const CellTiles& cells,
   };
   std::size_t most = 0;
   const int doublings = sparse.any() ? kDoublingsMax : 1;  // planes are merged once
-  for (int i = 0; i < doublings && below(levels.size()).resolution() <= 0.5 * kWidest; ++i) {
+  for (int i = 0; i < doublings && below(levels.size()).resolution() <= 0.5 * kWidestCell; ++i) {
     Level level;
     level.cells = wider_cells(below(levels.size()), executor, scratch);
     level.children.assign(level.cells.count(), 0);

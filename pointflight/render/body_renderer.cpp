@@ -13,7 +13,7 @@
 namespace pointflight {
 namespace {
 
-constexpr std::size_t kChunk = 2048;  // rays
+constexpr std::size_t kRaysPerChunk = 2048;  // rays
 constexpr std::size_t kLanes = 8;
 constexpr std::size_t kManyBodies = 200;  // from here on sorted rays are worth their sorting
 
@@ -142,7 +142,7 @@ class Directions {
   }
 
   std::span<const std::uint32_t> order_;
-  std::array<float, kChunk> x_{}, y_{}, z_{};
+  std::array<float, kRaysPerChunk> x_{}, y_{}, z_{};
   std::vector<Block> blocks_;
 };
 
@@ -233,7 +233,7 @@ void render_bodies(const RayBatch& batch, std::span<Hit> hits, const Executor& e
   const std::vector<Cone> cones = cones_of(batch);
   if (cones.empty()) return;
   const std::vector<std::uint32_t> order = ray_order(batch, cones.size(), executor);
-  executor.parallel_for(order.size(), kChunk, [&](std::size_t begin, std::size_t end) {
+  executor.parallel_for(order.size(), kRaysPerChunk, [&](std::size_t begin, std::size_t end) {
     const Directions directions(batch.rays, std::span(order).subspan(begin, end - begin));
     std::vector<std::uint32_t> candidates;
     for (const Cone& cone : cones) {

@@ -14,45 +14,46 @@
 namespace pointflight {
 namespace {
 
-constexpr Named<CommandKind> kKinds[] = {{CommandKind::kRotorSpeeds, "rotor_speeds"},
-                                         {CommandKind::kBodyRates, "body_rates"},
-                                         {CommandKind::kAttitude, "attitude"},
-                                         {CommandKind::kAcceleration, "acceleration"},
-                                         {CommandKind::kVelocity, "velocity"},
-                                         {CommandKind::kPosition, "position"},
-                                         {CommandKind::kPolynomial, "polynomial"},
-                                         {CommandKind::kBSpline, "b_spline"},
-                                         {CommandKind::kWaypoint, "waypoint"},
-                                         {CommandKind::kTakeOff, "take_off"},
-                                         {CommandKind::kLand, "land"},
-                                         {CommandKind::kHover, "hover"},
-                                         {CommandKind::kArm, "arm"},
-                                         {CommandKind::kDisarm, "disarm"}};
-constexpr double kFar = kFarthest;
+constexpr Named<CommandKind> kCommandKinds[] = {{CommandKind::kRotorSpeeds, "rotor_speeds"},
+                                                {CommandKind::kBodyRates, "body_rates"},
+                                                {CommandKind::kAttitude, "attitude"},
+                                                {CommandKind::kAcceleration, "acceleration"},
+                                                {CommandKind::kVelocity, "velocity"},
+                                                {CommandKind::kPosition, "position"},
+                                                {CommandKind::kPolynomial, "polynomial"},
+                                                {CommandKind::kBSpline, "b_spline"},
+                                                {CommandKind::kWaypoint, "waypoint"},
+                                                {CommandKind::kTakeOff, "take_off"},
+                                                {CommandKind::kLand, "land"},
+                                                {CommandKind::kHover, "hover"},
+                                                {CommandKind::kArm, "arm"},
+                                                {CommandKind::kDisarm, "disarm"}};
 
 }  // namespace
 
 void describe(SettingsVisitor& v, CommandSettings& s) {
   v.value({"time", "s", "when it is given", 0, 1e6}, s.time);
-  v.choice({"kind", "", "what is commanded"}, s.kind, kKinds);
+  v.choice({"kind", "", "what is commanded"}, s.kind, kCommandKinds);
   // the keys of each kind
   const auto for_kinds = [&](std::initializer_list<CommandKind> kinds, const auto& keys) {
     const bool holds = std::find(kinds.begin(), kinds.end(), s.kind) != kinds.end();
     std::vector<std::string_view> names;
-    for (const CommandKind kind : kinds) names.push_back(name_in(kKinds, kind));
+    for (const CommandKind kind : kinds) names.push_back(name_in(kCommandKinds, kind));
     v.only_if(holds, fmt::format("kind: {}", fmt::join(names, ", ")), keys);
   };
   const bool has_vector = s.kind == CommandKind::kAcceleration ||
                           s.kind == CommandKind::kVelocity || s.kind == CommandKind::kPosition ||
                           s.kind == CommandKind::kWaypoint;
-  v.only_if(
-      has_vector,
-      "kind: acceleration, velocity, position, waypoint; body_rates has rates_deg",
-      [&](SettingsVisitor& w) {
-        w.value(
-            {"vector", "", "acceleration m/s^2, velocity m/s, position or waypoint m", -kFar, kFar},
-            s.vector);
-      });
+  v.only_if(has_vector,
+            "kind: acceleration, velocity, position, waypoint; body_rates has rates_deg",
+            [&](SettingsVisitor& w) {
+              w.value({"vector",
+                       "",
+                       "acceleration m/s^2, velocity m/s, position or waypoint m",
+                       -kFarthest,
+                       kFarthest},
+                      s.vector);
+            });
   for_kinds({CommandKind::kBodyRates}, [&](SettingsVisitor& w) {
     w.value({"rates_deg", "deg/s", "about the body's axes", -36000, 36000}, s.rates_deg);
   });

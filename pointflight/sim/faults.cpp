@@ -9,11 +9,11 @@
 namespace pointflight {
 namespace {
 
-constexpr Named<FaultKind> kKinds[] = {{FaultKind::kRotor, "rotor"},
-                                       {FaultKind::kLidar, "lidar"},
-                                       {FaultKind::kImu, "imu"},
-                                       {FaultKind::kOdometryDelay, "odometry_delay"},
-                                       {FaultKind::kScanDrop, "scan_drop"}};
+constexpr Named<FaultKind> kFaultKinds[] = {{FaultKind::kRotor, "rotor"},
+                                            {FaultKind::kLidar, "lidar"},
+                                            {FaultKind::kImu, "imu"},
+                                            {FaultKind::kOdometryDelay, "odometry_delay"},
+                                            {FaultKind::kScanDrop, "scan_drop"}};
 constexpr Named<ImuAxis> kAxes[] = {{ImuAxis::kGyroX, "gyro_x"},
                                     {ImuAxis::kGyroY, "gyro_y"},
                                     {ImuAxis::kGyroZ, "gyro_z"},
@@ -37,7 +37,7 @@ void describe(SettingsVisitor& v, FaultSettings& s) {
             "",
             "a rotor that loses speed, a dead lidar, a stuck IMU axis, late odometry, lost scans"},
            s.kind,
-           kKinds);
+           kFaultKinds);
   v.value({"from", "s", "when it starts", 0, 1e6}, s.from);
   v.value({"until", "s", "when it ends; 0: never", 0, 1e6}, s.until);
   const auto is = [&](FaultKind kind) { return s.kind == kind; };
@@ -75,7 +75,7 @@ void check(const FaultSettings& s,
 }
 
 std::string_view to_string(FaultKind kind) {
-  return name_in(kKinds, kind);
+  return name_in(kFaultKinds, kind);
 }
 
 double Faults::rotor_share(std::size_t rotor, SimTime time) const {

@@ -19,7 +19,6 @@ constexpr Named<LowBatteryReaction> kLowBattery[] = {{LowBatteryReaction::kLand,
                                                      {LowBatteryReaction::kReport, "report"}};
 constexpr Named<YawMode> kYawModes[] = {{YawMode::kAlongPath, "along_path"},
                                         {YawMode::kFixed, "fixed"}};
-constexpr double kFar = kFarthest;
 
 Key required(Key key) {
   key.required = true;
@@ -51,7 +50,7 @@ void describe_mission(SettingsVisitor& v, MissionSettings& s) {
   v.choice({"yaw", "", "turn to the next waypoint, or keep the heading"}, s.yaw, kYawModes);
   v.value({"yaw_rate_deg", "deg/s", "greatest rate while turning", 1, 720}, s.yaw_rate_deg);
   v.value({"hold", "s", "rest at each waypoint", 0, 3600}, s.hold);
-  v.value({"waypoints", "m", "straight legs between them", -kFar, kFar}, s.waypoints);
+  v.value({"waypoints", "m", "straight legs between them", -kFarthest, kFarthest}, s.waypoints);
 }
 
 void describe_limits(SettingsVisitor& v, LimitSetup& s) {
@@ -65,12 +64,12 @@ void describe_limits(SettingsVisitor& v, LimitSetup& s) {
 void describe_airframe(SettingsVisitor& v, VehicleSetup& s) {
   v.value({"name", "", "of its files and topics; empty: drone0, drone1, ..."}, s.name);
   v.value({"model", "", "name of a shipped vehicle, or a path"}, s.model);
-  v.value({"start", "m", "where it hovers at first", -kFar, kFar}, s.start);
+  v.value({"start", "m", "where it hovers at first", -kFarthest, kFarthest}, s.start);
   v.value({"start_yaw_deg", "deg", "heading at first, from x towards y", -360, 360},
           s.start_yaw_deg);
   v.value({"landed", "", "start with rotors off, carried by the ground"}, s.landed);
   v.value({"copies", "", "so many alike, each with its own number", 1, 1000}, s.copies);
-  v.value({"copy_offset", "m", "of start and waypoints, from copy to copy", -kFar, kFar},
+  v.value({"copy_offset", "m", "of start and waypoints, from copy to copy", -kFarthest, kFarthest},
           s.copy_offset);
   v.value({"seed", "", "of its sensors and gusts; -1: the run's", -1, 9e15}, s.seed);
   v.choice({"on_collision", "", "go on, end the run, or fall with rotors off"},

@@ -14,8 +14,8 @@
 namespace pointflight {
 namespace {
 
-constexpr double kLongest = 1e6;  // s
-constexpr double kLargest = 1e9;  // of any coefficient or coordinate
+constexpr double kLongest = 1e6;             // s
+constexpr double kLargestCoefficient = 1e9;  // of any coefficient or coordinate
 
 /// Value and first three derivatives of a polynomial.
 std::array<double, 4> derivatives_at(const std::vector<double>& coefficients, double t) {
@@ -41,9 +41,11 @@ PolynomialTrajectory::PolynomialTrajectory(std::vector<Piece> pieces) : pieces_(
     }
     for (const auto& axis : piece.coefficients) {
       for (const double c : axis) {
-        if (!(std::abs(c) <= kLargest)) {
-          throw InputError(fmt::format(
-              "piece {} of the trajectory: {} is not a number up to {:g}", i, c, kLargest));
+        if (!(std::abs(c) <= kLargestCoefficient)) {
+          throw InputError(fmt::format("piece {} of the trajectory: {} is not a number up to {:g}",
+                                       i,
+                                       c,
+                                       kLargestCoefficient));
         }
       }
     }
@@ -124,9 +126,9 @@ BSplineTrajectory::BSplineTrajectory(std::vector<Eigen::Vector4d> points,
                     p + 1));
   }
   for (const auto& point : points) {
-    if (!(point.cwiseAbs().maxCoeff() <= kLargest)) {
-      throw InputError(
-          fmt::format("a point of the B-spline has a number beyond {:g}, or none", kLargest));
+    if (!(point.cwiseAbs().maxCoeff() <= kLargestCoefficient)) {
+      throw InputError(fmt::format("a point of the B-spline has a number beyond {:g}, or none",
+                                   kLargestCoefficient));
     }
   }
   for (std::size_t i = 0; i < knots.size(); ++i) {
@@ -164,9 +166,9 @@ std::shared_ptr<const BSplineTrajectory> BSplineTrajectory::read(const std::stri
                                 table.at(row, columns[1]),
                                 table.at(row, columns[2]),
                                 yaw < 0 ? 0.0 : kDegree * table.at(row, yaw));
-    if (!(point.cwiseAbs().maxCoeff() <= kLargest)) {
-      throw InputError(
-          fmt::format("{}: a number is missing or beyond {:g}", table.place(row), kLargest));
+    if (!(point.cwiseAbs().maxCoeff() <= kLargestCoefficient)) {
+      throw InputError(fmt::format(
+          "{}: a number is missing or beyond {:g}", table.place(row), kLargestCoefficient));
     }
     points.push_back(point);
   }
