@@ -96,6 +96,10 @@ struct RealMap {
   double length;  ///< Of the flight, m.
 };
 
+void PrintTo(const RealMap& map, std::ostream* out) {
+  *out << map.name;
+}
+
 class RealFlight : public ::testing::TestWithParam<RealMap> {};
 
 TEST_P(RealFlight, ImportsScansAndFliesWithoutACollision) {

@@ -169,8 +169,8 @@ TEST_F(Program, FallingBehindIsSaidWhileItHappens) {
   text.replace(text.find("duration: 0"), 11, "duration: 90000");
   write_file(yaml, text);
   // no machine flies a thousand seconds in one
-  const Result result =
-      run(fmt::format("fly {} -o {} --rate 1000", yaml, folder / "run"), "timeout -s INT 4");
+  const Result result = run(fmt::format("fly {} -o {} --rate 1000", yaml, folder / "run"),
+                            "timeout --foreground -s INT 4");
   expect_contains(result.err, "s behind: this machine manages a rate of");
   expect_contains(result.err, ", not 1000; use fewer LiDARs");
 }
@@ -311,7 +311,7 @@ TEST_F(Program, AnInterruptClosesTheFilesAndEnds130) {
              fmt::format("map: {}\nduration: 100\nvehicle:\n  start: [12, 10, 4]\n", map()));
   const Result result =
       run(fmt::format("fly {} -o {} --rate 1.0", folder / "s.yaml", folder / "run"),
-          "timeout --preserve-status -s INT 2");
+          "timeout --foreground --preserve-status -s INT 2");
   EXPECT_EQ(result.code, 130) << result.err;
   const auto summary = nlohmann::json::parse(read_file(folder / "run/summary.json"));
   EXPECT_EQ(summary["end"], "interrupted");

@@ -233,9 +233,10 @@ TEST_F(MapEdit, ACloudFromStandardInput) {
   expect_user_error(run(fmt::format("map import - -o {}", folder / "c.pfmap"), "true |"),
                     "nothing came");
   expect_user_error(run(fmt::format("map import - - -o {}", folder / "c.pfmap"), feed), "once");
-  // a signal is heard while nothing comes
-  const Result ended =
-      run(fmt::format("map import - -o {}", folder / "c.pfmap"), "sleep 20 | timeout -s INT 1");
+  // a signal is heard while nothing comes; in the foreground timeout sends no SIGCONT, which would
+  // stop the leak sanitizer in its tracks
+  const Result ended = run(fmt::format("map import - -o {}", folder / "c.pfmap"),
+                           "sleep 20 | timeout --foreground -s INT 1");
   EXPECT_EQ(ended.err, "pointflight: interrupted\n");
   EXPECT_FALSE(std::filesystem::exists(folder / "c.pfmap"));
   EXPECT_FALSE(std::filesystem::exists(folder / "c.pfmap.partial"));

@@ -349,7 +349,7 @@ TEST_F(Program, AnInterruptedImportLeavesNothing) {
   const Result import = run(
       fmt::format(
           "map import {0} {0} {0} -o {1} --resolution 0.02", folder / "f.pcd", folder / "f.pfmap"),
-      "timeout --preserve-status -s INT 0.3");
+      "timeout --foreground --preserve-status -s INT 0.3");
   EXPECT_EQ(import.code, 130) << import.err;
   EXPECT_FALSE(std::filesystem::exists(folder / "f.pfmap"));
   EXPECT_FALSE(std::filesystem::exists(folder / "f.pfmap.partial"));

@@ -35,6 +35,10 @@ struct Recorded {
   std::uint64_t beams_1e5, beams_1e6, beams_1e7;
 };
 
+void PrintTo(const Recorded& recorded, std::ostream* out) {
+  *out << recorded.scene;
+}
+
 constexpr Recorded kRecorded[] = {{"hall",
                                    7884902245680859279u,
                                    16360955782611061052u,

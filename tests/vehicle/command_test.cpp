@@ -82,6 +82,10 @@ struct Case {
   const char* controller;
 };
 
+void PrintTo(const Case& c, std::ostream* out) {
+  *out << c.vehicle << '_' << c.controller;
+}
+
 class Levels : public ::testing::TestWithParam<Case> {};
 
 TEST_P(Levels, FollowTheirDesignPassedThroughTheRotors) {
