@@ -78,7 +78,7 @@ TEST_F(Program, SurveysASceneAndFitsItsMapToTheRays) {
 std::string survey_the_room(const TemporaryFolder& folder) {
   write_file(folder / "room.csv", room_csv());
   const Result made =
-      run(fmt::format("fidelity {0}/room.csv --survey --seconds 0.5 --poses 1 --resolution 0.2 "
+      run(fmt::format("fidelity {0}/room.csv --survey --seconds 1 --poses 1 --resolution 0.2 "
                       "--survey-out {0}/survey",
                       folder.path()));
   EXPECT_EQ(made.code, 0) << made.err;
@@ -107,7 +107,7 @@ TEST_F(Program, FitsAMapToTheScansItWasMadeOf) {
       "--format is for clouds");
   const Result info = run(fmt::format("map info {} --json --verify", folder / "fit.pfmap"));
   ASSERT_EQ(info.code, 0) << info.err;
-  EXPECT_NE(info.out.find("rays of 5 scans"), std::string::npos) << info.out;
+  EXPECT_NE(info.out.find("rays of 10 scans"), std::string::npos) << info.out;
 }
 
 TEST_F(Program, MakesAMapOfScans) {
