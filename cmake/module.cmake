@@ -16,6 +16,10 @@ function(pointflight_target_options target)
     # false alarms of gcc 12 inside Eigen and libstdc++ at -O3
     target_compile_options(${target} PRIVATE -Wno-maybe-uninitialized -Wno-array-bounds
                                              -Wno-stringop-overflow -Wno-restrict)
+    if(CMAKE_UNITY_BUILD)
+      # takes the sources of a batch for headers, where a hidden part of a class must not be local
+      target_compile_options(${target} PRIVATE -Wno-subobject-linkage)
+    endif()
   endif()
 endfunction()
 
