@@ -64,39 +64,6 @@ Pose PoseTrack::at(SimTime time) const {
   return has_mount_ ? body() * mount_ : body();
 }
 
-/// Interpolates as `interpolate` does, but what is mounted instead of what carries it: both are
-/// linear in the quaternion, which is made a unit one afterwards.
-Pose PoseTrack::Cursor::at(SimTime time) {
-  if ((time < from_ || time >= to_) && !moved_between_records(time)) return track_->at(time);
-  const double share = static_cast<double>((time - from_).count()) * per_nanosecond_;
-  Pose pose;
-  pose.rotation.coeffs() = rotation_ + share * turn_;
-  pose.rotation.coeffs() *= 1.0 / pose.rotation.norm();
-  pose.translation = body_ + share * shift_ - pose.rotation * body_in_sensor_;
-  return pose;
-}
-
-/// False where no two records lie around the time.
-bool PoseTrack::Cursor::moved_between_records(SimTime time) {
-  const std::vector<TimedPose>& r = *track_->records_;
-  if (time < r.front().time || time >= r.back().time) return false;
-  const auto after = std::upper_bound(
-      r.begin(), r.end(), time, [](SimTime t, const TimedPose& p) { return t < p.time; });
-  const TimedPose& a = *(after - 1);
-  const TimedPose& b = *after;
-  from_ = a.time;
-  to_ = b.time;
-  per_nanosecond_ = 1.0 / static_cast<double>((to_ - from_).count());
-  const Quaterniond first = a.pose.rotation * track_->mount_.rotation;
-  const Quaterniond last = b.pose.rotation * track_->mount_.rotation;
-  rotation_ = first.coeffs();
-  turn_ = (first.dot(last) < 0.0 ? -1.0 : 1.0) * last.coeffs() - rotation_;
-  body_ = a.pose.translation;
-  shift_ = b.pose.translation - body_;
-  body_in_sensor_ = track_->mount_.inverse().translation;
-  return true;
-}
-
 double PoseTrack::speed_max(SimTime from, SimTime until) const {
   double most = 0.0;
   for (std::size_t i = 1; i < records_->size(); ++i) {

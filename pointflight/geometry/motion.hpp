@@ -28,8 +28,6 @@ class PoseTrack {
   /// Throws std::invalid_argument.
   explicit PoseTrack(std::vector<TimedPose> records, bool repeats = false);
 
-  class Cursor;
-
   /// The same motion, of something that sits on what moves.
   [[nodiscard]] PoseTrack with_mount(const Pose& T_body_sensor) const;
 
@@ -51,27 +49,6 @@ class PoseTrack {
   Pose mount_;
   bool has_mount_ = false;
   bool repeats_ = false;
-};
-
-/// Reads a track at times of which each lies near the one before: a third of what PoseTrack::at
-/// costs, the same poses but for rounding. For one thread; the track outlives it.
-class PoseTrack::Cursor {
- public:
-  /// Before the first time.
-  explicit Cursor(const PoseTrack& track) : track_(&track) {}
-  /// T_world_body, or T_world_sensor with a mount.
-  [[nodiscard]] Pose at(SimTime time);
-
- private:
-  bool moved_between_records(SimTime time);
-
-  const PoseTrack* track_;
-  // between two records, of what sits on the mount; none at first
-  SimTime from_ = SimTime::max(), to_ = SimTime::min();
-  double per_nanosecond_ = 0.0;
-  Eigen::Vector4d rotation_ = Eigen::Vector4d::Zero(), turn_ = Eigen::Vector4d::Zero();
-  Vector3d body_ = Vector3d::Zero(), shift_ = Vector3d::Zero();
-  Vector3d body_in_sensor_ = Vector3d::Zero();
 };
 
 /// Straight ahead at constant speed without turning; between walls it runs to and fro.

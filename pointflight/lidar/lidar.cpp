@@ -44,8 +44,8 @@ float measured(float range,
   return sigma > 0.0 ? static_cast<float>(r + sigma * normals(beam)) : range;
 }
 
-/// Written out: a product of Eigen's, or of a quaternion, takes thrice as long with the baseline's
-/// pairs of numbers.
+/// Written out: with Eigen's products by the quaternion, in the baseline's pairs of numbers, this
+/// took 8 % of a swarm's time instead of 3 %.
 Vector3d turned(const Matrix3d& m, const Vector3f& v) {
   const double x = static_cast<double>(v.x());
   const double y = static_cast<double>(v.y());
@@ -124,14 +124,13 @@ std::vector<Ray> Lidar::rays_of(std::span<const Beam> beams,
   std::vector<Ray> rays(beams.size());
   const auto range_max = static_cast<float>(settings_.range_max);
   executor.parallel_for(beams.size(), kChunk, [&](std::size_t begin, std::size_t end) {
-    PoseTrack::Cursor track(T_world_sensor);
     Vector3d position = middle.translation;
     Matrix3d rotation = middle.rotation.toRotationMatrix();
     Duration pose_time{-1};
     for (std::size_t i = begin; i < end; ++i) {
       if (!snapshot && beams[i].time_offset != pose_time) {
         pose_time = beams[i].time_offset;
-        const Pose pose = track.at(start + pose_time);
+        const Pose pose = T_world_sensor.at(start + pose_time);
         position = pose.translation;
         rotation = pose.rotation.toRotationMatrix();
       }

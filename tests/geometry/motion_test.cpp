@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include "pointflight/core/constants.hpp"
-#include "pointflight/core/random.hpp"
 #include "pointflight/geometry/rotation.hpp"
 
 namespace pointflight {
@@ -32,45 +31,6 @@ TEST(Motions, TracksAreKeptAndMounted) {
                       (track.at(at(3)) * Pose{Quaterniond::Identity(), {1, 1, 0}}).translation));
   // bits as without one
   EXPECT_EQ(track.with_mount({}).at(at(2.3)).translation, track.at(at(2.3)).translation);
-}
-
-TEST(Motions, CursorsReadWhatTheTrackSays) {
-  const RandomStream random(7, StreamId::kTest, 0);
-  std::uint64_t draw = 0;
-  const auto symmetric = [&] { return 2.0 * random.uniform(draw++) - 1.0; };
-  const auto vector = [&] {
-    const double x = symmetric();
-    const double y = symmetric();
-    const double z = symmetric();
-    return Vector3d(x, y, z);
-  };
-  std::vector<TimedPose> records;
-  for (int i = 0; i < 20; ++i) {
-    Quaterniond q = quaternion_from_rotation_vector(3.0 * vector());
-    if (i % 3 == 0) q.coeffs() *= -1.0;  // the same rotation
-    records.push_back({at(0.1 * i + 0.04 * symmetric()), {q, 50.0 * vector()}});
-  }
-  const Pose mount{quaternion_from_rpy(0.3, -1.0, 2.0), {0.1, -0.2, 0.3}};
-  const PoseTrack body(records);
-  for (const PoseTrack& track : {body,
-                                 body.with_mount(mount),
-                                 PoseTrack(records, true).with_mount(mount),
-                                 PoseTrack(mount)}) {
-    PoseTrack::Cursor cursor(track);
-    for (int i = -200; i < 2500; ++i) {
-      // mostly ahead; now and then back or far away; the records' own instants as well
-      const SimTime time = i % 50 == 7   ? at(2.2 * random.uniform(draw++))
-                           : i % 50 == 9 ? records[static_cast<std::size_t>(i + 200) % 20].time
-                                         : at(1e-3 * i);
-      const Pose wanted = track.at(time);
-      const Pose got = cursor.at(time);
-      EXPECT_LT((got.translation - wanted.translation).norm(), 1e-13 * 50) << i;
-      EXPECT_LT((got.rotation.coeffs() - wanted.rotation.coeffs()).norm() *
-                    (got.rotation.coeffs() + wanted.rotation.coeffs()).norm(),
-                1e-14 * 2)
-          << i;
-    }
-  }
 }
 
 TEST(Motions, RepeatAndTurnBack) {
