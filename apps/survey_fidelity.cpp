@@ -74,8 +74,11 @@ void print_survey_report(const std::string& title, const SurveyReport& report) {
     if (statistics->rays > 0) kSurveyTable.print_row(name, *statistics);
   }
   if (report.foliage.rays > 0) {
-    fmt::print("foliage: distributions of ranges in patches of 2 degrees lie {:.2f} m apart\n",
-               report.foliage_distance);
+    fmt::print(
+        "foliage: distributions of ranges in patches of 2 degrees lie {:.2f} m apart; those of "
+        "true beams 0.1 degrees beside {:.2f} m\n",
+        report.foliage_distance,
+        report.foliage_distance_beside);
   }
   fmt::print("\n");
 }
@@ -95,7 +98,7 @@ std::shared_ptr<const SurfelMap> bare_map(
 void judge(const std::shared_ptr<const SurfelMap>& map,
            const ExactScene& scene,
            const SceneBeams& beams,
-           const SurveyedPlaces& seen,
+           const SeenSurfaces& seen,
            const SurveyFlags& flags,
            const OwnRays* own,
            const Executor& executor,
@@ -141,6 +144,7 @@ void judge(const std::shared_ptr<const SurfelMap>& map,
       row[label] = kSurveyTable.json(*statistics);
     }
     row["foliage_distance"] = report.foliage_distance;
+    row["foliage_distance_beside"] = report.foliage_distance_beside;
     if (own != nullptr) row["own_rays_right"] = own->right_share();
     cases.push_back(std::move(row));
   }
@@ -187,7 +191,7 @@ void measure_surveyed(const ExactScene& scene,
       make_survey(scene, tree, load_lidar(flags.lidar), flags.walk, executor, progress);
   if (!flags.out.empty()) write_out(scene, survey, flags, progress);
   const SceneBeams beams = beams_beside(scene, tree, survey, flags, executor, progress);
-  const SurveyedPlaces seen = places_of([&] { return rays_of(survey); });
+  const SeenSurfaces seen = surfaces_of([&] { return rays_of(survey); });
   for (const auto& resolution : flags.resolutions) {
     ImportOptions options;
     options.resolution = resolution;

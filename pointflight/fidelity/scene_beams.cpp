@@ -146,16 +146,18 @@ class Caster {
       plane = normal.dot(p - o);
       beam.range = static_cast<float>(met->range);
       beam.cos_incidence = static_cast<float>(std::min(1.0, std::abs(normal.dot(d))));
+      beam.normal_world = (normal.dot(d) > 0.0 ? Vector3d(-normal) : normal).cast<float>();
       beam.tag = scene_.shape_tag[met->shape];
     }
     const auto [u, v] = across(d);
     for (int i = 0; i < 16 && !beam.silhouette; ++i) {
-      // eight directions on the rim, eight half-way between them
-      const auto angle = math::sincos((0.25 * i + (i < 8 ? 0.0 : 0.125)) * kPi);
-      const double offset = i < 8 ? kBeside : 0.5 * kBeside;
+      // eight directions half-way to the rim, eight on it between them
+      const auto angle = math::sincos((0.25 * i + (i < 8 ? 0.125 : 0.0)) * kPi);
+      const double offset = i < 8 ? 0.5 * kBeside : kBeside;
       const Vector3d beside = (d + offset * (angle.cos * u + angle.sin * v)).normalized();
       const auto there = tree_.intersect(o, beside);
       const bool also = there && there->range <= reach;
+      if (i == 0 && also) beam.range_beside = static_cast<float>(there->range);
       if (!returns || !also) {
         beam.silhouette = returns != also;
         continue;

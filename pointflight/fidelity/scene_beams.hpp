@@ -33,9 +33,11 @@ std::optional<BeamPlan> table_beams(const std::string& name);
 struct TrueBeam {
   Ray ray;                     ///< World; ends at the plan's range_max.
   float range = -1.0f;         ///< m; negative where it meets nothing within its range.
+  float range_beside = -1.0f;  ///< m; what a beam 0.1 degrees beside it meets; negative: nothing.
   float cos_incidence = 0.0f;  ///< |cos| of the angle to the surface normal.
-  std::uint16_t tag = 0;       ///< Of the shape met.
-  bool silhouette = false;     ///< A range jump lies within 0.2 degrees.
+  Vector3f normal_world = Vector3f::Zero();  ///< Of the surface met, towards the sensor.
+  std::uint16_t tag = 0;                     ///< Of the shape met.
+  bool silhouette = false;                   ///< A range jump lies within 0.2 degrees.
 };
 
 /// All beams of a plan in a scene.

@@ -19,34 +19,32 @@ using Cell = std::array<std::int64_t, 3>;
 struct Patch {
   std::vector<float> truth;
   std::vector<float> rendered;
-  std::size_t foliage = 0;  ///< Beams that meet some.
+  std::vector<float> beside;  ///< In truth, of other beams.
+  std::size_t foliage = 0;    ///< Beams that meet some.
 };
 
 using Patches = std::map<Cell, Patch>;
 
 /// Area between the distributions of two equally long lists, m.
-double range_distance(Patch& patch) {
-  float farthest = 0.0f;
-  for (const auto* ranges : {&patch.truth, &patch.rendered}) {
-    farthest = std::max(farthest, *std::max_element(ranges->begin(), ranges->end()));
-  }
-  for (auto* ranges : {&patch.truth, &patch.rendered}) {
+double range_distance(std::vector<float> a, std::vector<float> b) {
+  const float farthest =
+      std::max(*std::max_element(a.begin(), a.end()), *std::max_element(b.begin(), b.end()));
+  for (auto* ranges : {&a, &b}) {
     for (float& range : *ranges) range = range < 0.0f ? farthest : range;
     std::sort(ranges->begin(), ranges->end());
   }
   double sum = 0.0;
-  for (std::size_t i = 0; i < patch.truth.size(); ++i) {
-    sum += static_cast<double>(std::abs(patch.truth[i] - patch.rendered[i]));
-  }
-  return sum / static_cast<double>(patch.truth.size());
+  for (std::size_t i = 0; i < a.size(); ++i) sum += static_cast<double>(std::abs(a[i] - b[i]));
+  return sum / static_cast<double>(a.size());
 }
 
-double foliage_distance(Patches& patches) {
+/// Mean of the patches that show foliage.
+double foliage_distance(const Patches& patches, std::vector<float> Patch::*ranges) {
   double sum = 0.0;
   std::size_t count = 0;
-  for (auto& [place, patch] : patches) {
+  for (const auto& [place, patch] : patches) {
     if (2 * patch.foliage < patch.truth.size()) continue;
-    sum += range_distance(patch);
+    sum += range_distance(patch.truth, patch.*ranges);
     ++count;
   }
   return count > 0 ? sum / static_cast<double>(count) : 0.0;
@@ -62,7 +60,7 @@ bool is_foliage(const std::string& tag) {
 
 SurveyReport measure_survey(const ExactScene& scene,
                             const SceneBeams& beams,
-                            const SurveyedPlaces& surveyed,
+                            const SeenSurfaces& surveyed,
                             const Renderer& renderer,
                             const Executor& executor) {
   SurveyReport report;
@@ -84,6 +82,7 @@ SurveyReport measure_survey(const ExactScene& scene,
                             floor_to_integer(math::asin(std::clamp(d.z(), -1.0, 1.0)) / kPatch)}];
     patch.truth.push_back(beam.range);
     patch.rendered.push_back(rendered);
+    patch.beside.push_back(beam.range_beside);
     patch.foliage += leafy ? 1 : 0;
     if (beam.range < 0.0f) {
       sky.add_empty(rendered >= 0.0f);
@@ -92,7 +91,7 @@ SurveyReport measure_survey(const ExactScene& scene,
     std::optional<double> range;
     if (rendered >= 0.0f) range = static_cast<double>(rendered);
     const auto truth = static_cast<double>(beam.range);
-    if (!surveyed.has(beam.ray.origin_world + truth * d)) {
+    if (!surveyed.has(beam.ray.origin_world + truth * d, beam.normal_world)) {
       unseen.add(truth, range);
       continue;
     }
@@ -105,7 +104,8 @@ SurveyReport measure_survey(const ExactScene& scene,
   report.foliage = foliage.statistics();
   report.unseen = unseen.statistics();
   report.sky = sky.statistics();
-  report.foliage_distance = foliage_distance(patches);
+  report.foliage_distance = foliage_distance(patches, &Patch::rendered);
+  report.foliage_distance_beside = foliage_distance(patches, &Patch::beside);
   return report;
 }
 

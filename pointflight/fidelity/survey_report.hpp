@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "pointflight/fidelity/scene_beams.hpp"
-#include "pointflight/fit/surveyed_places.hpp"
+#include "pointflight/fidelity/seen_surfaces.hpp"
 
 namespace pointflight {
 
@@ -14,10 +14,13 @@ struct SurveyReport {
   ErrorStatistics inside;         ///< Firm surfaces away from edges.
   ErrorStatistics edge;           ///< Firm surfaces beside a jump in range.
   ErrorStatistics foliage;        ///< Leaves, grass, nets: what lets beams through.
-  ErrorStatistics unseen;         ///< What no scan saw.
+  ErrorStatistics unseen;         ///< What no scan saw: no return near from that side.
   ErrorStatistics sky;            ///< Beams that meet nothing: `false_fraction` counts.
   double foliage_distance = 0.0;  ///< Between distributions of ranges, m.
-  std::vector<float> rendered;    ///< Of each beam, m; negative where nothing was met.
+  /// The same between what the beams meet in truth and what others 0.1 degrees beside them meet: a
+  /// map of a survey whose poses are less exact than that cannot be nearer.
+  double foliage_distance_beside = 0.0;
+  std::vector<float> rendered;  ///< Of each beam, m; negative where nothing was met.
 };
 
 /// True for tags of things that let beams through: leaf, needle, grass, net, bush.
@@ -30,7 +33,7 @@ bool is_foliage(const std::string& tag);
 /// beam without a return counts with the farthest range of its patch, true or rendered.
 SurveyReport measure_survey(const ExactScene& scene,
                             const SceneBeams& beams,
-                            const SurveyedPlaces& surveyed,
+                            const SeenSurfaces& surveyed,
                             const Renderer& renderer,
                             const Executor& executor);
 

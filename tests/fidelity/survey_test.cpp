@@ -167,6 +167,33 @@ TEST(Survey, ThinnedCloudsKeepOnePointOfACube) {
   EXPECT_GT(points, 2000u);
 }
 
+/// Whether rays from in front of a wall at x = 1 show a point on the side with this normal.
+bool is_seen(const Vector3d& point, const Vector3f& normal) {
+  SeenSurfaces seen;
+  seen.add({{0, 0, 0}, Vector3f::UnitX(), 1.0f});
+  seen.add({{0, 0.5, 0}, Vector3f::UnitX(), 1.0f, 0.0f, false});  // no return
+  return seen.has(point, normal);
+}
+
+TEST(SeenSurfaces, AreSeenNearAReturnFromItsSide) {
+  const Vector3f front = -Vector3f::UnitX();
+  EXPECT_TRUE(is_seen({1, 0, 0}, front));
+  EXPECT_TRUE(is_seen({1, 0.06, -0.07}, front));
+  EXPECT_FALSE(is_seen({1, 0.08, 0.08}, front)) << "too far from it";
+  EXPECT_FALSE(is_seen({1.02, 0, 0}, -front)) << "the wall's back";
+  EXPECT_FALSE(is_seen({1, 0.5, 0}, front)) << "a ray without a return shows nothing";
+  EXPECT_FALSE(is_seen({std::nan(""), 0, 0}, front));
+  EXPECT_FALSE(is_seen({1e9, 0, 0}, front));
+}
+
+TEST(SeenSurfaces, OneReturnStandsForOthersOfItsDirectionAlone) {
+  SeenSurfaces seen;
+  seen.add({{0, 0, 0}, Vector3f::UnitX(), 1.0f});
+  seen.add({{2, 0, 0}, -Vector3f::UnitX(), 1.0f});  // the same place from behind
+  EXPECT_TRUE(seen.has({1, 0, 0}, -Vector3f::UnitX()));
+  EXPECT_TRUE(seen.has({1, 0, 0}, Vector3f::UnitX()));
+}
+
 /// The true ranges, moved.
 class TrueRenderer : public Renderer {
  public:
@@ -191,7 +218,7 @@ struct HalfSurveyed {
   SceneTree tree{scene};
   Executor executor{2};
   SceneBeams beams;
-  SurveyedPlaces seen;
+  SeenSurfaces seen;
   std::size_t on_west_wall = 0;
 
   HalfSurveyed() {
@@ -200,10 +227,9 @@ struct HalfSurveyed {
     plan.aimed_beams = 20000;
     beams = cast_exactly(scene, plan, executor);
     for (const TrueBeam& beam : beams.beams) {
-      const Vector3d p = beam.ray.origin_world +
-                         static_cast<double>(beam.range) * beam.ray.direction_world.cast<double>();
-      if (p.x() < 0.01) ++on_west_wall;
-      if (p.x() >= 0.3) seen.add(p);
+      const SurveyRay ray{beam.ray.origin_world, beam.ray.direction_world, beam.range};
+      if (ray.point_world().x() < 0.01) ++on_west_wall;
+      if (ray.point_world().x() >= 0.3) seen.add(ray);
     }
   }
   [[nodiscard]] SurveyReport report(float offset) const {
@@ -227,6 +253,7 @@ TEST(SurveyReport, SaysHowFarRangesAreOff) {
   const SurveyReport exact = half.report(0.0f);
   EXPECT_EQ(exact.all.wrong_fraction, 0.0);
   EXPECT_LT(exact.foliage_distance, 1e-5);
+  EXPECT_GT(exact.foliage_distance_beside, 0.0) << "leaves hide what lies behind them";
   const SurveyReport moved = half.report(0.25f);
   EXPECT_NEAR(moved.foliage_distance, 0.25, 1e-5);
   EXPECT_EQ(moved.inside.wrong_fraction, 1.0);

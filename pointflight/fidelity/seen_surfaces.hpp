@@ -1,0 +1,38 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <unordered_map>
+#include <unordered_set>
+#include <vector>
+
+#include "pointflight/fit/survey_rays.hpp"
+
+namespace pointflight {
+
+/// Which sides of which surfaces a survey has seen. What was seen of a trunk or of a partition from
+/// its front says nothing about its back, however thin it is.
+class SeenSurfaces {
+ public:
+  static constexpr double kNear = 0.1;  ///< m: a return so near has seen a place.
+
+  /// Adds a return; rays without one show no surface.
+  void add(const SurveyRay& ray);
+  /// True where a return lies within `kNear` of the point whose ray met the side that the unit
+  /// normal points away from. Of returns in the same 5 cm from about the same direction the first
+  /// stands for all.
+  [[nodiscard]] bool has(const Vector3d& point_world, const Vector3f& normal_world) const;
+
+ private:
+  struct Return {
+    Vector3f from_cell;        ///< From its cell's corner, m.
+    Vector3f direction_world;  ///< Of the ray.
+  };
+  std::unordered_map<std::uint64_t, std::vector<Return>> cells_;
+  std::unordered_set<std::uint64_t> kept_;  ///< Place and direction of the returns in `cells_`.
+};
+
+/// All that a survey has seen.
+SeenSurfaces surfaces_of(const SurveyOpener& survey);
+
+}  // namespace pointflight
