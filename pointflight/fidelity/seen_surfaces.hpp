@@ -1,9 +1,7 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <unordered_map>
-#include <unordered_set>
 #include <vector>
 
 #include "pointflight/fit/survey_rays.hpp"
@@ -25,11 +23,11 @@ class SeenSurfaces {
 
  private:
   struct Return {
-    Vector3f from_cell;        ///< From its cell's corner, m.
+    Vector3f from_corner;      ///< Of its cell, m.
     Vector3f direction_world;  ///< Of the ray.
+    std::uint8_t kind;         ///< Same place and direction, roughly: one stands for all.
   };
   std::unordered_map<std::uint64_t, std::vector<Return>> cells_;
-  std::unordered_set<std::uint64_t> kept_;  ///< Place and direction of the returns in `cells_`.
 };
 
 /// All that a survey has seen.

@@ -10,9 +10,8 @@
 
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/input_error.hpp"
-#include "pointflight/core/math.hpp"
 #include "pointflight/core/random.hpp"
-#include "pointflight/geometry/morton.hpp"
+#include "pointflight/fit/place_cells.hpp"
 #include "pointflight/geometry/rotation.hpp"
 #include "pointflight/io/pcd_writer.hpp"
 #include "pointflight/io/pose_files.hpp"
@@ -122,7 +121,8 @@ class ThinnedCloud : public CloudReader {
     batch.clear();
     while (batch.empty() && cloud_->read(read_)) {
       for (const CloudPoint& point : read_) {
-        if (kept_.insert(key_of(point.position)).second) batch.push_back(point);
+        if (kept_.insert(place_key(place_cell(point.position, width_))).second)
+          batch.push_back(point);
       }
     }
     return !batch.empty();
@@ -131,14 +131,6 @@ class ThinnedCloud : public CloudReader {
   [[nodiscard]] double share_read() const override { return cloud_->share_read(); }
 
  private:
-  [[nodiscard]] std::uint64_t key_of(const Vector3d& p) const {
-    constexpr std::int64_t kMiddle = 1 << 20;
-    const auto part = [&](double x) {
-      return static_cast<std::uint32_t>(floor_to_integer(x / width_) + kMiddle);
-    };
-    return morton_encode(part(p.x()), part(p.y()), part(p.z()));
-  }
-
   std::unique_ptr<CloudReader> cloud_;
   double width_;
   std::vector<CloudPoint> read_;

@@ -17,8 +17,8 @@ struct SurveyReport {
   ErrorStatistics unseen;         ///< What no scan saw: no return near from that side.
   ErrorStatistics sky;            ///< Beams that meet nothing: `false_fraction` counts.
   double foliage_distance = 0.0;  ///< Between distributions of ranges, m.
-  /// The same between what the beams meet in truth and what others 0.1 degrees beside them meet: a
-  /// map of a survey whose poses are less exact than that cannot be nearer.
+  /// The same between what the beams meet in truth and what others 0.1 degrees beside them meet, as
+  /// a yardstick.
   double foliage_distance_beside = 0.0;
   std::vector<float> rendered;  ///< Of each beam, m; negative where nothing was met.
 };

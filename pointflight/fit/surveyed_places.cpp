@@ -1,29 +1,11 @@
 #include "pointflight/fit/surveyed_places.hpp"
 
-#include <array>
-
-#include "pointflight/core/math.hpp"
-#include "pointflight/geometry/morton.hpp"
+#include "pointflight/fit/place_cells.hpp"
 
 namespace pointflight {
 namespace {
 
 constexpr double kCell = 0.1;  // m
-
-using Cell = std::array<std::int64_t, 3>;
-
-std::uint64_t key_of(const Cell& cell) {
-  constexpr std::int64_t kMiddle = 1 << 20;
-  return morton_encode(static_cast<std::uint32_t>(cell[0] + kMiddle),
-                       static_cast<std::uint32_t>(cell[1] + kMiddle),
-                       static_cast<std::uint32_t>(cell[2] + kMiddle));
-}
-
-Cell cell_of(const Vector3d& p) {
-  return {floor_to_integer(p.x() / kCell),
-          floor_to_integer(p.y() / kCell),
-          floor_to_integer(p.z() / kCell)};
-}
 
 /// Of whole numbers of cells; NaN is not.
 bool is_in_reach(const Vector3d& p) {
@@ -34,15 +16,14 @@ bool is_in_reach(const Vector3d& p) {
 
 void SurveyedPlaces::add(const Vector3d& point_world) {
   if (!is_in_reach(point_world)) return;
-  cells_.insert(key_of(cell_of(point_world)));
+  cells_.insert(place_key(place_cell(point_world, kCell)));
 }
 
 bool SurveyedPlaces::has(const Vector3d& point_world) const {
   if (!is_in_reach(point_world)) return false;
-  const Cell middle = cell_of(point_world);
+  const PlaceCell middle = place_cell(point_world, kCell);
   for (std::int64_t i = 0; i < 27; ++i) {
-    const Cell near = {middle[0] + i % 3 - 1, middle[1] + i / 3 % 3 - 1, middle[2] + i / 9 - 1};
-    if (cells_.contains(key_of(near))) return true;
+    if (cells_.contains(place_key(neighbour(middle, i)))) return true;
   }
   return false;
 }

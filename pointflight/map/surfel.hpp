@@ -34,7 +34,9 @@ inline constexpr float kThicknessClasses[4] = {kPlanarThickness, 0.06f, 0.14f, 0
 /// Steps of s1 and s2 start here, in units of r.
 inline constexpr float kMinSpread = 0.06f;
 
-/// The nearest that eight bytes can say; `center_voxels` must lie in [0, 16).
+/// What eight bytes can say of it: the nearest, but for planar ones (thickness class 0), which may
+/// lie a step beside that within their plane and be turned by some degrees about their normal so
+/// that plane and normal are the best. `center_voxels` must lie in [0, 16).
 SurfelWord encode(const Surfel& surfel);
 /// Axes come out as one of four that stand for the same ellipsoid.
 Surfel decode(SurfelWord word);
