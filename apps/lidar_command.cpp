@@ -39,7 +39,7 @@ void list_lidars(const LidarFlags& flags) {
                       {"path", s.path}});
       continue;
     }
-    fmt::print("{:<12}  {:<9} {:>5.1f} Hz  {:>5.1f} m  {}\n",
+    fmt::print("{:<16}  {:<9} {:>5.1f} Hz  {:>5.1f} m  {}\n",
                name,
                to_string(s.pattern),
                s.rate,

@@ -26,6 +26,8 @@ struct ScanFlags {
   std::uint64_t seed = 1;
   std::uint64_t index = 0;
   bool no_noise = false;
+  bool legacy = false;
+  Surroundings surroundings;
   bool mark_unknown = false;
   std::string output;
   std::string png;
@@ -82,7 +84,8 @@ void take_scan(const ScanFlags& flags) {
   refuse_to_overwrite(flags.png, flags.force);
   const auto map = SurfelMap::open(flags.map);
   const LidarSettings settings = load_lidar(flags.lidar);
-  const Lidar lidar(settings, 0);
+  const Lidar lidar(
+      settings, 0, nullptr, flags.legacy ? std::nullopt : std::optional(flags.surroundings));
   const auto renderer = make_renderer(flags.renderer, Scene{map});
   const Executor executor(flags.threads);
   ScanRequest request;
@@ -96,7 +99,10 @@ void take_scan(const ScanFlags& flags) {
         "extent)");
   }
   if (!flags.output.empty()) write_scan_pcd(flags.output, scan);
-  if (!flags.png.empty()) draw_scan(lidar.beams(flags.index, executor), scan, settings, flags.png);
+  if (!flags.png.empty()) {
+    const std::uint64_t index = lidar.pattern_scan(flags.index, flags.seed);
+    draw_scan(lidar.beams(index, executor), scan, settings, flags.png);
+  }
   print_scan(scan, flags);
 }
 
@@ -120,6 +126,43 @@ void add_scan_command(CLI::App& parent, int& /*exit_code*/) {
   app->add_option("--index", flags->index, "Which scan of a pattern that does not repeat")
       ->check(CLI::Range(0, 1 << 30));
   app->add_flag("--no-noise", flags->no_noise, "Exact ranges");
+  auto* legacy =
+      app->add_flag("--legacy",
+                    flags->legacy,
+                    "All that a beam meets within range_max comes back, with the map's intensity, "
+                    "instead of what the hardware would report by reflectivity, range and sun");
+  app->add_option("--sun", flags->surroundings.sun_klx, "Kilolux: 100 in full sun, 0 at night")
+      ->check(within(0.0, 200.0))
+      ->capture_default_str()
+      ->excludes(legacy);
+  app->add_option("--reflectivity",
+                  flags->surroundings.reflectivity,
+                  "Of surfaces of which the map does not say it")
+      ->check(within(0.001, 1.0))
+      ->capture_default_str()
+      ->excludes(legacy);
+  app->add_option("--reflectivity-per-intensity",
+                  flags->surroundings.reflectivity_per_intensity,
+                  "Of the map's surfaces, per unit of its intensity; 0: not calibrated")
+      ->check(within(0.0, 1e6))
+      ->capture_default_str()
+      ->excludes(legacy);
+  const auto weather = [&](const char* name, const char* help, WeatherKind kind, bool by_rate) {
+    app->add_option_function<double>(
+           name,
+           [flags, kind, by_rate](double figure) {
+             flags->surroundings.weather.kind = kind;
+             (by_rate ? flags->surroundings.weather.rate : flags->surroundings.weather.visibility) =
+                 figure;
+           },
+           help)
+        ->check(by_rate ? within(0.1, 200.0) : within(5.0, 1e5))
+        ->excludes(legacy);
+  };
+  weather("--fog", "Visibility in metres", WeatherKind::kFog, false);
+  weather("--dust", "Visibility in metres", WeatherKind::kDust, false);
+  weather("--rain", "Millimetres per hour", WeatherKind::kRain, true);
+  weather("--snow", "Millimetres of water per hour", WeatherKind::kSnow, true);
   app->add_option("-o,--output",
                   flags->output,
                   "PCD of the points in the sensor frame: x y z intensity range time ring label");

@@ -80,7 +80,7 @@ msg::Imu imu_of(const ImuSample& sample,
   imu.orientation = quaternion_of(sample.q_world_imu);
   imu.angular_velocity = vector_of(sample.gyro);
   imu.angular_velocity_covariance =
-      diagonal(variance_of(settings.gyro_noise_density, settings.rate));
+      diagonal(variance_of(settings.in_use().gyro.noise_density, settings.rate));
   Vector3d accel = sample.accel;
   if (customs.gravity_down) {
     accel -= sample.q_world_imu.conjugate() * Vector3d(0, 0, 2.0 * kGravity);
@@ -88,7 +88,7 @@ msg::Imu imu_of(const ImuSample& sample,
   const double unit = customs.in_g ? kStandardGravity : 1.0;
   imu.linear_acceleration = vector_of(Vector3d(accel / unit));
   imu.linear_acceleration_covariance =
-      diagonal(variance_of(settings.accel_noise_density / unit, settings.rate));
+      diagonal(variance_of(settings.in_use().accel.noise_density / unit, settings.rate));
   return imu;
 }
 

@@ -18,7 +18,7 @@ msg::Imu imu_message(const OutputStream& stream, const ImuSample& sample) {
   const RosProfile& profile = stream.ros.profile;
   return imu_of(sample,
                 stream.of_vehicle().settings.imu,
-                stream.header(sample.time),
+                stream.header(sample.stamp),
                 {profile.imu_unit == ImuUnit::kG, profile.imu_gravity == ImuGravity::kDown});
 }
 

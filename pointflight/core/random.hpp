@@ -17,14 +17,23 @@ enum class StreamId : std::uint32_t {
   kCloudSampling = 7,    ///< points on analytic shapes; entity: shape, index: point
   kMissionSearch = 8,    ///< candidate places in `scenario new`; index: candidate
   // 9: was blocks of a cloud, now a plain hash
-  kScenePoses = 10,    ///< where sensors stand in an exact scene; index: try
-  kAimedBeams = 11,    ///< beams at the targets of a small scene; entity: pose, index: beam
-  kObstacles = 12,     ///< entity: obstacle, index: (times replaced << 12) + draw
-  kGusts = 13,         ///< entity: vehicle, index: physics step * 4 + draw
-  kDroppedScans = 14,  ///< entity: vehicle << 8 | lidar, index: scan
-  kOwnSensors = 15,    ///< of kinds that programs add; entity: vehicle << 8 | sensor
-  kSurvey = 16,        ///< of an exact scene; entity: which draw, index: its number
-  kTest = 1000,        ///< inputs of tests and benchmarks
+  kScenePoses = 10,       ///< where sensors stand in an exact scene; index: try
+  kAimedBeams = 11,       ///< beams at the targets of a small scene; entity: pose, index: beam
+  kObstacles = 12,        ///< entity: obstacle, index: (times replaced << 12) + draw
+  kGusts = 13,            ///< entity: vehicle, index: physics step * 4 + draw
+  kDroppedScans = 14,     ///< entity: vehicle << 8 | lidar, index: scan
+  kOwnSensors = 15,       ///< of kinds that programs add; entity: vehicle << 8 | sensor
+  kSurvey = 16,           ///< of an exact scene; entity: which draw, index: its number
+  kLidarDetection = 17,   ///< entity: vehicle << 8 | lidar, index: scan << 32 | beam
+  kLidarAngle = 18,       ///< of beams' directions; entity and index as above
+  kImuGyroFlicker = 19,   ///< index: (sample * processes + process) * 3 + axis
+  kImuAccelFlicker = 20,  ///< the same
+  kImuTurnOn = 21,        ///< what an IMU has for a whole run; index: what * 3 + axis
+  kImuClock = 22,         ///< index: sample
+  kVibration = 23,        ///< angles that rotors start from; index: rotor
+  kPatternPhase = 24,     ///< which scan of a pattern that does not repeat a run starts with
+  kLidarWeather = 25,     ///< drops and fog; entity and index as of kLidarDetection
+  kTest = 1000,           ///< inputs of tests and benchmarks
 };
 
 /// Random numbers addressed by (seed, stream, entity, index): Philox 4x32-10 as a pure function.

@@ -83,8 +83,11 @@ std::string resolve_path(const std::string& path, const std::string& base) {
 }
 
 bool is_model_path(const std::string& name_or_path) {
-  return name_or_path.find('/') != std::string::npos ||
-         (name_or_path.size() > 5 && name_or_path.ends_with(".yaml"));
+  const auto ends = [&](std::string_view extension) {
+    return name_or_path.size() > extension.size() && name_or_path.ends_with(extension);
+  };
+  return name_or_path.find('/') != std::string::npos || ends(".yaml") || ends(".json") ||
+         ends(".csv");
 }
 
 std::string find_model(const std::string& kind,

@@ -15,11 +15,12 @@ std::string data_folder();
 /// so that they find the data of whatever prefix it lies in. Returns true.
 bool add_data_folder(const std::string& folder);
 
-/// True for what `find_model` takes as a path: it contains '/' or ends in ".yaml".
+/// True for what `find_model` takes as a path: it contains '/' or ends in ".yaml", or in ".json" or
+/// ".csv" as makers' files of sensors do.
 bool is_model_path(const std::string& name_or_path);
 
 /// The path of a model given by its name ("mid360" -> "<data>/lidars/mid360.yaml") or by a path
-/// that contains '/' or ends in ".yaml"; a relative path is taken from `base` (a folder; empty =
+/// (`is_model_path`); a relative path is taken from `base` (a folder; empty =
 /// the working directory). Throws InputError that lists the known names.
 std::string find_model(const std::string& kind,
                        const std::string& name_or_path,

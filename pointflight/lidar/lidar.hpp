@@ -1,11 +1,13 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 
 #include "pointflight/core/parallel.hpp"
 #include "pointflight/geometry/motion.hpp"
 #include "pointflight/lidar/beam_pattern.hpp"
 #include "pointflight/lidar/lidar_settings.hpp"
+#include "pointflight/lidar/return_model.hpp"
 #include "pointflight/lidar/scan.hpp"
 #include "pointflight/lidar/scan_beams.hpp"
 #include "pointflight/map/known_space.hpp"
@@ -15,24 +17,27 @@ namespace pointflight {
 
 /// Which scan to take.
 struct ScanRequest {
-  std::uint64_t index = 0;  ///< Scan number: its pattern, and its place in the noise stream.
+  std::uint64_t index = 0;  ///< Scan number: `Lidar::pattern_scan`, and its place among draws.
   SimTime start;            ///< When it starts in the run.
   bool snapshot = false;    ///< All beams from the pose at the scan's middle, as in the paper.
-  bool noise = true;        ///< Range noise of the sensor file.
-  std::uint64_t seed = 0;   ///< Of the range noise.
+  bool noise = true;        ///< Of ranges and directions, by the sensor file.
+  std::uint64_t seed = 0;   ///< Of all noise and of which beams come back.
   /// Points get `is_unknown` by it; null: they do not.
   const KnownSpace* known = nullptr;
   std::span<const Body> bodies;  ///< What moves in the map, without what carries the sensor.
 };
 
-/// A LiDAR: pattern, renderer, noise.
+/// A LiDAR: pattern, renderer, returns.
 class Lidar {
  public:
   /// `sensor` numbers it within the run: the entity of its random streams. LiDARs of the same
-  /// settings may share their beams; null: it has its own.
+  /// settings may share their beams; null: it has its own. With `surroundings` returns are modelled
+  /// (`ReturnModel`, directions with noise); without, whatever a beam meets within the sensor's
+  /// range comes back with the map's intensity and Gaussian noise of the range.
   Lidar(const LidarSettings& settings,
         std::uint32_t sensor,
-        std::shared_ptr<const ScanBeams> beams = nullptr);
+        std::shared_ptr<const ScanBeams> beams = nullptr,
+        const std::optional<Surroundings>& surroundings = std::nullopt);
 
   /// As given to the constructor.
   [[nodiscard]] const LidarSettings& settings() const { return settings_; }
@@ -50,9 +55,14 @@ class Lidar {
                           const Renderer& renderer,
                           const Executor& executor) const;
 
-  /// The beams of a scan.
-  [[nodiscard]] std::vector<Beam> beams(std::uint64_t scan_index, const Executor& executor) const {
-    return beams_->of(scan_index, executor)->beams;
+  /// Which scan of its pattern is scan `index` of a run with this seed. Where returns are modelled
+  /// a run starts anywhere in a pattern that does not repeat: all sensors of one model at the same
+  /// place.
+  [[nodiscard]] std::uint64_t pattern_scan(std::uint64_t index, std::uint64_t seed) const;
+  /// The beams of a scan of the pattern.
+  [[nodiscard]] std::vector<Beam> beams(std::uint64_t pattern_scan,
+                                        const Executor& executor) const {
+    return beams_->of(pattern_scan, executor)->beams;
   }
 
  private:
@@ -62,11 +72,22 @@ class Lidar {
                                          bool snapshot,
                                          std::span<Duration> offsets,
                                          const Executor& executor) const;
+  void shake(const ScanRequest& request, std::span<Ray> rays, const Executor& executor) const;
+  [[nodiscard]] std::vector<Return> returns_of(const ScanRequest& request,
+                                               std::span<const Beam> beams,
+                                               std::span<const Hit> hits,
+                                               const Executor& executor) const;
+  [[nodiscard]] std::vector<Return> noisy_ranges(const ScanRequest& request,
+                                                 std::span<const Beam> beams,
+                                                 std::span<const Hit> hits,
+                                                 const Executor& executor) const;
   [[nodiscard]] float depth_share(const Beam& beam) const;
+  [[nodiscard]] double range_limit() const;
 
   LidarSettings settings_;
   std::uint32_t sensor_;
   std::shared_ptr<const ScanBeams> beams_;
+  std::optional<ReturnModel> returns_;
   bool measures_depth_ = false;  ///< Limits and noise are of the depth along the axis.
 };
 

@@ -8,6 +8,7 @@
 
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/core/resources.hpp"
+#include "pointflight/lidar/maker_files.hpp"
 
 namespace pointflight {
 namespace {
@@ -18,6 +19,7 @@ constexpr Named<ScanPattern> kPatterns[] = {{ScanPattern::kRotor, "rotor"},
                                             {ScanPattern::kGrid, "grid"},
                                             {ScanPattern::kCsv, "csv"}};
 constexpr Named<RingConvention> kConventions[] = {{RingConvention::kVelodyne, "velodyne"},
+                                                  {RingConvention::kHesai, "hesai"},
                                                   {RingConvention::kOuster, "ouster"}};
 constexpr Named<GridProjection> kProjections[] = {{GridProjection::kAngular, "angular"},
                                                   {GridProjection::kPinhole, "pinhole"}};
@@ -76,16 +78,17 @@ void describe_rings(SettingsVisitor& v, RingsSettings& s) {
            s.convention,
            kConventions);
   describe_channels(v, s);
-  v.only_if(
-      s.convention == RingConvention::kVelodyne, "convention: velodyne", [&](SettingsVisitor& w) {
-        w.value({"cycle_us", "us", "between firings of one channel", 1, 1e6}, s.cycle_us);
-        w.value({"channel_interval_us",
-                 "us",
-                 "from channel to channel, without times in a table",
-                 0,
-                 1e5},
-                s.channel_interval_us);
-      });
+  v.only_if(s.convention != RingConvention::kOuster,
+            "convention: velodyne or hesai",
+            [&](SettingsVisitor& w) {
+              w.value({"cycle_us", "us", "between firings of one channel", 1, 1e6}, s.cycle_us);
+              w.value({"channel_interval_us",
+                       "us",
+                       "from channel to channel, without times in a table",
+                       0,
+                       1e5},
+                      s.channel_interval_us);
+            });
   v.only_if(s.convention == RingConvention::kOuster, "convention: ouster", [&](SettingsVisitor& w) {
     w.value({"columns", "", "a turn", 1, 65536}, s.columns);
     w.value({"beam_origin_radius", "m", "of the beams' origin from the axis", 0, 1},
@@ -123,20 +126,22 @@ void describe_noise(SettingsVisitor& v, RangeNoiseSettings& s) {
           s.range_sigma);
   v.value({"range_sigma_per_m2", "1/m", "part that grows with range squared (stereo)", 0, 1},
           s.range_sigma_per_m2);
+  v.value({"range_sigma_at_limit", "m", "added in squares where the signal is at its limit", 0, 10},
+          s.range_sigma_at_limit);
+  v.value({"range_step", "m", "ranges are whole multiples of it; 0: not rounded", 0, 1},
+          s.range_step);
 }
 
 void describe_optics(SettingsVisitor& v, OpticsSettings& s) {
   v.value({"wavelength_nm", "nm", "not used yet", 0, 20000}, s.wavelength_nm);
-  v.value({"divergence_horizontal_deg", "deg", "full angle, FWHM; not used yet", 0, 10},
-          s.divergence_horizontal_deg);
-  v.value({"divergence_vertical_deg", "deg", "full angle, FWHM; not used yet", 0, 10},
-          s.divergence_vertical_deg);
-  v.value({"angle_sigma_deg", "deg", "of the beam's direction; not used yet", 0, 10},
+  v.value(
+      {"divergence_horizontal_deg", "deg", "full angle, FWHM: how many drops a beam meets", 0, 10},
+      s.divergence_horizontal_deg);
+  v.value(
+      {"divergence_vertical_deg", "deg", "full angle, FWHM: how many drops a beam meets", 0, 10},
+      s.divergence_vertical_deg);
+  v.value({"angle_sigma_deg", "deg", "of the beam's direction, about each of two axes", 0, 10},
           s.angle_sigma_deg);
-  v.value({"range_at_10_percent", "m", "detection range, 10 % target; not used yet", 0, 1e5},
-          s.range_at_10_percent);
-  v.value({"range_at_80_percent", "m", "detection range, 80 % target; not used yet", 0, 1e5},
-          s.range_at_80_percent);
 }
 
 constexpr double kMostBeams = 16e6;  // a scan
@@ -170,6 +175,30 @@ void check_channels(const RingsSettings& s, const Fail& fail) {
   }
 }
 
+/// In each light a brighter target is seen from farther away.
+template <class Fail>
+void check_detection(const DetectionSettings& s, const Fail& fail) {
+  for (std::size_t i = 0; i < s.rated.size(); ++i) {
+    for (std::size_t k = 0; k < i; ++k) {
+      const RatedRange& a = s.rated[k];
+      const RatedRange& b = s.rated[i];
+      if (a.sun_klx != b.sun_klx) continue;
+      if ((a.reflectivity < b.reflectivity) == (a.range < b.range) &&
+          a.reflectivity != b.reflectivity && a.range != b.range) {
+        continue;
+      }
+      fail("detection.rated",
+           fmt::format("{} m at {:.4g} % and {} m at {:.4g} % in {} klx: a brighter target is seen "
+                       "from farther away",
+                       a.range,
+                       100.0 * a.reflectivity,
+                       b.range,
+                       100.0 * b.reflectivity,
+                       b.sun_klx));
+    }
+  }
+}
+
 /// What a scan has at least; a table may have more channels than one.
 double beams_a_scan(const LidarSettings& s) {
   if (s.pattern == ScanPattern::kRotor) {
@@ -194,31 +223,7 @@ LidarSettings read(SettingsReader& reader, const std::string& path) {
   reader.finish();
   settings.path = path;
   settings.lines = reader.lines();
-  const auto fail = [&](const char* key, const std::string& what) {
-    throw InputError(fmt::format("{}: {}: {}", settings.place(key), key, what));
-  };
-  if (settings.range_min >= settings.range_max) {
-    fail("range_min",
-         fmt::format("{} m is not below range_max {} m", settings.range_min, settings.range_max));
-  }
-  const GridSettings& grid = settings.grid;
-  if (settings.pattern == ScanPattern::kRotor && settings.rotor.line_angles_deg.empty()) {
-    fail("rotor.line_angles_deg", "no lines; at least one is needed");
-  } else if (settings.pattern == ScanPattern::kPrisms && settings.prisms.line_heights.empty()) {
-    fail("prisms.line_heights", "no lines; at least one is needed");
-  } else if (settings.pattern == ScanPattern::kRings) {
-    check_channels(settings.rings, fail);
-  } else if (settings.pattern == ScanPattern::kCsv && settings.csv.file.empty()) {
-    fail("csv.file", "missing; name the CSV of directions");
-  } else if (settings.pattern == ScanPattern::kGrid) {
-    if (grid.projection == GridProjection::kPinhole && (grid.fx <= 0.0 || grid.fy <= 0.0)) {
-      fail("grid.projection", "pinhole needs fx and fy");
-    }
-  }
-  if (const double beams = beams_a_scan(settings); beams > kMostBeams) {
-    fail(settings.pattern == ScanPattern::kGrid ? "grid.columns" : "rate",
-         fmt::format("{:.0f} beams per scan; {:.0f} at most", beams, kMostBeams));
-  }
+  check(settings);
   return settings;
 }
 
@@ -234,15 +239,22 @@ void describe(SettingsVisitor& v, LidarSettings& s) {
            0,
            1e5},
           s.range_min);
-  v.value(
-      {"range_max", "m", "longest range; of a pinhole grid: depth along the axis", 0.01, 1e5, true},
-      s.range_max);
+  v.value({"range_max",
+           "m",
+           "longest range (with detection.rated: of legacy runs); of a pinhole grid: depth along "
+           "the axis",
+           0.01,
+           1e5,
+           true},
+          s.range_max);
   v.value({"image_resolution_deg", "deg", "theta_res of the paper renderer", 0.01, 10},
           s.image_resolution_deg);
   v.section({"noise", "", "Gaussian range noise"},
             [&](SettingsVisitor& w) { describe_noise(w, s.noise); });
-  v.section({"optics", "", "figures for sensor models to come"},
+  v.section({"optics", "", "of every beam"},
             [&](SettingsVisitor& w) { describe_optics(w, s.optics); });
+  v.section({"detection", "", "which beams come back, by the sheet's ranges"},
+            [&](SettingsVisitor& w) { describe(w, s.detection); });
   Key pattern{"pattern", "", "scan principle; its figures stand in the section of this name"};
   pattern.required = true;
   v.choice(pattern, s.pattern, kPatterns);
@@ -268,6 +280,35 @@ void describe(SettingsVisitor& v, LidarSettings& s) {
   });
 }
 
+void check(const LidarSettings& settings) {
+  const auto fail = [&](const char* key, const std::string& what) {
+    throw InputError(fmt::format("{}: {}: {}", settings.place(key), key, what));
+  };
+  if (settings.range_min >= settings.range_max) {
+    fail("range_min",
+         fmt::format("{} m is not below range_max {} m", settings.range_min, settings.range_max));
+  }
+  check_detection(settings.detection, fail);
+  const GridSettings& grid = settings.grid;
+  if (settings.pattern == ScanPattern::kRotor && settings.rotor.line_angles_deg.empty()) {
+    fail("rotor.line_angles_deg", "no lines; at least one is needed");
+  } else if (settings.pattern == ScanPattern::kPrisms && settings.prisms.line_heights.empty()) {
+    fail("prisms.line_heights", "no lines; at least one is needed");
+  } else if (settings.pattern == ScanPattern::kRings) {
+    check_channels(settings.rings, fail);
+  } else if (settings.pattern == ScanPattern::kCsv && settings.csv.file.empty()) {
+    fail("csv.file", "missing; name the CSV of directions");
+  } else if (settings.pattern == ScanPattern::kGrid) {
+    if (grid.projection == GridProjection::kPinhole && (grid.fx <= 0.0 || grid.fy <= 0.0)) {
+      fail("grid.projection", "pinhole needs fx and fy");
+    }
+  }
+  if (const double beams = beams_a_scan(settings); beams > kMostBeams) {
+    fail(settings.pattern == ScanPattern::kGrid ? "grid.columns" : "rate",
+         fmt::format("{:.0f} beams per scan; {:.0f} at most", beams, kMostBeams));
+  }
+}
+
 std::string_view to_string(ScanPattern pattern) {
   return name_in(kPatterns, pattern);
 }
@@ -275,6 +316,7 @@ std::string_view to_string(ScanPattern pattern) {
 std::string lidar_reference() {
   LidarSettings defaults;  // with one of each, so that all keys are listed
   defaults.prisms.wedges.resize(1);
+  defaults.detection.rated.resize(1);
   SettingsTable table;
   describe(table, defaults);
   return table.text();
@@ -301,6 +343,8 @@ std::vector<std::string*> tables_of(LidarSettings& settings) {
 
 LidarSettings load_lidar(const std::string& name_or_path, const std::string& base) {
   const std::string path = find_model("lidars", name_or_path, base);
+  if (path.ends_with(".json")) return load_ouster_metadata(path);
+  if (path.ends_with(".csv")) return load_livox_table(path);
   SettingsReader reader(path);
   return read(reader, path);
 }

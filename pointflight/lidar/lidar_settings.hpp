@@ -7,6 +7,7 @@
 
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/core/settings.hpp"
+#include "pointflight/lidar/detection.hpp"
 
 namespace pointflight {
 
@@ -22,7 +23,8 @@ enum class ScanPattern {
 
 /// How the channels of a spinning LiDAR fire and what its angles mean.
 enum class RingConvention {
-  kVelodyne,  ///< One after the other.
+  kVelodyne,  ///< One after the other; channels lag behind the head by their azimuths.
+  kHesai,     ///< One after the other; channels lead by their azimuths.
   kOuster,    ///< All at once, in columns.
 };
 
@@ -75,11 +77,12 @@ struct RingsSettings {
   double elevation_min_deg = -15.0;         ///< Of evenly spaced channels: the lowest.
   double elevation_max_deg = 15.0;          ///< The highest.
   RingConvention convention = RingConvention::kVelodyne;  ///< How a turn is fired.
-  double cycle_us = 55.296;          ///< velodyne: from one firing of all channels to the next.
-  double channel_interval_us = 0.0;  ///< velodyne: between channels, where the table has no times.
-  std::int64_t columns = 1024;       ///< ouster: a turn.
-  double beam_origin_radius = 0.0;   ///< ouster: distance of the beams' origin from the axis, m.
-  double origin_z = 0.0;  ///< ouster: height of the beams' origin in the sensor frame, m.
+  double cycle_us = 55.296;  ///< not ouster: from one firing of all channels to the next.
+  double channel_interval_us =
+      0.0;                          ///< not ouster: between channels, where the table has no times.
+  std::int64_t columns = 1024;      ///< ouster: a turn.
+  double beam_origin_radius = 0.0;  ///< ouster: distance of the beams' origin from the axis, m.
+  double origin_z = 0.0;            ///< ouster: height of the beams' origin in the sensor frame, m.
 };
 
 /// Depth cameras and dense angular grids: all beams at the scan's start.
@@ -102,34 +105,38 @@ struct CsvSettings {
   std::int64_t lines = 1;               ///< Ring of row i = i mod lines.
 };
 
-/// Standard deviation of the range: sqrt(range_sigma^2 + (range_sigma_per_m2 R^2)^2).
+/// Standard deviation of the range: sqrt(range_sigma^2 + (range_sigma_per_m2 R^2)^2 +
+/// (range_sigma_at_limit / margin)^2), the last one where returns are modelled (`ReturnModel`): the
+/// jitter of a threshold's crossing goes with rise time over signal.
 struct RangeNoiseSettings {
-  double range_sigma = 0.0;         ///< m
-  double range_sigma_per_m2 = 0.0;  ///< m per m^2: stereo cameras.
+  double range_sigma = 0.0;           ///< m
+  double range_sigma_per_m2 = 0.0;    ///< m per m^2: stereo cameras.
+  double range_sigma_at_limit = 0.0;  ///< m, added in squares at the rated ranges.
+  double range_step = 0.0;            ///< m: ranges are whole multiples; 0: they are not rounded.
 };
 
-/// Figures of the optics for models to come (angular noise, divergence, detection); they are read,
-/// shown by `lidar show` and not used yet.
+/// Figures of the optics. The divergence says how many drops of rain a beam meets; mixed pixels are
+/// not modelled yet. The wavelength is shown by `lidar show` and not used.
 struct OpticsSettings {
   double wavelength_nm = 0.0;              ///< Not used yet.
   double divergence_horizontal_deg = 0.0;  ///< Full angle at half maximum.
   double divergence_vertical_deg = 0.0;    ///< Full angle at half maximum.
-  double angle_sigma_deg = 0.0;            ///< Of the beam's direction.
-  double range_at_10_percent = 0.0;        ///< Detection range on a 10 % target, m.
-  double range_at_80_percent = 0.0;        ///< Detection range on an 80 % target, m.
+  double angle_sigma_deg = 0.0;  ///< Of each beam's direction about each of two axes across it.
 };
 
 /// A sensor file, `data/lidars/<name>.yaml`.
 struct LidarSettings {
-  std::string path;                   ///< Of the file, for messages and for files beside it.
-  std::string title;                  ///< Maker and model.
-  std::string source;                 ///< Where the figures come from.
-  double rate = 10.0;                 ///< Scans a second.
-  double range_min = 0.1;             ///< m; nearer returns are lost (a depth camera's: depth).
-  double range_max = 100.0;           ///< m; farther returns are lost (a depth camera's: depth).
-  double image_resolution_deg = 0.2;  ///< theta_res of the `paper` renderer.
-  RangeNoiseSettings noise;           ///< Of every return.
-  OpticsSettings optics;              ///< For models to come.
+  std::string path;        ///< Of the file, for messages and for files beside it.
+  std::string title;       ///< Maker and model.
+  std::string source;      ///< Where the figures come from.
+  double rate = 10.0;      ///< Scans a second.
+  double range_min = 0.1;  ///< m; nearer returns are lost (a depth camera's: depth).
+  /// m; farther returns are lost (a depth camera's: depth), where `detection` does not say more.
+  double range_max = 100.0;
+  double image_resolution_deg = 0.2;          ///< theta_res of the `paper` renderer.
+  RangeNoiseSettings noise;                   ///< Of every return.
+  OpticsSettings optics;                      ///< Of every beam.
+  DetectionSettings detection;                ///< Which beams come back.
   ScanPattern pattern = ScanPattern::kUnset;  ///< Which of the sections below counts.
   RotorSettings rotor;                        ///< Where `pattern` says so.
   PrismsSettings prisms;                      ///< Where `pattern` says so.
@@ -157,7 +164,12 @@ void describe(SettingsVisitor& visitor, LidarSettings& settings);
 /// Markdown table of all keys.
 std::string lidar_reference();
 
-/// Reads a sensor by name ("mid360") or path; relative paths are taken from `base`.
+/// Refuses settings whose parts do not fit together. Throws InputError with the key's place.
+void check(const LidarSettings& settings);
+
+/// Reads a sensor by name ("mid360") or path; relative paths are taken from `base`. Beside sensor
+/// files (.yaml) it reads those of makers (`maker_files.hpp`): Ouster's metadata (.json) and tables
+/// of directions (.csv).
 LidarSettings load_lidar(const std::string& name_or_path, const std::string& base = {});
 
 /// The files that a sensor's settings name beside its own, as paths that can be opened; each in

@@ -16,6 +16,7 @@ inline constexpr Label kMapLabel = 0;      ///< The map.
 inline constexpr Label kFirstVehicle = 1;  ///< Label of vehicle 0.
 /// Label of obstacle 0: there are no more vehicles than fit below.
 inline constexpr Label kFirstObstacle = 10001;
+inline constexpr Label kFalseReturn = 65535;  ///< Of a return where nothing is.
 
 /// Shape of a body: an exact solid, or surfels of a cloud or mesh of its own.
 using BodyShape = std::variant<Solid, std::shared_ptr<const SurfelMap>>;

@@ -165,6 +165,7 @@ struct RecordedRun::Files {
       ImuSample sample;
       sample.vehicle = static_cast<std::uint32_t>(v);
       sample.time = time_at(table, row, 0);
+      sample.stamp = table.columns() > 7 ? time_at(table, row, 7) : sample.time;
       sample.gyro = vector_at(table, row, 1);
       sample.accel = vector_at(table, row, 4);
       sample.q_world_imu = rotation_of(v, sample.time) * q_body_imu;
@@ -233,7 +234,7 @@ struct RecordedRun::Files {
   [[nodiscard]] Sample with_points(Scan scan, const std::string& path) const {
     const MountedLidar& mounted = *simulation.vehicle(scan.vehicle).lidars()[scan.sensor];
     const PoseTrack track = tracks[scan.vehicle].with_mount(mounted.T_body_sensor());
-    const std::vector<Beam> beams = mounted.lidar().beams(scan.index, executor);
+    const std::vector<Beam> beams = mounted.beams_of(scan.index, executor);
     scan.snapshot = mounted.takes_snapshots();
     scan.marks_unknown = mounted.marks_unknown();
     scan.middle = mounted.lidar().middle_of(scan.start, beams, scan.snapshot);

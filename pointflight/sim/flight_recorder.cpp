@@ -130,6 +130,7 @@ struct FlightRecorder::VehicleFiles {
   OutputFile tum;
   OutputFile scans;
   std::optional<OutputFile> imu;
+  bool stamps_imu = false;  ///< Its IMU's clock errs: a column says what it says.
   std::optional<OutputFile> odometry;
   std::map<std::uint32_t, OutputFile> sensors;  ///< By `Measurement::sensor`.
 };
@@ -191,7 +192,11 @@ FlightRecorder::FlightRecorder(const std::string& folder,
     files->trajectory.write("\n");
     files->tum.write("# timestamp tx ty tz qx qy qz qw (T_world_body)\n");
     files->scans.write("file,lidar,scan,start,end,beams,points,px,py,pz,qw,qx,qy,qz\n");
-    if (files->imu) files->imu->write("time,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z\n");
+    if (files->imu) {
+      files->stamps_imu = simulation.vehicle(v).settings().imu.in_use().clock_errs();
+      files->imu->write("time,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z");
+      files->imu->write(files->stamps_imu ? ",stamp\n" : "\n");
+    }
     if (files->odometry) {
       files->odometry->write(fmt::format("time,delivered,{}\n", kStateColumns));
     }
@@ -242,7 +247,9 @@ void FlightRecorder::write(const OdometrySample& sample) {
 void FlightRecorder::write(const ImuSample& sample) {
   auto& imu = vehicles_[sample.vehicle]->imu;
   if (!imu) return;
-  imu->write(fmt::format("{},{},{}\n", seconds(sample.time), csv(sample.gyro), csv(sample.accel)));
+  imu->write(fmt::format("{},{},{}", seconds(sample.time), csv(sample.gyro), csv(sample.accel)));
+  imu->write(vehicles_[sample.vehicle]->stamps_imu ? fmt::format(",{}\n", seconds(sample.stamp))
+                                                   : std::string("\n"));
 }
 
 /// One row; its file begins with the kind's columns.

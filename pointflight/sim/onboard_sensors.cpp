@@ -22,9 +22,9 @@ void OdometrySource::arrive(Sample& sample, const VehicleStatus& status) const {
 }
 
 Sample OnboardImu::measure(const InstantInput& input, std::any& memory) const {
-  auto& [biases, last] = *std::any_cast<Memory>(&memory);
+  auto& [remembered, last] = *std::any_cast<Memory>(&memory);
   const BodyAcceleration acceleration = input.vehicle.acceleration(input.status, input.state);
-  ImuSample sample = imu_.sample(input.index, input.time, input.state.body, acceleration, biases);
+  ImuSample sample = imu_.sample(input.index, input.time, input.state, acceleration, remembered);
   for (std::size_t axis = 0; axis < 6 && last && faults_.any(); ++axis) {
     if (!faults_.is_stuck(axis, input.time)) continue;
     const int i = static_cast<int>(axis % 3);

@@ -23,18 +23,18 @@ class OdometrySource : public InstantSensor {
   const Faults& faults_;
 };
 
-/// The IMU of the vehicle file; what is stuck repeats its last value.
+/// The IMU of a vehicle; what is stuck repeats its last value.
 class OnboardImu : public InstantSensor {
  public:
   /// The faults must outlive it.
-  OnboardImu(const ImuSettings& settings, const SensorSite& site, const Faults& faults)
-      : InstantSensor(settings.rate), imu_(settings, site.seed, site.vehicle), faults_(faults) {}
+  OnboardImu(const VehicleSettings& vehicle, const SensorSite& site, const Faults& faults)
+      : InstantSensor(vehicle.imu.rate), imu_(vehicle, site.seed, site.vehicle), faults_(faults) {}
   [[nodiscard]] std::any memory_at_start() const override { return Memory{}; }
   [[nodiscard]] Sample measure(const InstantInput& input, std::any& memory) const override;
 
  private:
   struct Memory {
-    Imu::Biases biases;             ///< As they have walked up to the last sample.
+    Imu::Memory imu;                ///< Of the last sample.
     std::optional<ImuSample> last;  ///< What a stuck axis repeats.
   };
   Imu imu_;
@@ -59,6 +59,10 @@ class MountedLidar : public IntervalSensor {
 
   /// Pattern and noise; its number is vehicle << 8 | LiDAR.
   [[nodiscard]] const Lidar& lidar() const { return lidar_; }
+  /// The beams of its scan number `index`.
+  [[nodiscard]] std::vector<Beam> beams_of(std::uint64_t index, const Executor& executor) const {
+    return lidar_.beams(lidar_.pattern_scan(index, site_.seed), executor);
+  }
   /// From the sensor's axes to the body's.
   [[nodiscard]] const Pose& T_body_sensor() const { return T_body_sensor_; }
 

@@ -35,7 +35,7 @@ void describe_lidar(SettingsVisitor& v, LidarMount& s) {
     w.value({"snapshot", "", "all beams of a scan from one pose, as the paper's always"},
             s.snapshot);
   });
-  v.value({"noise", "", "range noise of the sensor file"}, s.noise);
+  v.value({"noise", "", "of ranges and directions, by the sensor file"}, s.noise);
   v.value({"mark_unknown",
            "",
            "points say whether their beams crossed space that no survey saw (a map made or fitted "
@@ -143,6 +143,12 @@ void describe(SettingsVisitor& v, Scenario& s) {
   v.value(required({"map", "", ".pfmap to fly in"}), s.map);
   v.value({"map_hash", "", "of the map; another one is refused; empty: any will do"}, s.map_hash);
   v.value({"seed", "", "of everything random", 0, 9e15}, s.seed);
+  v.value(
+      {"legacy",
+       "",
+       "sensors as before version 0.2: LiDARs return all that a beam meets within range_max, IMUs "
+       "have white noise and walk alone"},
+      s.legacy);
   v.value({"duration", "s", "0: as long as the mission takes", 0, 1e6}, s.duration);
   v.value({"physics_step", "s", "of the integrator", 0.0001, 0.005}, s.physics_step);
   if (s.is_short) {
@@ -165,6 +171,10 @@ void describe(SettingsVisitor& v, Scenario& s) {
               [&](SettingsVisitor& x) { describe(x, s.air.wind); });
     w.value({"ground_effect", "", "more thrust near the ground, for vehicles with rotor.radius"},
             s.air.ground_effect);
+  });
+  v.only_if(!s.legacy, "legacy: false", [&](SettingsVisitor& u) {
+    u.section({"surroundings", "", "what the returns of LiDARs depend on"},
+              [&](SettingsVisitor& w) { describe(w, s.surroundings); });
   });
   v.section({"output", "", "what is written"},
             [&](SettingsVisitor& w) { describe_output(w, s.output); });

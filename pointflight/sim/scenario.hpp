@@ -10,6 +10,7 @@
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/core/settings.hpp"
 #include "pointflight/core/time.hpp"
+#include "pointflight/lidar/return_model.hpp"
 #include "pointflight/map/surfel_map.hpp"
 #include "pointflight/sim/command_script.hpp"
 #include "pointflight/sim/faults.hpp"
@@ -28,7 +29,7 @@ struct LidarMount {
   Vector3d rotation_rpy_deg = Vector3d::Zero();  ///< Of the sensor's axes in the body.
   Choice<RendererKind> renderer{};               ///< "beam", "paper" or an own one.
   bool snapshot = false;                         ///< One pose per scan, as in the paper.
-  bool noise = true;                             ///< Range noise of the sensor file.
+  bool noise = true;                             ///< Of ranges and directions.
   bool mark_unknown = false;  ///< Points say whether they came through space no survey saw.
 };
 
@@ -110,7 +111,11 @@ struct Scenario {
       false;  ///< The file is for one vehicle: `vehicle`, `lidars`, `mission`, ... on top.
   std::vector<ObstacleSettings> obstacles;  ///< What moves by itself.
   AirSetup air;                             ///< Wind and ground effect.
-  OutputSetup output;                       ///< What is written.
+  Surroundings surroundings;                ///< What LiDARs' returns depend on.
+  /// Sensors as before version 0.2: LiDARs return all that a beam meets within `range_max`, IMUs
+  /// have white noise and walk alone. For results that must stay comparable.
+  bool legacy = false;
+  OutputSetup output;  ///< What is written.
   /// What other floors and programs read (`scenario_sections`), by name.
   std::map<std::string, std::any> sections;
   std::string ros_as_is;  ///< YAML of `ros`, in a program that does not read it.

@@ -38,11 +38,11 @@ class Inputs {
     if (is_model_path(setting)) take(setting);
   }
 
-  /// A sensor's file names tables beside it.
+  /// A sensor's file names tables beside it; one of a maker's becomes a sensor file.
   void take_lidar(std::string& setting) {
     if (!is_model_path(setting)) return;
     const std::string path = resolve_path(setting, from_);
-    const auto [name, is_new] = name_for(path);
+    const auto [name, is_new] = name_for(path, ".yaml");
     setting = "inputs/" + name;
     if (!is_new) return;
     LidarSettings sensor = load_lidar(path);
@@ -57,13 +57,16 @@ class Inputs {
   }
 
  private:
-  /// A name in inputs/, and whether the file is not there yet.
-  std::pair<std::string, bool> name_for(const std::string& path) {
-    const std::string source = fs::weakly_canonical(path).string();
+  /// A name in inputs/, and whether the file is not there yet. What is kept under another extension
+  /// is another file: a table of directions may be a sensor and one's table.
+  std::pair<std::string, bool> name_for(const std::string& path,
+                                        const std::string& extension = {}) {
+    const std::string source = fs::weakly_canonical(path).string() + extension;
     if (const auto known = names_.find(source); known != names_.end()) {
       return {known->second, false};
     }
-    const fs::path file = fs::path(path).filename();
+    fs::path file = fs::path(path).filename();
+    if (!extension.empty()) file.replace_extension(extension);
     std::string name = file.string();
     for (int i = 2; !taken_.insert(name).second; ++i) {
       name = fmt::format("{}_{}{}", file.stem().string(), i, file.extension().string());

@@ -94,7 +94,8 @@ void VehicleAgent::control(VehicleStatus& status,
         wind_.over_step(status.gusts, number_, step_number, dt, body.v_world, height);
   }
   if (setup_.battery) {
-    status.conditions.speed_share = battery_.step(status.battery, status.state, dt);
+    status.conditions.speed_share =
+        battery_.step(status.battery, dynamics_.shaft_power(status.state, status.conditions), dt);
     watch_battery(status, now);
   }
 }

@@ -27,6 +27,7 @@ VehicleSettings settings_of(const Scenario& scenario,
                             const VehicleSetup& setup) {
   VehicleSettings s = scenario.at(scenario.vehicle_key(number, "model"),
                                   [&] { return load_vehicle(setup.model, scenario.folder()); });
+  if (scenario.legacy) make_legacy(s);
   ControllerSettings& c = s.controller;
   if (setup.controller) c.kind = *setup.controller;
   const auto override_with = [](double value, double& setting) {
@@ -97,7 +98,7 @@ void VehicleAgent::mount_sensors(const Scenario& scenario, SharedParts& shared) 
     return SensorSite{number_, static_cast<std::uint32_t>(sensor), seed_};
   };
   mount(nullptr, std::make_unique<OdometrySource>(scenario.output.odometry_rate, faults_));
-  mount(nullptr, std::make_unique<OnboardImu>(settings().imu, site(sensors_.size()), faults_));
+  mount(nullptr, std::make_unique<OnboardImu>(settings(), site(sensors_.size()), faults_));
   for (std::size_t i = 0; i < setup_.sensors.size(); ++i) {
     const SensorSetup& sensor = setup_.sensors[i];
     const std::string key = scenario.vehicle_key(number_, fmt::format("sensors[{}]", i));
@@ -117,7 +118,9 @@ void VehicleAgent::mount_sensors(const Scenario& scenario, SharedParts& shared) 
     const std::string key = scenario.vehicle_key(number_, fmt::format("lidars[{}].model", i));
     auto lidar = scenario.at(key, [&] {
       const SharedParts::LidarModel& model = shared.lidar(entry.model);
-      Lidar made(model.settings, MountedLidar::entity_of(site(i)), model.beams);
+      const auto surroundings =
+          scenario.legacy ? std::nullopt : std::optional(scenario.surroundings);
+      Lidar made(model.settings, MountedLidar::entity_of(site(i)), model.beams, surroundings);
       return std::make_unique<MountedLidar>(
           entry, std::move(made), site(i), shared.renderer(entry.renderer), shared.map(), faults_);
     });

@@ -41,7 +41,21 @@ void describe_rotor(SettingsVisitor& v, RotorModel& r) {
   v.only_if(r.natural_frequency > 0.0, "natural_frequency above 0", [&](SettingsVisitor& w) {
     w.value({"damping", "", "of the speed's response", 0.1, 10}, r.damping);
   });
-  v.value({"radius", "m", "of the propeller, for ground effect; 0: none", 0, 10}, r.radius);
+  v.value(
+      {"radius", "m", "of the propeller, for ground effect and advance ratio; 0: neither", 0, 10},
+      r.radius);
+  v.only_if(r.radius > 0.0, "radius above 0", [&](SettingsVisitor& w) {
+    w.value({"advance_ratios",
+             "",
+             "J = v / (n D), ascending, v along the axis; empty: thrust does not depend on v",
+             -10,
+             10},
+            r.advance_ratios);
+    w.value({"thrust_shares", "", "C_T(J) / C_T(0) at these advance ratios", -2, 3},
+            r.thrust_shares);
+    w.value({"torque_shares", "", "C_P(J) / C_P(0) at these advance ratios", -2, 3},
+            r.torque_shares);
+  });
 }
 
 void describe_loop(SettingsVisitor& v, LoopDesign& loop) {
@@ -92,12 +106,24 @@ void describe_imu(SettingsVisitor& v, ImuSettings& i) {
   v.value({"position", "m", "in the body frame", -10, 10}, i.position);
   v.value({"rotation_rpy_deg", "deg", "roll, pitch, yaw of its axes in the body", -360, 360},
           i.rotation_rpy_deg);
-  v.value({"gyro_noise_density", "rad/s/sqrt(Hz)", "white noise", 0, 1}, i.gyro_noise_density);
-  v.value({"gyro_bias_walk", "rad/s^2/sqrt(Hz)", "random walk of the bias", 0, 1},
-          i.gyro_bias_walk);
-  v.value({"accel_noise_density", "m/s^2/sqrt(Hz)", "white noise", 0, 10}, i.accel_noise_density);
-  v.value({"accel_bias_walk", "m/s^3/sqrt(Hz)", "random walk of the bias", 0, 10},
-          i.accel_bias_walk);
+  v.value({"part",
+           "",
+           "name of a shipped part (below), whose errors it has; noise and walk beside it count in "
+           "legacy runs"},
+          i.part);
+  describe_noise(v, i.errors);
+  v.only_if(
+      i.part.empty(), "no `part`", [&](SettingsVisitor& w) { describe_beyond_noise(w, i.errors); });
+}
+
+void describe_vibration(SettingsVisitor& v, VibrationSettings& s) {
+  v.value({"rotor_accel", "m/s^2", "amplitude across the axis by each rotor's imbalance", 0, 1000},
+          s.rotor_accel);
+  v.value({"blade_accel", "m/s^2", "amplitude along the axis at the blades' frequency", 0, 1000},
+          s.blade_accel);
+  v.value({"rotor_gyro", "rad/s", "amplitude of rates by each rotor's imbalance", 0, 10},
+          s.rotor_gyro);
+  v.value({"blades", "", "of each propeller", 1, 16}, s.blades);
 }
 
 void describe_battery(SettingsVisitor& v, BatterySettings& b) {
@@ -108,6 +134,38 @@ void describe_battery(SettingsVisitor& v, BatterySettings& b) {
     w.value({"efficiency", "", "shaft power by electrical power", 0.05, 1}, b.efficiency);
     w.value({"reserve", "", "share of the capacity left when it counts as low", 0, 0.9}, b.reserve);
   });
+}
+
+/// Value at x of a line through points by ascending x; constant beyond them.
+double on_line(const std::vector<double>& xs, const std::vector<double>& ys, double x) {
+  if (x <= xs.front()) return ys.front();
+  for (std::size_t i = 1; i < xs.size(); ++i) {
+    if (x > xs[i]) continue;
+    return ys[i - 1] + (ys[i] - ys[i - 1]) * (x - xs[i - 1]) / (xs[i] - xs[i - 1]);
+  }
+  return ys.back();
+}
+
+/// J = v / (n D).
+double advance_ratio(double climb, double speed, double radius) {
+  return kPi * climb / (std::max(speed, 1.0) * radius);
+}
+
+template <class Fail>
+void check_rotor_curves(const RotorModel& r, const Fail& fail) {
+  const std::size_t n = r.advance_ratios.size();
+  if (r.thrust_shares.size() != n || r.torque_shares.size() != n) {
+    fail("rotor.advance_ratios",
+         fmt::format(
+             "{} of these, {} thrust_shares and {} torque_shares; as many of each are wanted",
+             n,
+             r.thrust_shares.size(),
+             r.torque_shares.size()));
+  }
+  for (std::size_t i = 1; i < n; ++i) {
+    if (r.advance_ratios[i] > r.advance_ratios[i - 1]) continue;
+    fail("rotor.advance_ratios", "not in ascending order");
+  }
 }
 
 VehicleSettings read(SettingsReader& reader, const std::string& path) {
@@ -132,8 +190,16 @@ VehicleSettings read(SettingsReader& reader, const std::string& path) {
   if (settings.battery.cells > 0.0 && settings.battery.capacity <= 0.0) {
     fail("battery.capacity", "a battery with cells needs a capacity");
   }
+  check_rotor_curves(settings.rotor, fail);
   if (settings.rotor.speed_min >= settings.rotor.speed_max) {
     fail("rotor.speed_min", "not below speed_max");
+  }
+  if (!settings.imu.part.empty()) {
+    try {
+      settings.imu.part_errors = load_imu_part(settings.imu.part).errors;
+    } catch (const InputError& error) {
+      fail("imu.part", error.what());
+    }
   }
   if (settings.thrust_to_weight() <= 1.0) {
     fail("mass",
@@ -185,8 +251,27 @@ void describe(SettingsVisitor& v, VehicleSettings& s) {
             [&](SettingsVisitor& w) { describe_controller(w, s.controller); });
   v.section({"imu", "", "continuous-time densities"},
             [&](SettingsVisitor& w) { describe_imu(w, s.imu); });
+  v.section({"vibration", "", "that the rotors give the IMU, at hover speed"},
+            [&](SettingsVisitor& w) { describe_vibration(w, s.vibration); });
   v.section({"battery", "", "LiPo; flown with where the scenario says so"},
             [&](SettingsVisitor& w) { describe_battery(w, s.battery); });
+}
+
+void make_legacy(VehicleSettings& settings) {
+  ImuErrors& errors = settings.imu.errors;
+  const auto noise_of = [](const TriadErrors& triad) {
+    TriadErrors noise;
+    noise.noise_density = triad.noise_density;
+    noise.bias_walk = triad.bias_walk;
+    return noise;
+  };
+  errors = {.gyro = noise_of(errors.gyro), .accel = noise_of(errors.accel)};
+  settings.imu.part.clear();
+  settings.imu.part_errors.reset();
+  settings.vibration = {};
+  settings.rotor.advance_ratios.clear();
+  settings.rotor.thrust_shares.clear();
+  settings.rotor.torque_shares.clear();
 }
 
 std::string_view to_string(CommandLevel level) {
@@ -205,6 +290,16 @@ Solid VehicleSettings::hull() const {
   if (shape == HullShape::kBox) return Cuboid{0.5 * size};
   if (shape == HullShape::kCapsule) return Capsule{radius, 0.5 * height - radius};
   return Ball{radius};
+}
+
+double RotorModel::thrust_share(double climb, double speed) const {
+  if (advance_ratios.empty()) return 1.0;
+  return on_line(advance_ratios, thrust_shares, advance_ratio(climb, speed, radius));
+}
+
+double RotorModel::torque_share(double climb, double speed) const {
+  if (advance_ratios.empty()) return 1.0;
+  return on_line(advance_ratios, torque_shares, advance_ratio(climb, speed, radius));
 }
 
 double VehicleSettings::hover_speed() const {

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -8,6 +10,7 @@
 #include "pointflight/geometry/solid.hpp"
 #include "pointflight/geometry/types.hpp"
 #include "pointflight/vehicle/controller_kind.hpp"
+#include "pointflight/vehicle/imu_errors.hpp"
 
 namespace pointflight {
 
@@ -27,7 +30,18 @@ struct RotorModel {
   double speed_max = 0.0;           ///< rad/s
   double natural_frequency = 0.0;   ///< Of the speed's second-order response, rad/s; 0: ideal.
   double damping = 1.0;  ///< Of the speed's response; used with a natural frequency only.
-  double radius = 0.0;   ///< Of the propeller, m: ground effect; 0: none.
+  double radius = 0.0;   ///< Of the propeller, m: ground effect, advance ratio; 0: neither.
+  /// Advance ratios J = v / (n D), ascending: v the air's speed against the thrust (the rotor
+  /// climbs), n turns per second, D the diameter. Empty: thrust and torque do not depend on v.
+  std::vector<double> advance_ratios;
+  std::vector<double>
+      thrust_shares;  ///< C_T(J) / C_T(0) at these, straight between, constant beyond.
+  std::vector<double> torque_shares;  ///< C_P(J) / C_P(0) at these.
+
+  /// Of the static thrust, at `climb` m/s along the axis and `speed` rad/s (> 0).
+  [[nodiscard]] double thrust_share(double climb, double speed) const;
+  /// Of the static torque.
+  [[nodiscard]] double torque_share(double climb, double speed) const;
 };
 
 /// Gains follow from these and from the airframe's mass and inertia.
@@ -60,10 +74,26 @@ struct ImuSettings {
   double rate = 200.0;                           ///< Hz
   Vector3d position = Vector3d::Zero();          ///< m, body frame.
   Vector3d rotation_rpy_deg = Vector3d::Zero();  ///< Of its axes in the body.
-  double gyro_noise_density = 0.0;               ///< rad/s/sqrt(Hz)
-  double gyro_bias_walk = 0.0;                   ///< rad/s^2/sqrt(Hz)
-  double accel_noise_density = 0.0;              ///< m/s^2/sqrt(Hz)
-  double accel_bias_walk = 0.0;                  ///< m/s^3/sqrt(Hz)
+  std::string part;  ///< Name of a shipped part (`load_imu_part`), whose errors it has; or empty.
+  std::optional<ImuErrors> part_errors;  ///< The part's, once the file is read.
+  /// Of an IMU that is no shipped part. Of one that is: noise and walk in legacy runs.
+  ImuErrors errors;
+
+  /// The part's errors, or its own.
+  [[nodiscard]] const ImuErrors& in_use() const { return part_errors ? *part_errors : errors; }
+};
+
+/// How rotors shake an IMU.
+struct VibrationSettings {
+  double rotor_accel = 0.0;  ///< Amplitude across the axis by each rotor's imbalance, m/s^2.
+  double blade_accel = 0.0;  ///< Amplitude along the axis at the blades' frequency, m/s^2.
+  double rotor_gyro = 0.0;   ///< Amplitude of rates by each rotor's imbalance, rad/s.
+  std::int64_t blades = 2;   ///< Of each propeller.
+
+  /// True where there is none.
+  [[nodiscard]] bool is_off() const {
+    return rotor_accel == 0.0 && blade_accel == 0.0 && rotor_gyro == 0.0;
+  }
 };
 
 /// LiPo battery: 3.5 V per cell when empty to 4.2 V when full, less what the current takes.
@@ -112,6 +142,7 @@ struct VehicleSettings {
   CommandLevel lowest_command = CommandLevel::kRotorSpeeds;
   ControllerSettings controller;  ///< Loops and limits.
   ImuSettings imu;                ///< One on each vehicle.
+  VibrationSettings vibration;    ///< At hover speed; grows with the square of the rotors'.
   BatterySettings battery;        ///< Without cells: none.
 
   /// What must stay free of everything, and what others see of it; around the body's origin.
@@ -125,6 +156,10 @@ struct VehicleSettings {
   /// body frame, m/s^2.
   [[nodiscard]] Vector3d drag_in_still_air(const Vector3d& v_body) const;
 };
+
+/// Takes away what vehicles did not have before version 0.2: errors of the IMU beyond noise and
+/// walk, vibration, rotors that feel the air's speed. For runs that must stay comparable.
+void make_legacy(VehicleSettings& settings);
 
 /// As files have it: "rotor_speeds", ...
 std::string_view to_string(CommandLevel level);

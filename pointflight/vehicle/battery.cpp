@@ -13,14 +13,10 @@ constexpr double kHour = 3600.0;    // s
 
 }  // namespace
 
-double Battery::step(BatteryState& state, const VehicleState& vehicle, double dt) const {
+double Battery::step(BatteryState& state, double shaft_power, double dt) const {
   const BatterySettings& b = settings_.battery;
   assert(b.capacity > 0.0 && b.cells > 0.0);
-  double power = 0.0;
-  for (const RotorState& rotor : vehicle.rotors) {
-    power += settings_.rotor.torque_coefficient * rotor.speed * rotor.speed * rotor.speed;
-  }
-  power /= b.efficiency;
+  const double power = shaft_power / b.efficiency;
   const double open = b.cells * (kEmptyCell + charge(state) * (kFullCell - kEmptyCell));
   // V = V_open - R P / V; where it cannot give the power, what it can give at most
   state.voltage = 0.5 * (open + std::sqrt(std::max(0.0, open * open - 4.0 * b.resistance * power)));

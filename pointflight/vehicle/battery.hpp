@@ -13,15 +13,16 @@ struct BatteryState {
 };
 
 /// Charge and voltage of a LiPo: open circuit 3.5 to 4.2 V per cell, in proportion to the charge
-/// left; the current is the rotors' shaft power (sum of k_m w^3) by efficiency and voltage.
+/// left; the current is the rotors' shaft power by efficiency and voltage.
 class Battery {
  public:
   /// `step` and `charge` are for vehicles whose file has a battery.
   explicit Battery(const VehicleSettings& settings) : settings_(settings) {}
 
-  /// Advances by `dt` seconds at the rotors' speeds. Returns the share of the rotors' greatest
-  /// speed that is left: they turn in proportion to the voltage, all of it at 4.2 V per cell.
-  double step(BatteryState& state, const VehicleState& vehicle, double dt) const;
+  /// Advances by `dt` seconds under the rotors' shaft power (W). Returns the share of the rotors'
+  /// greatest speed that is left: they turn in proportion to the voltage, all of it at 4.2 V per
+  /// cell.
+  double step(BatteryState& state, double shaft_power, double dt) const;
 
   /// Share of the capacity that is left, 0 to 1.
   [[nodiscard]] double charge(const BatteryState& state) const;

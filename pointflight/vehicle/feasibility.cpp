@@ -36,7 +36,10 @@ MotionDemand demand_of(const Trajectory& trajectory, const VehicleSettings& vehi
     most.acceleration = std::max(most.acceleration, sideways);
     most.climb_acceleration = std::max(most.climb_acceleration, a.z());
     most.tilt = std::max(most.tilt, math::atan2(sideways, a.z() + kGravity));
-    most.thrust = std::max(most.thrust, vehicle.mass * (a + Vector3d(0, 0, kGravity)).norm());
+    const Vector3d push = vehicle.mass * (a + Vector3d(0, 0, kGravity));
+    const double climb = c.v_world.dot(push) / std::max(push.norm(), 1e-9);
+    const double share = vehicle.rotor.thrust_share(climb, vehicle.rotor.speed_max);
+    most.thrust = std::max(most.thrust, push.norm() / std::max(share, 0.01));
   }
   return most;
 }

@@ -30,7 +30,9 @@ double feasible_share(const Eigen::VectorXd& base,
 }  // namespace
 
 Mixer::Mixer(const VehicleSettings& settings)
-    : thrust_coefficient_(settings.rotor.thrust_coefficient),
+    : rotor_(settings.rotor),
+      places_(settings.rotors),
+      thrust_coefficient_(settings.rotor.thrust_coefficient),
       thrust_min_(thrust_coefficient_ * settings.rotor.speed_min * settings.rotor.speed_min),
       thrust_max_(thrust_coefficient_ * settings.rotor.speed_max * settings.rotor.speed_max) {
   const auto n = static_cast<Eigen::Index>(settings.rotors.size());
@@ -52,7 +54,26 @@ Mixer::Mixer(const VehicleSettings& settings)
   inverse_ = allocation_.transpose() * lu.inverse();
 }
 
-std::vector<double> Mixer::speeds(const Wrench& wrench) const {
+/// Along a rotor's axis, m/s.
+double Mixer::climb_of(std::size_t rotor, const AirMotion& motion) const {
+  return (motion.v_body + motion.omega_body.cross(places_[rotor].position)).z();
+}
+
+/// Of the rotor that gives a thrust as it climbs. Each round takes the share at the last one's
+/// speed: where thrust falls by a half three are within 1 %.
+double Mixer::speed_for(double thrust, double climb) const {
+  double speed = std::sqrt(thrust / thrust_coefficient_);
+  if (rotor_.advance_ratios.empty()) return speed;
+  constexpr int kRounds = 4;
+  constexpr double kLeastShare = 0.05;
+  for (int i = 0; i < kRounds; ++i) {
+    const double share = std::max(kLeastShare, rotor_.thrust_share(climb, speed));
+    speed = std::sqrt(thrust / (thrust_coefficient_ * share));
+  }
+  return std::clamp(speed, rotor_.speed_min, rotor_.speed_max);
+}
+
+std::vector<double> Mixer::speeds(const Wrench& wrench, const AirMotion& motion) const {
   const auto n = static_cast<double>(allocation_.cols());
   Eigen::VectorXd tilt = inverse_.col(1) * wrench.torque.x() + inverse_.col(2) * wrench.torque.y();
   const Eigen::VectorXd yaw = inverse_.col(3) * wrench.torque.z();
@@ -76,16 +97,17 @@ std::vector<double> Mixer::speeds(const Wrench& wrench) const {
   std::vector<double> speeds(static_cast<std::size_t>(thrusts.size()));
   for (std::size_t i = 0; i < speeds.size(); ++i) {
     const double thrust = thrusts[static_cast<Eigen::Index>(i)];
-    speeds[i] = std::sqrt(std::clamp(thrust, thrust_min_, thrust_max_) / thrust_coefficient_);
+    speeds[i] = speed_for(std::clamp(thrust, thrust_min_, thrust_max_), climb_of(i, motion));
   }
   return speeds;
 }
 
-Wrench Mixer::wrench(const std::vector<double>& speeds) const {
+Wrench Mixer::wrench(const std::vector<double>& speeds, const AirMotion& motion) const {
   assert(static_cast<Eigen::Index>(speeds.size()) == allocation_.cols());
   Eigen::VectorXd thrusts(static_cast<Eigen::Index>(speeds.size()));
   for (std::size_t i = 0; i < speeds.size(); ++i) {
-    thrusts[static_cast<Eigen::Index>(i)] = thrust_coefficient_ * speeds[i] * speeds[i];
+    thrusts[static_cast<Eigen::Index>(i)] = thrust_coefficient_ * speeds[i] * speeds[i] *
+                                            rotor_.thrust_share(climb_of(i, motion), speeds[i]);
   }
   const Eigen::Vector4d w = allocation_ * thrusts;
   return {w[0], w.tail<3>()};

@@ -13,6 +13,12 @@ struct Wrench {
   Vector3d torque = Vector3d::Zero();  ///< N m
 };
 
+/// How a vehicle moves through the air around it: what its rotors climb at.
+struct AirMotion {
+  Vector3d v_body = Vector3d::Zero();      ///< m/s
+  Vector3d omega_body = Vector3d::Zero();  ///< rad/s
+};
+
 /// Turns a wrench into rotor speeds: the (pseudo-)inverse of the rotors' geometry, any layout.
 ///
 /// Where a rotor would leave its limits, yaw torque gives way first, then thrust moves so that roll
@@ -22,14 +28,22 @@ class Mixer {
   /// Throws InputError where the layout cannot make roll, pitch and yaw.
   explicit Mixer(const VehicleSettings& settings);
 
-  /// Rotor speeds, rad/s, within the rotors' limits.
-  [[nodiscard]] std::vector<double> speeds(const Wrench& wrench) const;
+  /// Rotor speeds, rad/s, within the rotors' limits. Rotors that climb turn faster for the same
+  /// thrust, where the vehicle file says how thrust falls with the advance ratio.
+  [[nodiscard]] std::vector<double> speeds(const Wrench& wrench,
+                                           const AirMotion& motion = {}) const;
 
   /// Wrench of given speeds (without drag and lag): the inverse of `speeds` inside the limits.
-  /// One speed a rotor.
-  [[nodiscard]] Wrench wrench(const std::vector<double>& speeds) const;
+  /// One speed per rotor.
+  [[nodiscard]] Wrench wrench(const std::vector<double>& speeds,
+                              const AirMotion& motion = {}) const;
 
  private:
+  [[nodiscard]] double climb_of(std::size_t rotor, const AirMotion& motion) const;
+  [[nodiscard]] double speed_for(double thrust, double climb) const;
+
+  RotorModel rotor_;
+  std::vector<RotorPlacement> places_;
   Eigen::MatrixXd allocation_;  ///< 4 x rotors: wrench = allocation * thrusts.
   Eigen::MatrixXd inverse_;     ///< rotors x 4
   double thrust_coefficient_;

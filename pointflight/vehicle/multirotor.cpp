@@ -104,13 +104,15 @@ Multirotor::Rate Multirotor::rate(const RigidBodyState& body,
     const double w = rotors[i].speed;
     // thrust, and drag of the blades against the air that the rotor moves through sideways
     const Vector3d v_rotor = v_body + body.omega_body.cross(place.position);
-    const Vector3d f(
-        -rotor.drag_coefficient * w * v_rotor.x(),
-        -rotor.drag_coefficient * w * v_rotor.y(),
-        rotor.thrust_coefficient * w * w * ground_effect(height + up_body.dot(place.position)));
+    const double thrust =
+        rotor.thrust_coefficient * w * w * ground_effect(height + up_body.dot(place.position));
+    const Vector3d f(-rotor.drag_coefficient * w * v_rotor.x(),
+                     -rotor.drag_coefficient * w * v_rotor.y(),
+                     thrust * rotor.thrust_share(v_rotor.z(), w));
     force += f;
     torque += place.position.cross(f);
-    torque.z() += place.yaw_sign * rotor.torque_coefficient * w * w;
+    torque.z() +=
+        place.yaw_sign * rotor.torque_coefficient * w * w * rotor.torque_share(v_rotor.z(), w);
   }
   // quadratic drag of the body along its axes
   force -=
@@ -186,6 +188,21 @@ void Multirotor::runge_kutta(VehicleState& state,
   for (RotorState& r : state.rotors) {
     if (r.speed < 0.0) r = {0.0, std::max(0.0, r.acceleration)};
   }
+}
+
+double Multirotor::shaft_power(const VehicleState& state,
+                               const FlightConditions& conditions) const {
+  const RotorModel& rotor = settings_.rotor;
+  const RigidBodyState& body = state.body;
+  const Vector3d v_body = body.q_world_body.conjugate() * (body.v_world - conditions.wind_world);
+  double power = 0.0;
+  for (std::size_t i = 0; i < state.rotors.size(); ++i) {
+    const double w = state.rotors[i].speed;
+    const double climb = (v_body + body.omega_body.cross(settings_.rotors[i].position)).z();
+    // a windmill gives nothing back
+    power += rotor.torque_coefficient * w * w * w * std::max(0.0, rotor.torque_share(climb, w));
+  }
+  return power;
 }
 
 BodyAcceleration Multirotor::acceleration(const VehicleState& state,

@@ -27,9 +27,10 @@ struct FlightConditions {
 ///   d2w_i/dt2 = wn^2 (w_cmd - w_i) - 2 z wn dw_i/dt
 ///
 /// s_i is the sign of the rotor's reaction torque: a rotor with s = +1 turns in the -z sense. Drag
-/// is against the air, which moves with the wind. Near the ground thrust grows by
-/// 1 / (1 - (R / 4h)^2), h the rotor's height, at least R / 2 (Cheeseman, Bennett, ARC R&M 3021,
-/// 1955).
+/// is against the air, which moves with the wind. T_i = k_f w_i^2 C_T(J) / C_T(0), and k_m with C_P
+/// in the same way, J the advance ratio along the rotor's axis (`RotorModel`). Near the ground
+/// thrust grows by 1 / (1 - (R / 4h)^2), h the rotor's height, at least R / 2 (Cheeseman, Bennett,
+/// ARC R&M 3021, 1955).
 class Multirotor {
  public:
   /// Throws InputError where a figure is not finite or beyond what a vehicle file may say.
@@ -45,6 +46,10 @@ class Multirotor {
             std::span<const double> rotor_commands,
             double dt,
             const FlightConditions& conditions = {}) const;
+
+  /// What the rotors take from their motors, W.
+  [[nodiscard]] double shaft_power(const VehicleState& state,
+                                   const FlightConditions& conditions = {}) const;
 
   /// What the state does: for the IMU.
   [[nodiscard]] BodyAcceleration acceleration(const VehicleState& state,

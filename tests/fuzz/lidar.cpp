@@ -1,4 +1,5 @@
-// Any text as a sensor file: a sensor that can fire its first scan, or an InputError of one line.
+// Any text as a sensor file, or as Ouster's metadata where it begins as JSON does: a sensor that
+// can fire its first scan, or an InputError of one line.
 #include <cstdint>
 #include <string>
 #include <string_view>
@@ -6,11 +7,14 @@
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/lidar/beam_pattern.hpp"
 #include "pointflight/lidar/lidar_settings.hpp"
+#include "pointflight/lidar/maker_files.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::string_view text(reinterpret_cast<const char*>(data), size);
   try {
-    const pointflight::LidarSettings settings = pointflight::parse_lidar(text, "input.yaml");
+    const pointflight::LidarSettings settings =
+        text.starts_with('{') ? pointflight::parse_ouster_metadata(text, "input.json")
+                              : pointflight::parse_lidar(text, "input.yaml");
     const auto pattern = pointflight::make_pattern(settings);
     // scans of millions of beams are legal, but would stall the fuzzer
     constexpr double kPatience = 2e5;

@@ -13,6 +13,7 @@
 #include "pointflight/io/csv_table.hpp"
 #include "pointflight/lidar/beam_pattern.hpp"
 #include "pointflight/lidar/lidar_settings.hpp"
+#include "pointflight/lidar/maker_files.hpp"
 #include "tests/support.hpp"
 
 namespace pointflight {
@@ -337,6 +338,155 @@ TEST(Rings, ChannelsWithoutATable) {
                   "1 offsets for 2 elevations");
   expect_contains(error("{channels: 3, elevation_min_deg: 5, elevation_max_deg: 5}\n"),
                   "is not below elevation_max_deg");
+}
+
+/// Fields of view and points per second as the data sheets have them.
+TEST(Rings, ShippedSensorsHaveTheirSheetsFigures) {
+  struct Case {
+    const char* name;
+    int rings;
+    double low_deg, high_deg;
+    double points_per_second;
+  };
+  const Case cases[] = {
+      {"vlp16", 16, -15.0, 15.0, 289e3},      {"vlp16_hires", 16, -10.0, 10.0, 289e3},
+      {"vlp32c", 32, -25.0, 15.0, 579e3},     {"hdl32e", 32, -30.67, 10.67, 694e3},
+      {"hdl64e", 64, -24.8, 5.0, 1.333e6},    {"hdl64e_s3", 64, -24.8, 2.0, 1.333e6},
+      {"vls128", 128, -25.0, 15.0, 2.4e6},    {"xt16", 16, -15.0, 15.0, 320e3},
+      {"xt32", 32, -16.0, 15.0, 640e3},       {"xt32m2x", 32, -20.8, 19.5, 640e3},
+      {"qt64", 64, -52.1, 52.1, 384e3},       {"pandar40p", 40, -25.0, 15.0, 720e3},
+      {"pandar64", 64, -25.0, 15.0, 1.152e6}, {"os0_32", 32, -45.0, 45.0, 328e3},
+      {"os0_64", 64, -45.0, 45.0, 655e3},     {"os0_128", 128, -45.0, 45.0, 1.31e6},
+      {"os1_32", 32, -20.5, 20.5, 328e3},     {"os1_32_gradient", 32, -15.3, 13.0, 328e3},
+      {"os1_64", 64, -16.6, 16.6, 655e3},     {"os1_128", 128, -21.2, 21.2, 1.31e6},
+      {"os2_128", 128, -11.25, 11.25, 1.31e6}};
+  for (const Case& c : cases) {
+    SCOPED_TRACE(c.name);
+    const auto beams = scan_of(c.name, 1);
+    EXPECT_NEAR(
+        static_cast<double>(beams.size()) * 10.0, c.points_per_second, 0.005 * c.points_per_second);
+    std::set<int> rings;
+    double low = 90.0;
+    double high = -90.0;
+    std::vector<double> azimuths;
+    for (const Beam& beam : beams) {
+      rings.insert(beam.ring);
+      low = std::min(low, angles_of(beam).elevation_deg);
+      high = std::max(high, angles_of(beam).elevation_deg);
+      azimuths.push_back(angles_of(beam).azimuth_deg);
+    }
+    EXPECT_EQ(static_cast<int>(rings.size()), c.rings);
+    EXPECT_EQ(*rings.rbegin(), c.rings - 1);
+    EXPECT_NEAR(low, c.low_deg, 1.5);  // units differ from sheets and from one another
+    EXPECT_NEAR(high, c.high_deg, 1.5);
+    std::sort(azimuths.begin(), azimuths.end());
+    double gap = azimuths.front() + 360.0 - azimuths.back();
+    for (std::size_t i = 1; i < azimuths.size(); ++i) {
+      gap = std::max(gap, azimuths[i] - azimuths[i - 1]);
+    }
+    EXPECT_LT(gap, 1.0);  // a whole turn
+  }
+}
+
+TEST(Hesai, ChannelsLeadByTheirAzimuthAndFireAtTheirTimes) {
+  // channel 1 of the table, ring 0 in the maker's driver, fires 6 us into its block at 15 degrees
+  const auto beams = scan_of("xt32");
+  ASSERT_EQ(beams[0].time_offset, Duration(6000));
+  EXPECT_NEAR(angles_of(beams[0]).elevation_deg, 15.0, 1e-4);
+  EXPECT_EQ(beams[0].ring, 0);
+  EXPECT_NEAR(angles_of(beams[0]).azimuth_deg, -3600.0 * 6e-6, 1e-4);  // clockwise
+  EXPECT_EQ(beams[1].time_offset, Duration(7512));
+  EXPECT_EQ(beams[1].ring, 1);
+  // the first channel of a QT64 stands 8.736 degrees clockwise of the encoder
+  const auto wide = scan_of("qt64");
+  EXPECT_NEAR(angles_of(wide[0]).azimuth_deg, -8.736 - 3600.0 * 2.31e-6, 1e-4);
+}
+
+TEST(Prisms, ShippedMid40AndMid70ReachTheirCones) {
+  for (const auto& [name, half] : {std::pair("mid40", 19.173), std::pair("mid70", 35.216)}) {
+    SCOPED_TRACE(name);
+    double widest = 0.0;
+    for (std::uint64_t k = 0; k < 5; ++k) {
+      const auto beams = scan_of(name, k);
+      ASSERT_NEAR(static_cast<double>(beams.size()), 10000.0, 1.0);
+      for (const Beam& beam : beams) {
+        const double away = static_cast<double>(beam.direction_sensor.x());
+        widest = std::max(widest, std::acos(std::min(1.0, away)) / kDegree);
+      }
+    }
+    EXPECT_NEAR(widest, half, 0.02);
+  }
+}
+
+/// A unit of four beams, in the flat layout of old firmware or in sections.
+std::string metadata_of(bool in_sections) {
+  const std::string beams =
+      "\"beam_altitude_angles\": [10, 3, -3, -10], \"beam_azimuth_angles\": [3.1, 1, -1, -3], "
+      "\"lidar_origin_to_beam_origin_mm\": 15.8";
+  const std::string frame =
+      "\"lidar_to_sensor_transform\": [-1,0,0,0, 0,-1,0,0, 0,0,1,36.18, 0,0,0,1]";
+  const std::string unit = "\"prod_line\": \"OS-1-4\"";
+  const std::string mode = "\"lidar_mode\": \"512x20\"";
+  if (!in_sections) return "{" + beams + ", " + frame + ", " + unit + ", " + mode + "}";
+  return "{\"beam_intrinsics\": {" + beams + "}, \"lidar_intrinsics\": {" + frame +
+         "}, \"sensor_info\": {" + unit + "}, \"config_params\": {" + mode + "}}";
+}
+
+TEST(MakerFiles, OustersMetadataIsASensor) {
+  for (const bool in_sections : {false, true}) {
+    const TemporaryFolder folder;
+    testing::write_file(folder / "unit.json", metadata_of(in_sections));
+    const LidarSettings s = load_lidar(folder / "unit.json");
+    EXPECT_EQ(s.rate, 20.0);
+    EXPECT_EQ(s.detection.rated, load_lidar("os1_128").detection.rated);
+    const auto beams = scan_of(folder / "unit.json");
+    ASSERT_EQ(beams.size(), 512u * 4u);
+    EXPECT_NEAR(angles_of(beams[0]).elevation_deg, 10.0, 1e-4);
+    EXPECT_EQ(beams[3].ring, 3);
+    EXPECT_NEAR(beams[0].origin_sensor.z(), 0.03618f, 1e-6f);
+    EXPECT_NEAR(beams[0].origin_sensor.head<2>().norm(), 0.0158f, 1e-6f);
+    // the same as a sensor file with these figures
+    const auto same = parse_lidar(
+        "range_max: 100\nrate: 20\npattern: rings\nrings: {convention: ouster, columns: 512, "
+        "beam_origin_radius: 0.0158, origin_z: 0.03618, elevations_deg: [10, 3, -3, -10], "
+        "azimuth_offsets_deg: [3.1, 1, -1, -3]}\n",
+        "x.yaml");
+    const auto written = make_pattern(same)->beams(0, Executor(1));
+    ASSERT_EQ(written.size(), beams.size());
+    EXPECT_EQ(written[777].direction_sensor, beams[777].direction_sensor);
+  }
+}
+
+TEST(MakerFiles, WrongOnesSayWhat) {
+  const TemporaryFolder folder;
+  const auto error = [&](const std::string& from, const std::string& to) {
+    std::string text = metadata_of(false);
+    const std::size_t at = text.find(from);
+    EXPECT_NE(at, std::string::npos);
+    text.replace(at, from.size(), to);
+    return error_of([&] { parse_ouster_metadata(text, "unit.json"); });
+  };
+  expect_contains(error("512x20", "fast"), "unit.json: lidar_mode: 'fast' is no mode");
+  expect_contains(error("OS-1-4", "XT-32"), "unit.json: prod_line: 'XT-32' is none of");
+  expect_contains(error("[3.1, 1", "[1"), "4 of these and 3 beam_azimuth_angles");
+  expect_contains(error("15.8", "\"near\""), "lidar_origin_to_beam_origin_mm: a number is wanted");
+  expect_contains(error("{", "[{"), "unit.json: this is no JSON object");
+  testing::write_file(folder / "few.csv", "Time/s,Azimuth/deg,Zenith/deg\n1,0,90\n");
+  expect_contains(error_of([&] { load_lidar(folder / "few.csv"); }),
+                  "1 rows are no 4 s of a Livox");
+}
+
+TEST(MakerFiles, ALivoxTableIsASensor) {
+  const TemporaryFolder folder;
+  std::string text = "Time/s,Azimuth/deg,Zenith/deg\n";
+  for (int i = 0; i < 400000; ++i) text += i % 2 == 0 ? "1,0,90\n" : "2,5,85\n";
+  testing::write_file(folder / "mid70.csv", text);
+  const LidarSettings s = load_lidar(folder / "mid70.csv");
+  EXPECT_EQ(s.csv.points_per_second, 100000.0);
+  EXPECT_EQ(s.range_max, load_lidar("mid40").range_max);
+  const auto beams = scan_of(folder / "mid70.csv");
+  ASSERT_EQ(beams.size(), 10000u);
+  EXPECT_NEAR(angles_of(beams[1]).elevation_deg, 5.0, 1e-4);
 }
 
 TEST(Ouster, ColumnsShareATimeAndBeamsLeaveTheRing) {

@@ -155,7 +155,7 @@ TEST_F(Ros2, EveryTypeArrivesReliableAndBestEffort) {
         last = seconds_of(m.header);
       });
       counts["imu"] +=
-          imu.take([](const auto& m) { EXPECT_NEAR(m.linear_acceleration.z, 9.81, 0.5); });
+          imu.take([](const auto& m) { EXPECT_NEAR(m.linear_acceleration.z, 9.81, 2.0); });
       counts["cloud"] += cloud.take([](const auto& m) {
         EXPECT_EQ(m.data._length, m.width * m.point_step);
         EXPECT_EQ(m.point_step, 26u);
@@ -250,7 +250,7 @@ TEST_F(Ros2, PicturesAndCustomMessagesArriveReliableAndBestEffort) {
           ASSERT_LT(point.offset_time, 100'000'000u);
           ASSERT_LT(point.line, 4);
           ASSERT_EQ(point.tag, 16);
-          ASSERT_LT(std::hypot(point.x, point.y, point.z), 70.0);
+          ASSERT_LT(std::hypot(point.x, point.y, point.z), 120.0);
         }
       });
       return image_count > 10 && info_count > 10 && cloud_count > 5;

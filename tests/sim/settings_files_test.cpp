@@ -33,7 +33,7 @@ TEST(KeysWithoutEffect, OfASensorAreErrorsWithLineAndVariant) {
            {"pattern: rings\nrings:\n  table: velodyne_vlp32c\n  columns: 900\n",
             "x.yaml:5: rings.columns: has no effect here: it is for `convention: ouster`"},
            {"pattern: rings\nrings: {channels: 4, convention: ouster, cycle_us: 50}\n",
-            "rings.cycle_us: has no effect here: it is for `convention: velodyne`"},
+            "rings.cycle_us: has no effect here: it is for `convention: velodyne or hesai`"},
            {"pattern: grid\nrings: {table: velodyne_vlp32c}\n",
             "x.yaml:3: rings: has no effect here: it is for `pattern: rings`"},
            {"pattern: grid\ngrid: {fx: 300}\n", "for `projection: pinhole`"},

@@ -6,7 +6,6 @@
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/random.hpp"
 #include "pointflight/geometry/rotation.hpp"
-#include "pointflight/vehicle/imu.hpp"
 #include "pointflight/vehicle/mixer.hpp"
 #include "pointflight/vehicle/multirotor.hpp"
 #include "tests/support.hpp"
@@ -67,6 +66,7 @@ TEST(Multirotor, TorqueFreeSpinConservesMomentumAndEnergy) {
 TEST(Multirotor, RungeKuttaShowsItsOrder) {
   // everything on: lag, drag, gyroscopic torque, tumbling
   VehicleSettings settings = load_vehicle("quad_330");
+  make_legacy(settings);  // kinks of the rotors' curve would hide it
   const Multirotor vehicle(settings);
   const std::vector<double> commands = {900, 1100, 1000, 1050};
   const auto end_state = [&](double dt) {
@@ -174,6 +174,69 @@ TEST(Multirotor, DragTakesEnergyAway) {
   EXPECT_NEAR(a.a_world.x(), -by_hand, 1e-9);
 }
 
+TEST(Multirotor, ThrustFallsWithTheAdvanceRatio) {
+  VehicleSettings settings = load_vehicle("quad_330");
+  const RotorModel& rotor = settings.rotor;
+  const double n = rotor.speed_max / (2.0 * kPi);
+  const double diameter = 2.0 * rotor.radius;
+  // at the table's ratios and halfway between them
+  for (std::size_t i = 0; i < rotor.advance_ratios.size(); ++i) {
+    const double v = rotor.advance_ratios[i] * n * diameter;
+    EXPECT_NEAR(rotor.thrust_share(v, rotor.speed_max), rotor.thrust_shares[i], 1e-12);
+    EXPECT_NEAR(rotor.torque_share(v, rotor.speed_max), rotor.torque_shares[i], 1e-12);
+    if (i == 0) continue;
+    const double between = 0.5 * (rotor.advance_ratios[i - 1] + rotor.advance_ratios[i]);
+    EXPECT_NEAR(rotor.thrust_share(between * n * diameter, rotor.speed_max),
+                0.5 * (rotor.thrust_shares[i - 1] + rotor.thrust_shares[i]),
+                1e-12);
+  }
+  EXPECT_EQ(rotor.thrust_share(-5.0, rotor.speed_max), 1.0);
+  // straight up at full speed: against the equation of one dimension, solved on its own
+  const Multirotor vehicle(settings);
+  VehicleState state = vehicle.hover_at(Vector3d::Zero(), 0.0);
+  const std::vector<double> full(4, rotor.speed_max);
+  for (RotorState& r : state.rotors) r.speed = rotor.speed_max;
+  double v = 0.0;
+  const auto rate = [&](double climb) {
+    const double thrust = 4.0 * rotor.thrust_coefficient * rotor.speed_max * rotor.speed_max *
+                          rotor.thrust_share(climb, rotor.speed_max);
+    const double drag = 0.5 * kAirDensity * settings.drag_area.z() * climb * std::abs(climb);
+    return (thrust - drag) / settings.mass - kGravity;
+  };
+  double fastest = 0.0;
+  for (int i = 0; i < 10000; ++i) {
+    vehicle.step(state, full, 1e-3);
+    for (int k = 0; k < 10; ++k) v += 1e-4 * rate(v + 0.5e-4 * rate(v));
+    ASSERT_NEAR(state.body.v_world.z(), v, 1e-4) << i;
+    fastest = std::max(fastest, v);
+  }
+  EXPECT_NEAR(rate(v), 0.0, 1e-3);  // as fast as it gets
+  EXPECT_LT(fastest, 30.0);
+  EXPECT_GT(fastest, 15.0);
+  // without the curve drag alone would hold it
+  make_legacy(settings);
+  EXPECT_EQ(settings.rotor.thrust_share(20.0, rotor.speed_max), 1.0);
+}
+
+TEST(Multirotor, ShaftPowerIsTorqueTimesSpeed) {
+  const VehicleSettings settings = load_vehicle("quad_330");
+  const Multirotor vehicle(settings);
+  VehicleState state = vehicle.hover_at(Vector3d::Zero(), 0.0);
+  const double w = settings.hover_speed();
+  EXPECT_NEAR(
+      vehicle.shaft_power(state), 4.0 * settings.rotor.torque_coefficient * w * w * w, 1e-9);
+  state.body.v_world = {0, 0, 8.0};
+  EXPECT_NEAR(
+      vehicle.shaft_power(state),
+      4.0 * settings.rotor.torque_coefficient * w * w * w * settings.rotor.torque_share(8.0, w),
+      1e-9);
+  FlightConditions rising;
+  rising.wind_world = {0, 0, 8.0};  // the air goes along
+  EXPECT_NEAR(vehicle.shaft_power(state, rising),
+              4.0 * settings.rotor.torque_coefficient * w * w * w,
+              1e-9);
+}
+
 TEST(Mixer, SpeedsAndWrenchAreInverse) {
   for (const char* name :
        {"lee2010", "marsim_quad", "quad_250", "quad_330", "quad_450", "hexa_550", "octo_1045"}) {
@@ -212,54 +275,6 @@ TEST(Mixer, GivesUpYawBeforeTilt) {
   }
 }
 
-TEST(Imu, ReadsPlusGravityAtRestAndTheLeverArmWhileTurning) {
-  ImuSettings settings;
-  settings.position = {0.1, 0, 0};
-  const Imu imu(settings, 1, 0);
-  Imu::Biases biases;
-  const RigidBodyState still;
-  const ImuSample rest = imu.sample(0, SimTime{}, still, {}, biases);
-  EXPECT_TRUE(rest.accel.isApprox(Vector3d(0, 0, kGravity), 1e-12));
-  EXPECT_EQ(rest.gyro, Vector3d::Zero());
-  // turning about z at 3 rad/s and speeding up by 2 rad/s^2: centripetal and tangential
-  RigidBodyState turning;
-  turning.omega_body = {0, 0, 3};
-  const ImuSample t = imu.sample(1, SimTime{}, turning, {{0, 0, 0}, {0, 0, 2}}, biases);
-  EXPECT_NEAR(t.accel.x(), -0.9, 1e-12);
-  EXPECT_NEAR(t.accel.y(), 0.2, 1e-12);
-  EXPECT_EQ(t.gyro.z(), 3.0);
-  // tilted: gravity turns into the body; in free fall nothing is felt
-  RigidBodyState rolled;
-  rolled.q_world_body = quaternion_from_rpy(kPi / 2, 0, 0);
-  EXPECT_NEAR(imu.sample(2, SimTime{}, rolled, {}, biases).accel.y(), kGravity, 1e-12);
-  EXPECT_LT(imu.sample(3, SimTime{}, still, {{0, 0, -kGravity}, {0, 0, 0}}, biases).accel.norm(),
-            1e-12);
-}
-
-TEST(Imu, NoiseAndBiasWalkHaveTheFilesDensities) {
-  ImuSettings settings;
-  settings.rate = 200;
-  settings.gyro_noise_density = 1e-3;
-  settings.accel_bias_walk = 1e-2;
-  constexpr int kRuns = 400;
-  constexpr int kSamples = 200;  // one second
-  double gyro_square = 0.0;
-  double bias_square = 0.0;
-  for (int run = 0; run < kRuns; ++run) {
-    const Imu imu(settings, static_cast<std::uint64_t>(run), 0);
-    Imu::Biases biases;
-    ImuSample last{};
-    for (int i = 0; i <= kSamples; ++i) {
-      last = imu.sample(i, SimTime{}, {}, {}, biases);
-      gyro_square += last.gyro.squaredNorm() / (3.0 * kRuns * (kSamples + 1));
-    }
-    bias_square += (last.accel - Vector3d(0, 0, kGravity)).squaredNorm() / (3.0 * kRuns);
-  }
-  // white noise of density d sampled at f has deviation d sqrt(f); a walk grows as w sqrt(T)
-  EXPECT_NEAR(std::sqrt(gyro_square), 1e-3 * std::sqrt(200.0), 1e-3 * std::sqrt(200.0) * 0.01);
-  EXPECT_NEAR(std::sqrt(bias_square), 1e-2, 1e-2 * 0.1);
-}
-
 TEST(VehicleSettings, BadFilesSayWhereAndWhat) {
   const std::string good = testing::read_file(load_vehicle("quad_330").path);
   const auto with = [&](const std::string& from, const std::string& to) {
@@ -272,6 +287,8 @@ TEST(VehicleSettings, BadFilesSayWhereAndWhat) {
   expect_contains(with("mass: 1.6", "mass: 1.6 kg"), "plain number in kg");
   expect_contains(with("speed_min: 150", "speed_min: 2150"), "not below speed_max");
   expect_contains(with("damping: 1.0", "dampng: 1.0"), "did you mean 'damping'");
+  expect_contains(with("thrust_shares: [1,", "thrust_shares: ["), "as many of each are wanted");
+  expect_contains(with("advance_ratios: [0,", "advance_ratios: [0.5,"), "not in ascending order");
   expect_contains(error_of([] { load_vehicle("quad_300"); }), "did you mean 'quad_330'");
 }
 

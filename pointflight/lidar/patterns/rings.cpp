@@ -90,15 +90,20 @@ CsvTable load_table(const LidarSettings& settings) {
   return table;
 }
 
-/// Velodyne: the head turns clockwise seen from above; a channel fires at its own time within the
-/// cycle, at azimuth encoder(time) - rot_correction. Geometry of the channels as in the maker's ROS
-/// driver (velodyne_pointcloud, RawData::unpack), with the offsets as the beam's origin.
-class VelodynePattern : public BeamPattern {
+/// Velodyne and Hesai: the head turns clockwise seen from above; a channel fires at its own time
+/// within the cycle. Velodyne: at azimuth encoder(time) - rot_correction, geometry of the channels
+/// as in the maker's ROS driver (velodyne_pointcloud, RawData::unpack), with the offsets as the
+/// beam's origin. Hesai: at encoder(time) + azimuth offset, as in the maker's SDK
+/// (HesaiLidar_SDK_2.0); that driver's frame has y where ours has x: the way that azimuth 0 looks.
+class FiringsPattern : public BeamPattern {
  public:
-  explicit VelodynePattern(const LidarSettings& settings)
+  explicit FiringsPattern(const LidarSettings& settings)
       : rate_(settings.rate), train_(1e6 / settings.rings.cycle_us, Duration{0}, settings.rate) {
     const CsvTable table = load_table(settings);
-    const int ring = table.require("ring");
+    const bool hesai = settings.rings.convention == RingConvention::kHesai;
+    // Hesai's driver numbers channels in the order of the table, from 1 there and from 0 in points
+    const int channel_number = hesai ? table.find("channel") : -1;
+    const int ring = channel_number < 0 ? table.require("ring") : channel_number;
     const int elevation = table.require("elevation_deg");
     const int azimuth = table.require("azimuth_offset_deg");
     const int fire_time = table.find("fire_time_us");
@@ -107,17 +112,18 @@ class VelodynePattern : public BeamPattern {
     for (std::size_t row = 0; row < table.rows(); ++row) {
       Channel channel{};
       channel.elevation = math::sincos(table.at(row, elevation) * kDegree);
-      channel.azimuth = table.at(row, azimuth) * kDegree;
+      channel.azimuth = (hesai ? -1.0 : 1.0) * table.at(row, azimuth) * kDegree;
       double time_us = fire_time < 0 ? std::nan("") : table.at(row, fire_time);
       if (std::isnan(time_us)) {
         time_us = settings.rings.channel_interval_us * static_cast<double>(row);
       }
       channel.vertical = vertical < 0 ? 0.0 : table.at(row, vertical) * 1e-3;
       channel.horizontal = horizontal < 0 ? 0.0 : table.at(row, horizontal) * 1e-3;
-      const double number = table.at(row, ring);
+      const double number = table.at(row, ring) - (channel_number < 0 ? 0.0 : 1.0);
       if (!(number >= 0.0 && number <= 65535.0) || !(std::abs(time_us) < 1e6)) {
         throw InputError(
-            fmt::format("{}: row {}: a ring from 0 to 65535 and a firing time within a second are "
+            fmt::format("{}: row {}: a ring from 0 to 65535 (a channel from 1) and a firing time "
+                        "within a second are "
                         "wanted",
                         settings.rings.table,
                         row + 1));
@@ -168,7 +174,7 @@ class VelodynePattern : public BeamPattern {
  private:
   struct Channel {
     math::SinCos elevation;
-    double azimuth;  ///< rot_correction, rad
+    double azimuth;  ///< By which it lags behind the encoder, rad.
     Duration fire_time;
     double vertical;    ///< m
     double horizontal;  ///< m
@@ -238,7 +244,7 @@ class OusterPattern : public BeamPattern {
 std::unique_ptr<BeamPattern> make_rings_pattern(const LidarSettings& settings) {
   if (settings.rings.convention == RingConvention::kOuster)
     return std::make_unique<OusterPattern>(settings);
-  return std::make_unique<VelodynePattern>(settings);
+  return std::make_unique<FiringsPattern>(settings);
 }
 
 }  // namespace pointflight

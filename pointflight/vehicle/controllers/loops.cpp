@@ -56,16 +56,16 @@ std::vector<double> LoopController::update(const RigidBodyState& state,
       const Vector3d f = a + Vector3d(0, 0, kGravity);
       memory.limits.tilt = differ(f, self.tilt_limited(f));
       const Vector3d torque = self.demanded_torque(state, demand, dt, memory);
-      return self.speeds(demand.thrust, torque, dt, memory);
+      return self.speeds(state, demand.thrust, torque, dt, memory);
     }
     std::vector<double> operator()(const RotorSpeedCommand& c) const { return c.speeds; }
     std::vector<double> operator()(const BodyRateCommand& c) const {
-      return self.speeds(c.thrust, self.rate_torque(state, c.omega_body), dt, memory);
+      return self.speeds(state, c.thrust, self.rate_torque(state, c.omega_body), dt, memory);
     }
     std::vector<double> operator()(const AttitudeCommand& c) const {
       const AttitudeDemand demand{c.q_world_body.toRotationMatrix(), c.omega_body, c.thrust};
       const Vector3d torque = self.demanded_torque(state, demand, dt, memory);
-      return self.speeds(demand.thrust, torque, dt, memory);
+      return self.speeds(state, demand.thrust, torque, dt, memory);
     }
     std::vector<double> operator()(const AccelerationCommand& c) const {
       const Vector3d a = self.allowed(c.a_world, memory);
@@ -96,9 +96,15 @@ std::vector<double> LoopController::update(const RigidBodyState& state,
   return std::visit(Visitor{*this, state, dt, memory}, setpoint);
 }
 
+/// Through still air: what wind adds is a disturbance.
+AirMotion LoopController::motion_of(const RigidBodyState& state) {
+  return {state.q_world_body.conjugate() * state.v_world, state.omega_body};
+}
+
 /// A rotor that speeds up turns the body as well: by J_r dw/dt beside k_m w^2, which together
 /// answer a speed command with 1 + T s, T = J_r / (2 k_m w). A lag of that time takes it out again.
-std::vector<double> LoopController::speeds(double thrust,
+std::vector<double> LoopController::speeds(const RigidBodyState& state,
+                                           double thrust,
                                            const Vector3d& torque,
                                            double dt,
                                            ControllerMemory& memory) const {
@@ -106,9 +112,11 @@ std::vector<double> LoopController::speeds(double thrust,
   const double slope = 2.0 * rotor.torque_coefficient * settings_.hover_speed();
   const double lag = slope > 0.0 ? rotor.inertia / slope : 0.0;
   memory.yaw_torque += dt / (lag + dt) * (torque.z() - memory.yaw_torque);
-  std::vector<double> speeds = mixer_.speeds({thrust, {torque.x(), torque.y(), memory.yaw_torque}});
+  const AirMotion motion = motion_of(state);
+  std::vector<double> speeds =
+      mixer_.speeds({thrust, {torque.x(), torque.y(), memory.yaw_torque}}, motion);
   const double weight = settings_.mass * kGravity;
-  memory.limits.rotors = std::abs(mixer_.wrench(speeds).thrust - thrust) > 1e-3 * weight;
+  memory.limits.rotors = std::abs(mixer_.wrench(speeds, motion).thrust - thrust) > 1e-3 * weight;
   return speeds;
 }
 
@@ -130,7 +138,7 @@ Vector3d LoopController::expected_acceleration(const RigidBodyState& state,
   const Vector3d gravity(0, 0, kGravity);
   const Vector3d f = tilt_limited(a_world + gravity);
   const double wanted = settings_.mass * f.dot(state.q_world_body * Vector3d::UnitZ());
-  const double share = wanted > 0.0 ? mixer_.wrench(speeds).thrust / wanted : 1.0;
+  const double share = wanted > 0.0 ? mixer_.wrench(speeds, motion_of(state)).thrust / wanted : 1.0;
   return std::min(share, 1.0) * f - gravity + drag_of(state, state.v_world);
 }
 

@@ -62,8 +62,10 @@ class LoopController : public Controller {
                                        const Vector3d& v_world,
                                        double dt,
                                        ControllerMemory& memory) const;
+  [[nodiscard]] static AirMotion motion_of(const RigidBodyState& state);
   /// Rotor speeds for thrust and torque.
-  [[nodiscard]] std::vector<double> speeds(double thrust,
+  [[nodiscard]] std::vector<double> speeds(const RigidBodyState& state,
+                                           double thrust,
                                            const Vector3d& torque,
                                            double dt,
                                            ControllerMemory& memory) const;

@@ -1,0 +1,76 @@
+// Which beams come back: a link budget by the ranges that a sensor's sheet states.
+#pragma once
+
+#include <vector>
+
+#include "pointflight/core/settings.hpp"
+
+namespace pointflight {
+
+/// How far a sensor sees a diffuse (Lambertian) target that it looks at face on.
+struct RatedRange {
+  double reflectivity = 0.1;  ///< Of the target, 0 to 1.
+  double range = 100.0;       ///< m
+  double sun_klx = 100.0;     ///< In such light, kilolux.
+  /// The same figures.
+  bool operator==(const RatedRange&) const = default;
+};
+
+/// The `detection` section of a sensor file.
+struct DetectionSettings {
+  std::vector<RatedRange> rated;  ///< None: whatever a beam meets comes back.
+  double probability = 0.5;       ///< Of a return at the rated ranges.
+  double false_alarm = 1e-4;      ///< Share of beams that report what is not there.
+  double range_limit = 0.0;       ///< m, nothing farther is reported however bright; 0: no limit.
+  /// What the sensor reports of a diffuse target of 100 %, face on; 0: the map's intensity.
+  double intensity_at_100_percent = 0.0;
+};
+
+/// The keys of the section.
+void describe(SettingsVisitor& visitor, DetectionSettings& settings);
+
+/// Probability of a return by the signal's strength.
+///
+/// The signal counts by its *margin*: how many times stronger it is than one from a target that the
+/// sensor is rated for. By the link budget the margin of a diffuse surface is
+/// (rho cos(incidence) / 0.1) (R10 / R)^(1 / gamma), with gamma = 0.5 where the sun does not matter
+/// and less where sheets say so (0.25 for an Avia at 100 klx). Here the law is the sheet's own:
+/// rated ranges are met exactly, and lie on a straight line in (log reflectivity, log range)
+/// between and beyond. With one rated range gamma is 0.5. Light changes the ranges in proportion
+/// between the levels that are rated, and keeps the nearest level's beyond.
+class DetectionModel {
+ public:
+  /// `settings` as `describe` admits; `sun_klx`: background light, 0 at night, 100 in full sun.
+  DetectionModel(const DetectionSettings& settings, double sun_klx);
+
+  /// True if every beam that meets something comes back.
+  [[nodiscard]] bool is_ideal() const { return points_.empty(); }
+  /// Rated range of a diffuse target of this reflectivity (> 0), face on, m.
+  [[nodiscard]] double rated_range(double reflectivity) const;
+  /// Reflectivity of the target that is rated for a range (> 0, m); above 1 for one that no diffuse
+  /// target reaches.
+  [[nodiscard]] double rated_reflectivity(double range) const;
+  /// Of the signal from `range` (> 0, m); `reflectivity` is the surface's times the cosine of the
+  /// incidence, times what the air lets through, there and back.
+  [[nodiscard]] double margin(double reflectivity, double range) const;
+  /// Signal of margin 1 by the pure link budget, in the unit of `Weather::target`: rho / R^2 of the
+  /// darkest rated target.
+  [[nodiscard]] double least_strength() const;
+  /// Of a threshold detector amid Gaussian noise: Phi((T + z) m - T), T = Phi^-1(1 - false_alarm),
+  /// z = Phi^-1(probability at m = 1).
+  [[nodiscard]] double probability(double margin) const;
+  /// No diffuse target comes back from farther than this with a probability above 0.001, m;
+  /// `range_limit` where that is less.
+  [[nodiscard]] double reach() const;
+
+ private:
+  struct Point {
+    double log_reflectivity, log_range;
+  };
+  std::vector<Point> points_;  ///< By ascending reflectivity, two at least.
+  double threshold_ = 0.0;     ///< T
+  double slope_ = 0.0;         ///< T + z
+  double limit_ = 0.0;         ///< `range_limit`
+};
+
+}  // namespace pointflight

@@ -1,0 +1,76 @@
+// What a beam that met something brings back to the sensor.
+#pragma once
+
+#include "pointflight/lidar/detection.hpp"
+#include "pointflight/lidar/lidar_settings.hpp"
+#include "pointflight/lidar/weather.hpp"
+#include "pointflight/render/renderer.hpp"
+
+namespace pointflight {
+
+/// What returns depend on beside the sensor.
+struct Surroundings {
+  double sun_klx = 100.0;  ///< Background light, kilolux: 100 in full sun, 0 at night.
+  double reflectivity =
+      0.3;  ///< Of surfaces of which the map does not say it, at the laser's line.
+  /// Reflectivity of a surface per unit of the map's intensity; 0: intensities are not calibrated.
+  double reflectivity_per_intensity = 0.0;
+  WeatherSettings weather{};  ///< What is in the air.
+};
+
+/// Their keys.
+void describe(SettingsVisitor& visitor, Surroundings& surroundings);
+
+/// The random part of one beam.
+struct BeamChance {
+  double normal = 0.0;      ///< Standard normal, of the range.
+  double detection = 0.0;   ///< Uniform in [0, 1): whether it comes back.
+  double place = 0.0;       ///< Uniform in [0, 1): where a false return lies.
+  double drop = 0.0;        ///< Uniform in [0, 1): what the air gives back (`Weather::soft`).
+  double drop_place = 0.0;  ///< Uniform in [0, 1).
+};
+
+/// One return as the sensor reports it.
+struct Return {
+  float range = -1.0f;     ///< m; of a depth camera: depth. Negative: no return.
+  float intensity = 0.0f;  ///< In the sensor's own unit, or the map's where it has none.
+  bool is_false = false;   ///< Nothing was there, or nothing but fog, dust or a drop.
+};
+
+/// A sensor's detection, noise and rounding.
+class ReturnModel {
+ public:
+  /// Of a sensor file.
+  ReturnModel(const LidarSettings& lidar, const Surroundings& surroundings);
+
+  /// True where draws for the air count.
+  [[nodiscard]] bool has_weather() const { return !weather_.is_clear(); }
+  /// How far beams have to be followed, m (a depth camera's: depth).
+  [[nodiscard]] double reach() const { return reach_; }
+  /// Standard deviation of the range at a range (m) and a margin (`DetectionModel`; infinity where
+  /// the sensor has no rated ranges), m.
+  [[nodiscard]] double range_sigma(double range, double margin) const;
+  /// Of what a beam met; `hit.range` is what the sensor measures. None where nothing comes back, or
+  /// from nearer than the sensor's least range. A beam whose draw lies below the false alarms'
+  /// share reports a range anywhere. Of a surface and what is in the air before it the stronger
+  /// signal counts, if the sensor detects it.
+  [[nodiscard]] Return measure(const Hit& hit, const BeamChance& chance) const;
+
+ private:
+  [[nodiscard]] double reflectivity_of(const Hit& hit) const;
+  [[nodiscard]] Return from_air(double strength_of_surface,
+                                double range,
+                                const BeamChance& chance) const;
+  [[nodiscard]] float rounded(double range) const;
+
+  RangeNoiseSettings noise_;
+  Surroundings surroundings_;
+  DetectionModel detection_;
+  Weather weather_;
+  double false_alarm_ = 0.0;
+  double intensity_scale_ = 0.0;
+  double range_min_ = 0.0;
+  double reach_ = 0.0;
+};
+
+}  // namespace pointflight
