@@ -130,7 +130,11 @@ void add_lidar_command(CLI::App& parent, int& /*exit_code*/) {
   list->callback([flags] { list_lidars(*flags); });
   auto* show =
       app->add_subcommand("show", "What a sensor's file says, and figures of its first scan");
-  show->add_option("name", flags->name, "A shipped sensor or the path of a .yaml file")->required();
+  show->add_option(
+          "name",
+          flags->name,
+          "A shipped sensor, a .yaml file, Ouster's metadata (.json) or a Livox table (.csv)")
+      ->required();
   show->add_option(
       "--png", flags->picture, "Draw its pattern after 0.1 s and 1 s, and its coverage over time");
   add_force_flag(*show, flags->force);

@@ -112,7 +112,10 @@ void add_scan_command(CLI::App& parent, int& /*exit_code*/) {
   auto* app = parent.add_subcommand("scan", "Take one scan from one pose");
   auto flags = std::make_shared<ScanFlags>();
   app->add_option("map", flags->map, "A .pfmap")->required();
-  app->add_option("--lidar", flags->lidar, "A shipped sensor or a .yaml file")
+  app->add_option(
+         "--lidar",
+         flags->lidar,
+         "A shipped sensor, a .yaml file, Ouster's metadata (.json) or a Livox table (.csv)")
       ->capture_default_str();
   app->add_option(
          "--pose", flags->pose, "x,y,z,roll,pitch,yaw of the sensor in the world: metres, degrees")
@@ -147,22 +150,24 @@ void add_scan_command(CLI::App& parent, int& /*exit_code*/) {
       ->check(within(0.0, 1e6))
       ->capture_default_str()
       ->excludes(legacy);
+  std::vector<CLI::Option*> weathers;
   const auto weather = [&](const char* name, const char* help, WeatherKind kind, bool by_rate) {
-    app->add_option_function<double>(
-           name,
-           [flags, kind, by_rate](double figure) {
-             flags->surroundings.weather.kind = kind;
-             (by_rate ? flags->surroundings.weather.rate : flags->surroundings.weather.visibility) =
-                 figure;
-           },
-           help)
-        ->check(by_rate ? within(0.1, 200.0) : within(5.0, 1e5))
-        ->excludes(legacy);
+    auto* option = app->add_option_function<double>(
+        name,
+        [flags, kind, by_rate](double figure) {
+          WeatherSettings& w = flags->surroundings.weather;
+          w.kind = kind;
+          (by_rate ? w.rate : w.visibility) = figure;
+        },
+        help);
+    option->check(by_rate ? within(0.1, 200.0) : within(5.0, 1e5))->excludes(legacy);
+    for (CLI::Option* other : weathers) option->excludes(other);
+    weathers.push_back(option);
   };
-  weather("--fog", "Visibility in metres", WeatherKind::kFog, false);
-  weather("--dust", "Visibility in metres", WeatherKind::kDust, false);
-  weather("--rain", "Millimetres per hour", WeatherKind::kRain, true);
-  weather("--snow", "Millimetres of water per hour", WeatherKind::kSnow, true);
+  weather("--fog", "Visibility in fog, m", WeatherKind::kFog, false);
+  weather("--dust", "Visibility in dust, m", WeatherKind::kDust, false);
+  weather("--rain", "Rain, mm/h", WeatherKind::kRain, true);
+  weather("--snow", "Snow, mm of water per hour", WeatherKind::kSnow, true);
   app->add_option("-o,--output",
                   flags->output,
                   "PCD of the points in the sensor frame: x y z intensity range time ring label");

@@ -1,6 +1,7 @@
 #include "examples/lio/point_map.hpp"
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
 
 namespace lio {

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <utility>
 
+#include "pointflight/core/interpolation.hpp"
 #include "pointflight/core/math.hpp"
 
 namespace pointflight {
@@ -14,30 +14,26 @@ constexpr double kPureGamma = 0.5;       // received power falls with the square
 constexpr double kLeastAlarm = 1e-9;     // T is finite
 constexpr double kFurthestShare = 1e-3;  // probability that counts as none
 
-/// Ranges of one level of light, by log reflectivity.
-using Curve = std::vector<std::pair<double, double>>;
-
-/// Value at x of a line through points by ascending x, two at least; straight on beyond them.
-double on_line(const Curve& points, double x) {
-  const auto above =
-      std::upper_bound(points.begin() + 1, points.end() - 1, x, [](double value, const auto& p) {
-        return value < p.first;
-      });
-  const auto [x0, y0] = *(above - 1);
-  const auto [x1, y1] = *above;
-  return y0 + (y1 - y0) * (x - x0) / (x1 - x0);
-}
-
-/// One level's curve; a lone range gets a second by the pure link budget.
-Curve curve_of(const std::map<double, double>& ranges) {
-  Curve curve;
-  for (const auto& [reflectivity, range] : ranges) {
-    curve.emplace_back(math::log(reflectivity), math::log(range));
+/// Rated ranges of one level of light, in logarithms, by ascending reflectivity.
+struct Level {
+  std::vector<double> reflectivities, ranges;
+  [[nodiscard]] double range_at(double reflectivity) const {
+    return on_line(reflectivities, ranges, reflectivity);
   }
-  if (curve.size() == 1) {
-    curve.emplace_back(curve[0].first + 1.0, curve[0].second + kPureGamma);
+};
+
+/// A lone range gets a second by the pure link budget.
+Level level_of(const std::map<double, double>& rated) {
+  Level level;
+  for (const auto& [reflectivity, range] : rated) {
+    level.reflectivities.push_back(math::log(reflectivity));
+    level.ranges.push_back(math::log(range));
   }
-  return curve;
+  if (rated.size() == 1) {
+    level.reflectivities.push_back(level.reflectivities[0] + 1.0);
+    level.ranges.push_back(level.ranges[0] + kPureGamma);
+  }
+  return level;
 }
 
 }  // namespace
@@ -81,39 +77,26 @@ DetectionModel::DetectionModel(const DetectionSettings& settings, double sun_klx
       brighter == levels.begin() || brighter->first <= sun_klx ? brighter : std::prev(brighter);
   const double share =
       brighter == darker ? 1.0 : (sun_klx - darker->first) / (brighter->first - darker->first);
-  const Curve bright = curve_of(brighter->second);
-  const Curve dark = curve_of(darker->second);
-  std::vector<double> places;
-  for (const Curve* curve : {&bright, &dark}) {
-    for (const auto& [place, range] : *curve) places.push_back(place);
-  }
-  std::sort(places.begin(), places.end());
-  places.erase(std::unique(places.begin(), places.end()), places.end());
-  for (const double place : places) {
-    const double range =
-        share * math::exp(on_line(bright, place)) + (1.0 - share) * math::exp(on_line(dark, place));
-    points_.push_back({place, math::log(range)});
+  const Level bright = level_of(brighter->second);
+  const Level dark = level_of(darker->second);
+  log_reflectivities_ = bright.reflectivities;
+  log_reflectivities_.insert(
+      log_reflectivities_.end(), dark.reflectivities.begin(), dark.reflectivities.end());
+  std::sort(log_reflectivities_.begin(), log_reflectivities_.end());
+  log_reflectivities_.erase(std::unique(log_reflectivities_.begin(), log_reflectivities_.end()),
+                            log_reflectivities_.end());
+  for (const double place : log_reflectivities_) {
+    log_ranges_.push_back(math::log(share * math::exp(bright.range_at(place)) +
+                                    (1.0 - share) * math::exp(dark.range_at(place))));
   }
 }
 
 double DetectionModel::rated_range(double reflectivity) const {
-  const double x = math::log(reflectivity);
-  std::size_t i = 1;
-  while (i + 1 < points_.size() && points_[i].log_reflectivity < x) ++i;
-  const Point& a = points_[i - 1];
-  const Point& b = points_[i];
-  const double share = (x - a.log_reflectivity) / (b.log_reflectivity - a.log_reflectivity);
-  return math::exp(a.log_range + share * (b.log_range - a.log_range));
+  return math::exp(on_line(log_reflectivities_, log_ranges_, math::log(reflectivity)));
 }
 
 double DetectionModel::rated_reflectivity(double range) const {
-  const double y = math::log(range);
-  std::size_t i = 1;
-  while (i + 1 < points_.size() && points_[i].log_range < y) ++i;
-  const Point& a = points_[i - 1];
-  const Point& b = points_[i];
-  const double share = (y - a.log_range) / (b.log_range - a.log_range);
-  return math::exp(a.log_reflectivity + share * (b.log_reflectivity - a.log_reflectivity));
+  return math::exp(on_line(log_ranges_, log_reflectivities_, math::log(range)));
 }
 
 double DetectionModel::margin(double reflectivity, double range) const {
@@ -125,7 +108,7 @@ double DetectionModel::probability(double margin) const {
 }
 
 double DetectionModel::least_strength() const {
-  return math::exp(points_.front().log_reflectivity - 2.0 * points_.front().log_range);
+  return math::exp(log_reflectivities_.front() - 2.0 * log_ranges_.front());
 }
 
 double DetectionModel::reach() const {

@@ -44,7 +44,7 @@ class DetectionModel {
   DetectionModel(const DetectionSettings& settings, double sun_klx);
 
   /// True if every beam that meets something comes back.
-  [[nodiscard]] bool is_ideal() const { return points_.empty(); }
+  [[nodiscard]] bool is_ideal() const { return log_ranges_.empty(); }
   /// Rated range of a diffuse target of this reflectivity (> 0), face on, m.
   [[nodiscard]] double rated_range(double reflectivity) const;
   /// Reflectivity of the target that is rated for a range (> 0, m); above 1 for one that no diffuse
@@ -64,13 +64,11 @@ class DetectionModel {
   [[nodiscard]] double reach() const;
 
  private:
-  struct Point {
-    double log_reflectivity, log_range;
-  };
-  std::vector<Point> points_;  ///< By ascending reflectivity, two at least.
-  double threshold_ = 0.0;     ///< T
-  double slope_ = 0.0;         ///< T + z
-  double limit_ = 0.0;         ///< `range_limit`
+  std::vector<double> log_reflectivities_;  ///< Of targets, ascending; two at least, or none.
+  std::vector<double> log_ranges_;          ///< Rated for these; ascending, too.
+  double threshold_ = 0.0;                  ///< T
+  double slope_ = 0.0;                      ///< T + z
+  double limit_ = 0.0;                      ///< `range_limit`
 };
 
 }  // namespace pointflight

@@ -46,14 +46,14 @@ ReturnModel::ReturnModel(const LidarSettings& lidar, const Surroundings& surroun
     : noise_(lidar.noise),
       surroundings_(surroundings),
       detection_(lidar.detection, surroundings.sun_klx),
+      reach_(detection_.is_ideal() ? lidar.range_max : detection_.reach()),
       weather_(detection_.is_ideal() ? WeatherSettings{} : surroundings.weather,
                divergence_of(lidar.optics),
                lidar.range_min,
-               detection_.is_ideal() ? lidar.range_max : detection_.reach()),
+               reach_),
       false_alarm_(detection_.is_ideal() ? 0.0 : lidar.detection.false_alarm),
       intensity_scale_(lidar.detection.intensity_at_100_percent),
-      range_min_(lidar.range_min),
-      reach_(detection_.is_ideal() ? lidar.range_max : detection_.reach()) {}
+      range_min_(lidar.range_min) {}
 
 double ReturnModel::reflectivity_of(const Hit& hit) const {
   double reflectivity = surroundings_.reflectivity;

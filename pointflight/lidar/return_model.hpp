@@ -66,11 +66,11 @@ class ReturnModel {
   RangeNoiseSettings noise_;
   Surroundings surroundings_;
   DetectionModel detection_;
+  double reach_ = 0.0;
   Weather weather_;
   double false_alarm_ = 0.0;
   double intensity_scale_ = 0.0;
   double range_min_ = 0.0;
-  double reach_ = 0.0;
 };
 
 }  // namespace pointflight

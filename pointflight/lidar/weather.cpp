@@ -144,14 +144,6 @@ double Weather::drops_in(std::size_t cell, double strength) const {
   return volume * drops_ / steepness_ * math::exp(-steepness_ * least);
 }
 
-double Weather::stronger_drops(double strength, double range) const {
-  double sum = 0.0;
-  for (std::size_t i = 0; i < cells_.size() && cells_[i].range < range; ++i) {
-    sum += drops_in(i, strength);
-  }
-  return sum;
-}
-
 /// Expected numbers of stronger drops, for strengths evenly in the logarithm.
 void Weather::tabulate_drops() {
   const double strongest = fresnel_ / squared(cells_.front().range);

@@ -67,9 +67,6 @@ class Weather {
   /// its peak, for drops how strong the strongest is and where. None where nothing comes back.
   [[nodiscard]] std::optional<Soft> soft(double range, double first, double second) const;
 
-  /// Expected number of drops before `range` (m) that are stronger than `strength`.
-  [[nodiscard]] double stronger_drops(double strength, double range) const;
-
  private:
   void set_up_fog(double visibility, double nearest, double reach);
   void set_up_drops(double rate, double divergence, double nearest, double reach);

@@ -146,8 +146,8 @@ void describe(SettingsVisitor& v, Scenario& s) {
   v.value(
       {"legacy",
        "",
-       "sensors as before version 0.2: LiDARs return all that a beam meets within range_max, IMUs "
-       "have white noise and walk alone"},
+       "LiDARs, IMUs and rotors of version 0.1: all that a beam meets within range_max comes back, "
+       "IMUs have white noise and walk alone, thrust does not depend on the air's speed"},
       s.legacy);
   v.value({"duration", "s", "0: as long as the mission takes", 0, 1e6}, s.duration);
   v.value({"physics_step", "s", "of the integrator", 0.0001, 0.005}, s.physics_step);

@@ -112,8 +112,8 @@ struct Scenario {
   std::vector<ObstacleSettings> obstacles;  ///< What moves by itself.
   AirSetup air;                             ///< Wind and ground effect.
   Surroundings surroundings;                ///< What LiDARs' returns depend on.
-  /// Sensors as before version 0.2: LiDARs return all that a beam meets within `range_max`, IMUs
-  /// have white noise and walk alone. For results that must stay comparable.
+  /// LiDARs, IMUs and rotors of version 0.1, bit for bit (`Lidar` without surroundings,
+  /// `make_legacy`). For results that must stay comparable.
   bool legacy = false;
   OutputSetup output;  ///< What is written.
   /// What other floors and programs read (`scenario_sections`), by name.

@@ -7,6 +7,7 @@
 
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/input_error.hpp"
+#include "pointflight/core/interpolation.hpp"
 #include "pointflight/core/resources.hpp"
 
 namespace pointflight {
@@ -136,14 +137,11 @@ void describe_battery(SettingsVisitor& v, BatterySettings& b) {
   });
 }
 
-/// Value at x of a line through points by ascending x; constant beyond them.
-double on_line(const std::vector<double>& xs, const std::vector<double>& ys, double x) {
-  if (x <= xs.front()) return ys.front();
-  for (std::size_t i = 1; i < xs.size(); ++i) {
-    if (x > xs[i]) continue;
-    return ys[i - 1] + (ys[i] - ys[i - 1]) * (x - xs[i - 1]) / (xs[i] - xs[i - 1]);
-  }
-  return ys.back();
+/// Constant beyond the first and the last.
+double share_at(const std::vector<double>& ratios,
+                const std::vector<double>& shares,
+                double ratio) {
+  return on_line(ratios, shares, std::clamp(ratio, ratios.front(), ratios.back()));
 }
 
 /// J = v / (n D).
@@ -162,9 +160,15 @@ void check_rotor_curves(const RotorModel& r, const Fail& fail) {
              r.thrust_shares.size(),
              r.torque_shares.size()));
   }
+  if (n == 1) fail("rotor.advance_ratios", "one alone; two or more are wanted, or none");
   for (std::size_t i = 1; i < n; ++i) {
-    if (r.advance_ratios[i] > r.advance_ratios[i - 1]) continue;
-    fail("rotor.advance_ratios", "not in ascending order");
+    if (r.advance_ratios[i] <= r.advance_ratios[i - 1]) {
+      fail("rotor.advance_ratios", "not in ascending order");
+    }
+    // else no speed, or two, would give a thrust
+    if (r.thrust_shares[i] > r.thrust_shares[i - 1] || r.thrust_shares[0] <= 0.0) {
+      fail("rotor.thrust_shares", "these fall with the advance ratio, from above 0");
+    }
   }
 }
 
@@ -294,12 +298,37 @@ Solid VehicleSettings::hull() const {
 
 double RotorModel::thrust_share(double climb, double speed) const {
   if (advance_ratios.empty()) return 1.0;
-  return on_line(advance_ratios, thrust_shares, advance_ratio(climb, speed, radius));
+  return share_at(advance_ratios, thrust_shares, advance_ratio(climb, speed, radius));
+}
+
+/// Where the share is constant w^2 = T / (k_f share). Along a straight piece of it, share = y + m J
+/// with J = c / w, c = pi v / R, and y w^2 + m c w = T / k_f. The piece whose own J it has is the
+/// one.
+double RotorModel::speed_for(double thrust, double climb) const {
+  const double square = thrust / thrust_coefficient;
+  if (advance_ratios.empty()) return std::sqrt(square);
+  const auto ratio_of = [&](double speed) { return advance_ratio(climb, speed, radius); };
+  const std::vector<double>& js = advance_ratios;
+  constexpr double kRounding = 1e-9;
+  if (const double speed = std::sqrt(square / thrust_shares.front());
+      ratio_of(speed) <= js.front()) {
+    return speed;
+  }
+  const double scale = kPi * climb / radius;
+  for (std::size_t i = 1; i < js.size(); ++i) {
+    const double slope = (thrust_shares[i] - thrust_shares[i - 1]) / (js[i] - js[i - 1]);
+    const double base = thrust_shares[i - 1] - slope * js[i - 1];
+    const double half = 0.5 * slope * scale;
+    const double speed = (std::sqrt(std::max(0.0, half * half + base * square)) - half) / base;
+    const double ratio = ratio_of(speed);
+    if (ratio >= js[i - 1] - kRounding && ratio <= js[i] + kRounding) return speed;
+  }
+  return speed_max;
 }
 
 double RotorModel::torque_share(double climb, double speed) const {
   if (advance_ratios.empty()) return 1.0;
-  return on_line(advance_ratios, torque_shares, advance_ratio(climb, speed, radius));
+  return share_at(advance_ratios, torque_shares, advance_ratio(climb, speed, radius));
 }
 
 double VehicleSettings::hover_speed() const {

@@ -40,6 +40,9 @@ struct RotorModel {
 
   /// Of the static thrust, at `climb` m/s along the axis and `speed` rad/s (> 0).
   [[nodiscard]] double thrust_share(double climb, double speed) const;
+  /// Speed (rad/s) that gives a thrust (N, 0 or more) at `climb` m/s, whatever the limits.
+  [[nodiscard]] double speed_for(double thrust, double climb) const;
+  /// Of the static torque.
   /// Of the static torque.
   [[nodiscard]] double torque_share(double climb, double speed) const;
 };
@@ -157,8 +160,8 @@ struct VehicleSettings {
   [[nodiscard]] Vector3d drag_in_still_air(const Vector3d& v_body) const;
 };
 
-/// Takes away what vehicles did not have before version 0.2: errors of the IMU beyond noise and
-/// walk, vibration, rotors that feel the air's speed. For runs that must stay comparable.
+/// Takes away what vehicles did not have in version 0.1: errors of the IMU beyond noise and walk,
+/// vibration, rotors that feel the air's speed. For runs that must stay comparable.
 void make_legacy(VehicleSettings& settings);
 
 /// As files have it: "rotor_speeds", ...

@@ -59,20 +59,6 @@ double Mixer::climb_of(std::size_t rotor, const AirMotion& motion) const {
   return (motion.v_body + motion.omega_body.cross(places_[rotor].position)).z();
 }
 
-/// Of the rotor that gives a thrust as it climbs. Each round takes the share at the last one's
-/// speed: where thrust falls by a half three are within 1 %.
-double Mixer::speed_for(double thrust, double climb) const {
-  double speed = std::sqrt(thrust / thrust_coefficient_);
-  if (rotor_.advance_ratios.empty()) return speed;
-  constexpr int kRounds = 4;
-  constexpr double kLeastShare = 0.05;
-  for (int i = 0; i < kRounds; ++i) {
-    const double share = std::max(kLeastShare, rotor_.thrust_share(climb, speed));
-    speed = std::sqrt(thrust / (thrust_coefficient_ * share));
-  }
-  return std::clamp(speed, rotor_.speed_min, rotor_.speed_max);
-}
-
 std::vector<double> Mixer::speeds(const Wrench& wrench, const AirMotion& motion) const {
   const auto n = static_cast<double>(allocation_.cols());
   Eigen::VectorXd tilt = inverse_.col(1) * wrench.torque.x() + inverse_.col(2) * wrench.torque.y();
@@ -97,7 +83,10 @@ std::vector<double> Mixer::speeds(const Wrench& wrench, const AirMotion& motion)
   std::vector<double> speeds(static_cast<std::size_t>(thrusts.size()));
   for (std::size_t i = 0; i < speeds.size(); ++i) {
     const double thrust = thrusts[static_cast<Eigen::Index>(i)];
-    speeds[i] = speed_for(std::clamp(thrust, thrust_min_, thrust_max_), climb_of(i, motion));
+    speeds[i] = rotor_.speed_for(std::clamp(thrust, thrust_min_, thrust_max_), climb_of(i, motion));
+    if (!rotor_.advance_ratios.empty()) {
+      speeds[i] = std::clamp(speeds[i], rotor_.speed_min, rotor_.speed_max);
+    }
   }
   return speeds;
 }

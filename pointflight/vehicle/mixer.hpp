@@ -40,7 +40,6 @@ class Mixer {
 
  private:
   [[nodiscard]] double climb_of(std::size_t rotor, const AirMotion& motion) const;
-  [[nodiscard]] double speed_for(double thrust, double climb) const;
 
   RotorModel rotor_;
   std::vector<RotorPlacement> places_;

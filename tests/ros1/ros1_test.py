@@ -136,8 +136,9 @@ class Ros1Test(unittest.TestCase):
             self.assertGreater(min(periods), 0.5, topic)
             for period in periods:
                 self.assertAlmostEqual(period, round(period), delta=0.11, msg=topic)
-        imu = kept["/drone0/imu"][-1]
-        self.assertAlmostEqual(imu.linear_acceleration.z, 9.81, delta=2)
+        # the mean: rotors shake each sample
+        up = [m.linear_acceleration.z for m in kept["/drone0/imu"]]
+        self.assertAlmostEqual(sum(up) / len(up), 9.81, delta=0.3)
         odometry = kept["/drone0/odom"][-1]
         self.assertEqual(odometry.child_frame_id, "drone0/base_link")
         cloud = kept["/drone0/mid360/points"][-1]

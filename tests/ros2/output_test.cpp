@@ -147,6 +147,7 @@ TEST_F(Ros2, EveryTypeArrivesReliableAndBestEffort) {
     const auto flight = fly("", scenario);
     std::map<std::string, int> counts;
     double last = -1.0;
+    double up = 0.0;
     const auto all_there = [&] {
       counts["odometry"] += odometry.take([&](const auto& m) {
         EXPECT_STREQ(m.header.frame_id, "world");
@@ -154,8 +155,7 @@ TEST_F(Ros2, EveryTypeArrivesReliableAndBestEffort) {
         EXPECT_GT(seconds_of(m.header), last);
         last = seconds_of(m.header);
       });
-      counts["imu"] +=
-          imu.take([](const auto& m) { EXPECT_NEAR(m.linear_acceleration.z, 9.81, 2.0); });
+      counts["imu"] += imu.take([&](const auto& m) { up += m.linear_acceleration.z; });
       counts["cloud"] += cloud.take([](const auto& m) {
         EXPECT_EQ(m.data._length, m.width * m.point_step);
         EXPECT_EQ(m.point_step, 26u);
@@ -184,6 +184,7 @@ TEST_F(Ros2, EveryTypeArrivesReliableAndBestEffort) {
       return true;
     };
     EXPECT_TRUE(eventually(all_there, 30.0)) << flight->stop();
+    EXPECT_NEAR(up / counts["imu"], 9.81, 0.3);  // the mean: rotors shake each sample
     for (const auto& [name, count] : counts) {
       EXPECT_TRUE(count > 0 || (name == "fixed" && !reliable)) << name;
     }
@@ -244,14 +245,17 @@ TEST_F(Ros2, PicturesAndCustomMessagesArriveReliableAndBestEffort) {
         ASSERT_GT(m.point_num, 1000u);
         EXPECT_EQ(m.timebase, 1'000'000'000ull * m.header.stamp.sec + m.header.stamp.nanosec);
         EXPECT_EQ(m.points._buffer[0].offset_time, 0u);
+        int far = 0;
         for (std::uint32_t i = 1; i < m.point_num; ++i) {
           const auto& point = m.points._buffer[i];
           ASSERT_GE(point.offset_time, m.points._buffer[i - 1].offset_time);
           ASSERT_LT(point.offset_time, 100'000'000u);
           ASSERT_LT(point.line, 4);
           ASSERT_EQ(point.tag, 16);
-          ASSERT_LT(std::hypot(point.x, point.y, point.z), 120.0);
+          // but for false returns, one of 10^4 beams
+          far += std::hypot(point.x, point.y, point.z) < 70.0 ? 0 : 1;
         }
+        EXPECT_LT(far, 20);
       });
       return image_count > 10 && info_count > 10 && cloud_count > 5;
     })) << image_count

@@ -4,9 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 
-#include "examples/lio/odometry.hpp"
+#include "examples/lio/judge.hpp"
 #include "pointflight/core/constants.hpp"
 #include "tests/sim/runs.hpp"
 
@@ -59,52 +58,6 @@ std::shared_ptr<const SurfelMap> corridor() {
   return map;
 }
 
-/// Runs the odometry beside a flight.
-class Listener : public SampleSink {
- public:
-  Listener(const VehicleAgent& vehicle, bool with_times)
-      : T_imu_lidar_(Pose{Quaterniond::Identity(), -vehicle.settings().imu.position} *
-                     vehicle.lidars().at(0)->T_body_sensor()),
-        with_times_(with_times) {}
-
-  void on_sample(const Sample& sample) override {
-    if (const auto* state = std::get_if<StateSample>(&sample)) {
-      const Pose pose = state->state.body.T_world_body();
-      if (!odometry_) {
-        lio::Tuning tuning;
-        tuning.thinning = 0.5;  // fewer points: a test is run often
-        odometry_.emplace(pose, T_imu_lidar_, tuning);
-      }
-      if (last_) way += (pose.translation - last_->translation).norm();
-      last_ = pose;
-      fastest = std::max(fastest, state->state.body.omega_body.norm());
-    } else if (const auto* imu = std::get_if<ImuSample>(&sample); imu && odometry_) {
-      odometry_->add({imu->stamp, imu->gyro, imu->accel});
-    } else if (const auto* scanned = std::get_if<ScanSample>(&sample); scanned && odometry_) {
-      const Scan& scan = *scanned->scan;
-      std::vector<lio::LidarPoint> points;
-      for (const ScanPoint& p : scan.points) {
-        points.push_back(
-            {with_times_ ? scan.seen_at(p) : scan.end, p.position_sensor.cast<double>()});
-      }
-      const lio::State& estimate = odometry_->add_scan(points, scan.end);
-      const Pose truth = scanned->T_world_sensor.at(scan.end) * T_imu_lidar_.inverse();
-      error = (estimate.position - truth.translation).norm();
-      squares_ += error * error;
-      scans_ += 1.0;
-    }
-  }
-  [[nodiscard]] double rms() const { return std::sqrt(squares_ / scans_); }
-  double way = 0.0, fastest = 0.0, error = 0.0;
-
- private:
-  Pose T_imu_lidar_;
-  bool with_times_;
-  std::optional<lio::Odometry> odometry_;
-  std::optional<Pose> last_;
-  double squares_ = 0.0, scans_ = 0.0;
-};
-
 struct Drift {
   double share;  ///< Of the way, in the end.
   double rms;    ///< Over all scans, m.
@@ -123,12 +76,14 @@ Drift drift(const std::string& lidar, bool with_times, double visibility = 0.0) 
   Simulation simulation(scenario, corridor(), executor);
   simulation.command(
       0, TrajectoryCommand{std::make_shared<SpinningToAndFro>(Vector3d(4.0, 1.5, 1.4), 10.0, 3.0)});
-  Listener listener(simulation.vehicle(0), with_times);
-  while (simulation.step(listener)) {
+  lio::Tuning tuning;
+  tuning.thinning = 0.5;  // fewer points: a test is run often
+  lio::Judge judge(simulation.vehicle(0), with_times, nullptr, tuning);
+  while (simulation.step(judge)) {
   }
-  EXPECT_GT(listener.way, 19.0);
-  EXPECT_GT(listener.fastest, 2.8);
-  return {listener.error / listener.way, listener.rms()};
+  EXPECT_GT(judge.way(), 19.0);
+  EXPECT_GT(judge.fastest_turn(), 2.8);
+  return {judge.last_error() / judge.way(), judge.rms_error()};
 }
 
 TEST(Lio, NeedsTheTimesOfPointsAndAClearView) {

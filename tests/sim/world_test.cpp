@@ -363,6 +363,7 @@ TEST(Commands, DisarmedInTheAirItFallsAndLiesWhereItFell) {
 
 TEST(Faults, DoWhatTheySay) {
   Scenario scenario = hovering();
+  scenario.legacy = true;  // readings of 16 bits repeat by themselves
   VehicleSetup& v = scenario.vehicles[0];
   v.lidars = {LidarMount{}, LidarMount{"vlp32c"}};
   v.faults = {{.kind = FaultKind::kLidar, .from = 1.0, .until = 2.0, .index = 0},
@@ -392,7 +393,7 @@ TEST(Faults, DoWhatTheySay) {
   EXPECT_GT(watch.scans[1], 8);
   EXPECT_LT(watch.scans[1], 22);
   EXPECT_EQ(watch.stuck.size(), 1u);
-  EXPECT_GT(watch.free.size(), 5u);  // of 16 bits
+  EXPECT_GT(watch.free.size(), 100u);
   EXPECT_EQ(watch.late, 200);
   // a dead rotor
   scenario = hovering();

@@ -259,6 +259,31 @@ TEST(Mixer, SpeedsAndWrenchAreInverse) {
   }
 }
 
+TEST(Mixer, AllowsForTheRotorsClimb) {
+  for (const char* name : {"quad_250", "quad_330", "hexa_550", "octo_1045"}) {
+    SCOPED_TRACE(name);
+    const VehicleSettings settings = load_vehicle(name);
+    const Mixer mixer(settings);
+    const double weight = settings.mass * kGravity;
+    for (const double climb : {-6.0, -0.5, 0.0, 0.5, 3.0, 6.0, 9.0}) {
+      SCOPED_TRACE(climb);
+      const AirMotion motion{{2.0, -1.0, climb}, {0.4, -0.8, 0.2}};
+      const Wrench wanted{1.1 * weight, {0.02 * weight * 0.1, -0.01 * weight * 0.1, 0.0}};
+      const Wrench got = mixer.wrench(mixer.speeds(wanted, motion), motion);
+      EXPECT_NEAR(got.thrust, wanted.thrust, 1e-9 * weight);
+      EXPECT_TRUE(got.torque.isApprox(wanted.torque, 1e-7));
+    }
+    // speeds beyond any limit, which the mixer cuts
+    const RotorModel& rotor = settings.rotor;
+    const double fast = rotor.speed_for(1.0, 1000.0);
+    EXPECT_NEAR(
+        rotor.thrust_coefficient * fast * fast * rotor.thrust_share(1000.0, fast), 1.0, 1e-9);
+    EXPECT_EQ(mixer.speeds({weight, Vector3d::Zero()}, {{0, 0, 1000}, Vector3d::Zero()})[0],
+              rotor.speed_max);
+    EXPECT_NEAR(rotor.speed_for(2.0, -1000.0), std::sqrt(2.0 / rotor.thrust_coefficient), 1e-9);
+  }
+}
+
 TEST(Mixer, GivesUpYawBeforeTilt) {
   const VehicleSettings settings = load_vehicle("quad_330");
   const Mixer mixer(settings);
@@ -289,6 +314,8 @@ TEST(VehicleSettings, BadFilesSayWhereAndWhat) {
   expect_contains(with("damping: 1.0", "dampng: 1.0"), "did you mean 'damping'");
   expect_contains(with("thrust_shares: [1,", "thrust_shares: ["), "as many of each are wanted");
   expect_contains(with("advance_ratios: [0,", "advance_ratios: [0.5,"), "not in ascending order");
+  expect_contains(with("thrust_shares: [1, 0.87", "thrust_shares: [1, 1.87"),
+                  "fall with the advance");
   expect_contains(error_of([] { load_vehicle("quad_300"); }), "did you mean 'quad_330'");
 }
 
