@@ -22,6 +22,8 @@ struct ScanFlags {
   std::string map;
   std::string lidar = "mid360";
   std::string pose;
+  std::int64_t sub_rays = -1;
+  std::string returns;
   std::string renderer = "beam";
   std::uint64_t seed = 1;
   std::uint64_t index = 0;
@@ -45,6 +47,8 @@ void print_scan(const Scan& scan, const ScanFlags& flags) {
                ? 0.0f
                : ranges[static_cast<std::size_t>(share * static_cast<double>(ranges.size() - 1))];
   };
+  const auto further = std::count_if(
+      scan.points.begin(), scan.points.end(), [](const ScanPoint& p) { return p.echo > 0; });
   const auto unknown = std::count_if(
       scan.points.begin(), scan.points.end(), [](const ScanPoint& p) { return p.is_unknown; });
   if (flags.json) {
@@ -57,18 +61,20 @@ void print_scan(const Scan& scan, const ScanFlags& flags) {
     json["range_min"] = at(0.0);
     json["range_median"] = at(0.5);
     json["range_max"] = at(1.0);
-    if (scan.marks_unknown) json["unknown"] = unknown;
+    if (scan.marks.echoes) json["further_returns"] = further;
+    if (scan.marks.unknown) json["unknown"] = unknown;
     if (!flags.output.empty()) json["file"] = flags.output;
     print_json(json);
     return;
   }
   fmt::print("{} of {} beams returned; range {:.2f} to {:.2f} m, median {:.2f} m\n",
-             scan.points.size(),
+             scan.points.size() - static_cast<std::size_t>(further),
              scan.beams,
              at(0.0),
              at(1.0),
              at(0.5));
-  if (!scan.marks_unknown) return;
+  if (scan.marks.echoes) fmt::print("{} further returns of the same beams\n", further);
+  if (!scan.marks.unknown) return;
   fmt::print("{} ({:.1f} %) came through space that no survey saw\n",
              unknown,
              100.0 * static_cast<double>(unknown) /
@@ -83,7 +89,11 @@ void take_scan(const ScanFlags& flags) {
   refuse_to_overwrite(flags.output, flags.force);
   refuse_to_overwrite(flags.png, flags.force);
   const auto map = SurfelMap::open(flags.map);
-  const LidarSettings settings = load_lidar(flags.lidar);
+  LidarSettings settings = load_lidar(flags.lidar);
+  if (flags.sub_rays >= 0) settings.optics.sub_rays = flags.sub_rays;
+  for (const Named<ReturnMode>& mode : return_modes()) {
+    if (flags.returns == mode.name) settings.detection.returns = mode.value;
+  }
   const Lidar lidar(
       settings, 0, nullptr, flags.legacy ? std::nullopt : std::optional(flags.surroundings));
   const auto renderer = make_renderer(flags.renderer, Scene{map});
@@ -150,6 +160,22 @@ void add_scan_command(CLI::App& parent, int& /*exit_code*/) {
       ->check(within(0.0, 1e6))
       ->capture_default_str()
       ->excludes(legacy);
+  app->add_option(
+         "--sub-rays",
+         flags->sub_rays,
+         "Rays over each beam's cross-section: 0: as many as it takes, 1: beams are lines, "
+         "-1: as the sensor file says")
+      ->check(CLI::Range(-1, 4096))
+      ->capture_default_str()
+      ->excludes(legacy);
+  std::vector<std::string> modes;
+  for (const Named<ReturnMode>& mode : return_modes()) modes.emplace_back(mode.name);
+  app->add_option("--returns",
+                  flags->returns,
+                  "Which echoes of a beam are reported, instead of the sensor file's: one, or dual "
+                  "(strongest and last), or triple")
+      ->check(CLI::IsMember(modes))
+      ->excludes(legacy);
   std::vector<CLI::Option*> weathers;
   const auto weather = [&](const char* name, const char* help, WeatherKind kind, bool by_rate) {
     auto* option = app->add_option_function<double>(
@@ -168,9 +194,11 @@ void add_scan_command(CLI::App& parent, int& /*exit_code*/) {
   weather("--dust", "Visibility in dust, m", WeatherKind::kDust, false);
   weather("--rain", "Rain, mm/h", WeatherKind::kRain, true);
   weather("--snow", "Snow, mm of water per hour", WeatherKind::kSnow, true);
-  app->add_option("-o,--output",
-                  flags->output,
-                  "PCD of the points in the sensor frame: x y z intensity range time ring label");
+  app->add_option(
+      "-o,--output",
+      flags->output,
+      "PCD of the points in the sensor frame: x y z intensity range time ring label; echo, "
+      "where beams may have several");
   app->add_flag("--mark-unknown",
                 flags->mark_unknown,
                 "Points say whether they came through space that no survey saw (field unknown, 0 "

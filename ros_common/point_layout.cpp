@@ -16,7 +16,10 @@ using Source = PointLayout::Source;
 using Field = PointLayout::Field;
 using Type = msg::PointField;
 
-constexpr std::uint8_t kLivoxTag = 0x10;
+/// Of a Livox point: bits 4 and 5 number its beam's returns, the first one 1.
+constexpr std::uint8_t tag_of(std::uint8_t echo) {
+  return static_cast<std::uint8_t>((echo + 1) << 4);
+}
 
 constexpr Field kX{"x", 0, Type::kFloat32, Source::kX};
 constexpr Field kY{"y", 4, Type::kFloat32, Source::kY};
@@ -112,6 +115,7 @@ struct Values {
   std::uint16_t ring = 0;
   float range = 0.0f;
   bool is_unknown = false;
+  std::uint8_t echo = 0;
   Duration after{0};          ///< After the stamp.
   std::int64_t absolute = 0;  ///< ns since the epoch.
 };
@@ -156,7 +160,7 @@ double number_for(Source source, const Values& v) {
     case Source::kRing:
       return v.ring;
     case Source::kTag:
-      return kLivoxTag;
+      return tag_of(v.echo);
     case Source::kSecondsAfter:
       return to_seconds(v.after);
     case Source::kNanosAfter:
@@ -245,6 +249,7 @@ msg::PointCloud2 cloud_of(const Scan& scan,
     values.ring = point.ring;
     values.range = point.range;
     values.is_unknown = point.is_unknown;
+    values.echo = point.echo;
     const SimTime fired = scan.start + point.time_offset;
     values.after = fired - time;
     values.absolute = (fired.time_since_epoch() + epoch).count();
@@ -272,7 +277,7 @@ msg::CustomMsg custom_cloud_of(const Scan& scan,
                             point.position_sensor.y(),
                             point.position_sensor.z(),
                             as_byte(point.intensity == 0.0f ? plain : point.intensity),
-                            kLivoxTag,
+                            tag_of(point.echo),
                             static_cast<std::uint8_t>(point.ring)});
   }
   return cloud;

@@ -33,6 +33,7 @@ enum class StreamId : std::uint32_t {
   kVibration = 23,        ///< angles that rotors start from; index: rotor
   kPatternPhase = 24,     ///< which scan of a pattern that does not repeat a run starts with
   kLidarWeather = 25,     ///< drops and fog; entity and index as of kLidarDetection
+  kLidarEcho = 26,        ///< entity: echo << 28 | vehicle << 8 | lidar, index as above
   kTest = 1000,           ///< inputs of tests and benchmarks
 };
 

@@ -248,6 +248,15 @@ POINTFLIGHT_INLINE M8 any_bit(const U8& a, std::uint32_t bits) {
   return out;
 }
 
+/// Lanes i for which bit i is set: the inverse of `bits`.
+POINTFLIGHT_INLINE M8 lanes_of(std::uint32_t bits) {
+  alignas(32) static constexpr std::uint32_t kBit[8] = {1, 2, 4, 8, 16, 32, 64, 128};
+  M8 out;
+  const auto set = hn::Set(kU, bits);
+  POINTFLIGHT_EACH(hn::RebindMask(kF, hn::TestBit(set, hn::Load(kU, kBit + p * kWidth))))
+  return out;
+}
+
 /// Towards zero.
 POINTFLIGHT_INLINE I8 to_int(const F8& a) {
   I8 out;

@@ -10,6 +10,12 @@
 namespace pointflight {
 namespace {
 
+constexpr Named<ReturnMode> kReturnModes[] = {{ReturnMode::kStrongest, "strongest"},
+                                              {ReturnMode::kFirst, "first"},
+                                              {ReturnMode::kLast, "last"},
+                                              {ReturnMode::kDual, "dual"},
+                                              {ReturnMode::kTriple, "triple"}};
+
 constexpr double kPureGamma = 0.5;       // received power falls with the square of the range
 constexpr double kLeastAlarm = 1e-9;     // T is finite
 constexpr double kFurthestShare = 1e-3;  // probability that counts as none
@@ -38,6 +44,15 @@ Level level_of(const std::map<double, double>& rated) {
 
 }  // namespace
 
+std::size_t most_returns(ReturnMode mode) {
+  if (mode == ReturnMode::kDual) return 2;
+  return mode == ReturnMode::kTriple ? 3 : 1;
+}
+
+std::span<const Named<ReturnMode>> return_modes() {
+  return kReturnModes;
+}
+
 void describe(SettingsVisitor& v, DetectionSettings& s) {
   v.list({"rated", "", "ranges that the sheet states; none: all that a beam meets comes back"},
          s.rated,
@@ -59,6 +74,7 @@ void describe(SettingsVisitor& v, DetectionSettings& s) {
            0,
            255},
           s.intensity_at_100_percent);
+  v.choice({"returns", "", "which echoes of a beam are reported"}, s.returns, kReturnModes);
 }
 
 DetectionModel::DetectionModel(const DetectionSettings& settings, double sun_klx)

@@ -1,6 +1,8 @@
 // Which beams come back: a link budget by the ranges that a sensor's sheet states.
 #pragma once
 
+#include <cstddef>
+#include <span>
 #include <vector>
 
 #include "pointflight/core/settings.hpp"
@@ -16,6 +18,20 @@ struct RatedRange {
   bool operator==(const RatedRange&) const = default;
 };
 
+/// Which echoes of a beam a sensor reports.
+enum class ReturnMode {
+  kStrongest,  ///< One: the strongest.
+  kFirst,      ///< One: the nearest.
+  kLast,       ///< One: the farthest.
+  kDual,       ///< The strongest and the last; where these are one, the second strongest.
+  kTriple,     ///< The three strongest.
+};
+
+/// Of one beam.
+std::size_t most_returns(ReturnMode mode);
+/// Their names in sensor files.
+std::span<const Named<ReturnMode>> return_modes();
+
 /// The `detection` section of a sensor file.
 struct DetectionSettings {
   std::vector<RatedRange> rated;  ///< None: whatever a beam meets comes back.
@@ -24,6 +40,7 @@ struct DetectionSettings {
   double range_limit = 0.0;       ///< m, nothing farther is reported however bright; 0: no limit.
   /// What the sensor reports of a diffuse target of 100 %, face on; 0: the map's intensity.
   double intensity_at_100_percent = 0.0;
+  ReturnMode returns = ReturnMode::kStrongest;  ///< Where a beam has several echoes.
 };
 
 /// The keys of the section.

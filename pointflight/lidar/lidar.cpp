@@ -36,10 +36,10 @@ class BeamNormals {
 
 /// Range (of a depth camera: depth) with the sensor's Gaussian noise, where returns are not
 /// modelled.
-float measured(float range,
-               const RangeNoiseSettings& noise,
-               BeamNormals& normals,
-               std::size_t beam) {
+float with_noise(float range,
+                 const RangeNoiseSettings& noise,
+                 BeamNormals& normals,
+                 std::size_t beam) {
   const double r = static_cast<double>(range);
   const double far = noise.range_sigma_per_m2 * r * r;
   const double sigma = std::sqrt(noise.range_sigma * noise.range_sigma + far * far);
@@ -57,22 +57,29 @@ Vector3d turned(const Matrix3d& m, const Vector3f& v) {
           m(2, 0) * x + m(2, 1) * y + m(2, 2) * z};
 }
 
-/// By the true range: noise takes no point into a wall. False returns have none.
+/// By the true range: noise takes no point into a wall. False alarms have none but their own.
 void mark_unknown(const KnownSpace& known,
                   std::span<const Ray> rays,
-                  std::span<const Hit> hits,
+                  std::span<const float> true_ranges,
                   Scan& scan,
                   const Executor& executor) {
-  scan.marks_unknown = true;
+  scan.marks.unknown = true;
   executor.parallel_for(scan.points.size(), kChunk, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       ScanPoint& point = scan.points[i];
       const Ray& ray = rays[point.beam];
-      const float range = point.label == kFalseReturn ? point.range : hits[point.beam].range;
-      point.is_unknown = !known.is_seen_through(
-          ray.origin_world, ray.direction_world.cast<double>(), static_cast<double>(range));
+      point.is_unknown = !known.is_seen_through(ray.origin_world,
+                                                ray.direction_world.cast<double>(),
+                                                static_cast<double>(true_ranges[i]));
     }
   });
+}
+
+/// The horizontal of the sensor across a beam; straight up or down, its y axis.
+Vector3f across(const Vector3f& direction_sensor) {
+  const float level = std::hypot(direction_sensor.x(), direction_sensor.y());
+  if (level < 1e-6f) return Vector3f::UnitY();
+  return {-direction_sensor.y() / level, direction_sensor.x() / level, 0.0f};
 }
 
 }  // namespace
@@ -84,6 +91,7 @@ Lidar::Lidar(const LidarSettings& settings,
     : settings_(settings),
       sensor_(sensor),
       beams_(beams ? std::move(beams) : std::make_shared<const ScanBeams>(settings)),
+      footprint_(settings.optics),
       measures_depth_(settings.pattern == ScanPattern::kGrid &&
                       settings.grid.projection == GridProjection::kPinhole) {
   if (surroundings) returns_.emplace(settings, *surroundings);
@@ -98,6 +106,10 @@ float Lidar::depth_share(const Beam& beam) const {
 /// How far beams are followed: a range, of a camera a depth.
 double Lidar::range_limit() const {
   return returns_ ? returns_->reach() : settings_.range_max;
+}
+
+bool Lidar::reports_echoes() const {
+  return returns_ && !footprint_.is_line() && most_returns(settings_.detection.returns) > 1;
 }
 
 double Lidar::reach() const {
@@ -128,16 +140,17 @@ Duration Lidar::period() const {
   return from_seconds(1.0 / settings_.rate);
 }
 
-/// Beams in the world, each from the pose at its own time, those of a snapshot from the one in the
-/// middle. Fills `offsets` where there are as many.
-std::vector<Ray> Lidar::rays_of(std::span<const Beam> beams,
-                                SimTime start,
-                                const PoseTrack& T_world_sensor,
-                                bool snapshot,
-                                std::span<Duration> offsets,
-                                const Executor& executor) const {
-  const Pose middle = T_world_sensor.at(start + period() / 2);
-  std::vector<Ray> rays(beams.size());
+/// Each beam from the pose at its own time, those of a snapshot from the one in the middle.
+Lidar::WorldBeams Lidar::in_world(std::span<const Beam> beams,
+                                  const ScanRequest& request,
+                                  const PoseTrack& T_world_sensor,
+                                  bool snapshot,
+                                  const Executor& executor) const {
+  const Pose middle = T_world_sensor.at(request.start + period() / 2);
+  WorldBeams world;
+  world.rays.resize(beams.size());
+  world.offsets.resize(request.bodies.empty() || snapshot ? 0 : beams.size());
+  world.across.resize(returns_ && !footprint_.is_line() ? beams.size() : 0);
   const auto range_max = static_cast<float>(range_limit());
   executor.parallel_for(beams.size(), kChunk, [&](std::size_t begin, std::size_t end) {
     Vector3d position = middle.translation;
@@ -146,18 +159,21 @@ std::vector<Ray> Lidar::rays_of(std::span<const Beam> beams,
     for (std::size_t i = begin; i < end; ++i) {
       if (!snapshot && beams[i].time_offset != pose_time) {
         pose_time = beams[i].time_offset;
-        const Pose pose = T_world_sensor.at(start + pose_time);
+        const Pose pose = T_world_sensor.at(request.start + pose_time);
         position = pose.translation;
         rotation = pose.rotation.toRotationMatrix();
       }
-      rays[i].origin_world = turned(rotation, beams[i].origin_sensor) + position;
-      rays[i].direction_world =
-          turned(rotation, beams[i].direction_sensor).cast<float>().normalized();
-      rays[i].range_max = range_max / depth_share(beams[i]);
-      if (!offsets.empty()) offsets[i] = beams[i].time_offset;
+      Ray& ray = world.rays[i];
+      ray.origin_world = turned(rotation, beams[i].origin_sensor) + position;
+      ray.direction_world = turned(rotation, beams[i].direction_sensor).cast<float>().normalized();
+      ray.range_max = range_max / depth_share(beams[i]);
+      if (!world.offsets.empty()) world.offsets[i] = beams[i].time_offset;
+      if (!world.across.empty()) {
+        world.across[i] = turned(rotation, across(beams[i].direction_sensor)).cast<float>();
+      }
     }
   });
-  return rays;
+  return world;
 }
 
 /// Turns each ray by the noise of its direction. The sensor knows nothing of it: points lie where
@@ -180,31 +196,48 @@ void Lidar::shake(const ScanRequest& request, std::span<Ray> rays, const Executo
   });
 }
 
-/// What the sensor reports of each beam; a negative range where it reports nothing.
+/// What the sensor reports of each beam, `most_returns` places each; a negative range where it
+/// reports nothing.
 std::vector<Return> Lidar::returns_of(const ScanRequest& request,
                                       std::span<const Beam> beams,
-                                      std::span<const Hit> hits,
+                                      std::span<const Echoes> echoes,
                                       const Executor& executor) const {
-  if (!returns_) return noisy_ranges(request, beams, hits, executor);
-  std::vector<Return> returns(beams.size());
+  const std::size_t most = most_returns(settings_.detection.returns);
+  std::vector<Return> returns(beams.size() * most);
   const RandomStream noise(request.seed, StreamId::kLidarRangeNoise, sensor_);
   const RandomStream detection(request.seed, StreamId::kLidarDetection, sensor_);
   const RandomStream weather(request.seed, StreamId::kLidarWeather, sensor_);
   executor.parallel_for(beams.size(), kChunk, [&](std::size_t begin, std::size_t end) {
     BeamNormals normals(noise, request.index);
-    for (std::size_t i = begin; i < end; ++i) {
-      const float share = depth_share(beams[i]);
-      const auto [detected, place] = detection.uniform2(request.index << 32 | i);
-      Hit hit = hits[i];
-      if (hit.is_return()) hit.range *= share;
-      BeamChance chance{request.noise ? normals(i) : 0.0, detected, place};
-      if (returns_->has_weather()) {
-        const auto [drop, drop_place] = weather.uniform2(request.index << 32 | i);
+    std::size_t i = begin;
+    const ChanceOf chance_of = [&](std::size_t echo) {
+      BeamChance chance;
+      const std::uint64_t address = request.index << 32 | i;
+      if (echo == 0) {
+        const auto [detected, place] = detection.uniform2(address);
+        return BeamChance{request.noise ? normals(i) : 0.0, detected, place};
+      }
+      const RandomStream own(
+          request.seed, StreamId::kLidarEcho, static_cast<std::uint32_t>(echo) << 28 | sensor_);
+      chance.normal = request.noise ? own.normal(2 * address) : 0.0;
+      chance.detection = own.uniform(2 * address + 1);
+      if (echo == Echoes::kMost) {
+        const auto [drop, drop_place] = weather.uniform2(address);
         chance.drop = drop;
         chance.drop_place = drop_place;
       }
-      returns[i] = returns_->measure(hit, chance);
-      returns[i].range /= share;
+      return chance;
+    };
+    for (; i < end; ++i) {
+      const float share = depth_share(beams[i]);
+      Echoes seen = echoes[i];
+      for (std::size_t k = 0; k < seen.count; ++k) seen.all[k].range *= share;
+      const std::span<Return> made(returns.data() + i * most, most);
+      const std::size_t count = returns_->measure(seen.span(), chance_of, made);
+      for (std::size_t k = 0; k < count; ++k) {
+        made[k].range /= share;
+        made[k].true_range /= share;
+      }
     }
   });
   return returns;
@@ -224,13 +257,37 @@ std::vector<Return> Lidar::noisy_ranges(const ScanRequest& request,
       if (!hits[i].is_return()) continue;
       const float share = depth_share(beams[i]);
       float range = hits[i].range;
-      if (request.noise) range = measured(range * share, settings_.noise, normals, i) / share;
+      if (request.noise) range = with_noise(range * share, settings_.noise, normals, i) / share;
       // noise neither makes nor ends a return at the far limit; it may at the near one
       if (range * share < range_min) continue;
-      returns[i] = {range, hits[i].intensity};
+      returns[i] = {range, hits[i].intensity, hits[i].label, hits[i].range};
     }
   });
   return returns;
+}
+
+/// Renders the beams and measures what comes back: as many places per beam as it may have returns.
+std::vector<Return> Lidar::measured(const ScanRequest& request,
+                                    std::span<const Beam> beams,
+                                    const WorldBeams& world,
+                                    const RayBatch& batch,
+                                    const Renderer& renderer,
+                                    const Executor& executor) const {
+  std::vector<Echoes> echoes(returns_ ? beams.size() : 0);
+  // what a renderer of images sees has no parts
+  if (returns_ && !footprint_.is_line() && !renderer.is_snapshot()) {
+    footprint_.trace({batch, world.across}, renderer, *returns_, echoes, executor);
+    return returns_of(request, beams, echoes, executor);
+  }
+  std::vector<Hit> hits(beams.size());
+  renderer.render(batch, hits, executor);
+  if (!returns_) return noisy_ranges(request, beams, hits, executor);
+  for (std::size_t i = 0; i < hits.size(); ++i) {
+    if (!hits[i].is_return()) continue;
+    echoes[i].all[0] = returns_->echo_of(hits[i]);
+    echoes[i].count = 1;
+  }
+  return returns_of(request, beams, echoes, executor);
 }
 
 Scan Lidar::take(const ScanRequest& request,
@@ -250,38 +307,42 @@ Scan Lidar::take(const ScanRequest& request,
   const bool snapshot = request.snapshot || renderer.is_snapshot();
   scan.snapshot = snapshot;
   scan.middle = middle_of(request.start, beams, snapshot);
-  std::vector<Duration> offsets(request.bodies.empty() || snapshot ? 0 : beams.size());
-  std::vector<Ray> rays =
-      rays_of(beams, request.start, T_world_sensor, snapshot, offsets, executor);
-  if (returns_ && request.noise) shake(request, rays, executor);
+  WorldBeams world = in_world(beams, request, T_world_sensor, snapshot, executor);
+  if (returns_ && request.noise) shake(request, world.rays, executor);
 
-  std::vector<Hit> hits(beams.size());
   RayBatch batch;
-  batch.rays = rays;
+  batch.rays = world.rays;
   batch.order = ordered->order;
   batch.T_world_sensor = middle;
   batch.range_max = static_cast<float>(reach());
   batch.bodies = request.bodies;
   batch.snapshot_time = request.start + period() / 2;
   batch.time = snapshot ? batch.snapshot_time : request.start;
-  batch.time_offsets = offsets;
+  batch.time_offsets = world.offsets;
   batch.image_resolution = settings_.image_resolution_deg * kDegree;
-  renderer.render(batch, hits, executor);
+  const std::vector<Return> returns = measured(request, beams, world, batch, renderer, executor);
 
-  const std::vector<Return> returns = returns_of(request, beams, hits, executor);
+  scan.marks.echoes = reports_echoes();
   scan.points.reserve(beams.size());
-  for (std::size_t i = 0; i < beams.size(); ++i) {
-    const float range = returns[i].range;
-    if (range < 0.0f) continue;
-    scan.points.push_back({beams[i].origin_sensor + range * beams[i].direction_sensor,
-                           range,
-                           returns[i].intensity,
-                           beams[i].time_offset,
-                           beams[i].ring,
-                           static_cast<std::uint32_t>(i),
-                           returns[i].is_false ? kFalseReturn : hits[i].label});
+  std::vector<float> true_ranges;
+  const std::size_t most = beams.empty() ? 1 : returns.size() / beams.size();
+  for (std::size_t i = 0; i < returns.size(); ++i) {
+    const Return& made = returns[i];
+    if (!made.is_return()) continue;
+    const Beam& beam = beams[i / most];
+    scan.points.push_back({beam.origin_sensor + made.range * beam.direction_sensor,
+                           made.range,
+                           made.intensity,
+                           beam.time_offset,
+                           beam.ring,
+                           static_cast<std::uint32_t>(i / most),
+                           made.label});
+    scan.points.back().echo = static_cast<std::uint8_t>(i % most);
+    if (request.known != nullptr) true_ranges.push_back(made.true_range);
   }
-  if (request.known != nullptr) mark_unknown(*request.known, rays, hits, scan, executor);
+  if (request.known != nullptr) {
+    mark_unknown(*request.known, world.rays, true_ranges, scan, executor);
+  }
   return scan;
 }
 

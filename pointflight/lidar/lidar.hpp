@@ -6,6 +6,7 @@
 #include "pointflight/core/parallel.hpp"
 #include "pointflight/geometry/motion.hpp"
 #include "pointflight/lidar/beam_pattern.hpp"
+#include "pointflight/lidar/footprint.hpp"
 #include "pointflight/lidar/lidar_settings.hpp"
 #include "pointflight/lidar/return_model.hpp"
 #include "pointflight/lidar/scan.hpp"
@@ -32,8 +33,8 @@ class Lidar {
  public:
   /// `sensor` numbers it within the run: the entity of its random streams. LiDARs of the same
   /// settings may share their beams; null: it has its own. With `surroundings` returns are modelled
-  /// (`ReturnModel`, directions with noise); without, whatever a beam meets within the sensor's
-  /// range comes back with the map's intensity and Gaussian noise of the range.
+  /// (`ReturnModel`, `Footprint`, directions with noise); without, whatever a beam meets within the
+  /// sensor's range comes back with the map's intensity and Gaussian noise of the range.
   Lidar(const LidarSettings& settings,
         std::uint32_t sensor,
         std::shared_ptr<const ScanBeams> beams = nullptr,
@@ -45,6 +46,8 @@ class Lidar {
   [[nodiscard]] Duration period() const;
   /// `Scan::middle` of a scan that starts then.
   [[nodiscard]] SimTime middle_of(SimTime start, std::span<const Beam> beams, bool snapshot) const;
+  /// True if a beam may have several points.
+  [[nodiscard]] bool reports_echoes() const;
   /// The longest ray that it can see something at, m from the sensor.
   [[nodiscard]] double reach() const;
 
@@ -66,21 +69,32 @@ class Lidar {
   }
 
  private:
-  [[nodiscard]] std::vector<Ray> rays_of(std::span<const Beam> beams,
-                                         SimTime start,
-                                         const PoseTrack& T_world_sensor,
-                                         bool snapshot,
-                                         std::span<Duration> offsets,
-                                         const Executor& executor) const;
+  /// The beams of a scan in the world.
+  struct WorldBeams {
+    std::vector<Ray> rays;          ///< Their axes.
+    std::vector<Vector3f> across;   ///< `WideBeams::across`; none where beams are lines.
+    std::vector<Duration> offsets;  ///< Their times, where bodies move meanwhile.
+  };
+  [[nodiscard]] WorldBeams in_world(std::span<const Beam> beams,
+                                    const ScanRequest& request,
+                                    const PoseTrack& T_world_sensor,
+                                    bool snapshot,
+                                    const Executor& executor) const;
   void shake(const ScanRequest& request, std::span<Ray> rays, const Executor& executor) const;
   [[nodiscard]] std::vector<Return> returns_of(const ScanRequest& request,
                                                std::span<const Beam> beams,
-                                               std::span<const Hit> hits,
+                                               std::span<const Echoes> echoes,
                                                const Executor& executor) const;
   [[nodiscard]] std::vector<Return> noisy_ranges(const ScanRequest& request,
                                                  std::span<const Beam> beams,
                                                  std::span<const Hit> hits,
                                                  const Executor& executor) const;
+  [[nodiscard]] std::vector<Return> measured(const ScanRequest& request,
+                                             std::span<const Beam> beams,
+                                             const WorldBeams& world,
+                                             const RayBatch& batch,
+                                             const Renderer& renderer,
+                                             const Executor& executor) const;
   [[nodiscard]] float depth_share(const Beam& beam) const;
   [[nodiscard]] double range_limit() const;
 
@@ -88,6 +102,7 @@ class Lidar {
   std::uint32_t sensor_;
   std::shared_ptr<const ScanBeams> beams_;
   std::optional<ReturnModel> returns_;
+  Footprint footprint_;
   bool measures_depth_ = false;  ///< Limits and noise are of the depth along the axis.
 };
 

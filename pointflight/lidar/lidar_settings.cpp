@@ -134,14 +134,20 @@ void describe_noise(SettingsVisitor& v, RangeNoiseSettings& s) {
 
 void describe_optics(SettingsVisitor& v, OpticsSettings& s) {
   v.value({"wavelength_nm", "nm", "not used yet", 0, 20000}, s.wavelength_nm);
-  v.value(
-      {"divergence_horizontal_deg", "deg", "full angle, FWHM: how many drops a beam meets", 0, 10},
-      s.divergence_horizontal_deg);
-  v.value(
-      {"divergence_vertical_deg", "deg", "full angle, FWHM: how many drops a beam meets", 0, 10},
-      s.divergence_vertical_deg);
+  v.value({"divergence_horizontal_deg", "deg", "full angle, FWHM; both 0: beams are lines", 0, 10},
+          s.divergence_horizontal_deg);
+  v.value({"divergence_vertical_deg", "deg", "full angle, FWHM", 0, 10}, s.divergence_vertical_deg);
   v.value({"angle_sigma_deg", "deg", "of the beam's direction, about each of two axes", 0, 10},
           s.angle_sigma_deg);
+  v.value(
+      {"pulse_ns", "ns", "length of a pulse: echoes closer than half of it are one", 0.01, 1000},
+      s.pulse_ns);
+  v.value({"sub_rays",
+           "",
+           "rays over a beam's cross-section; 0: as many as it takes, 8 to 288; 1: beams are lines",
+           0,
+           4096},
+          s.sub_rays);
 }
 
 constexpr double kMostBeams = 16e6;  // a scan

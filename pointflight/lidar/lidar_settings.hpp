@@ -122,6 +122,10 @@ struct OpticsSettings {
   double divergence_horizontal_deg = 0.0;  ///< Full angle at half maximum.
   double divergence_vertical_deg = 0.0;    ///< Full angle at half maximum.
   double angle_sigma_deg = 0.0;  ///< Of each beam's direction about each of two axes across it.
+  double pulse_ns = 5.0;         ///< Echoes closer than half its length are one.
+  /// Rays over the cross-section; 0: as many as it takes, 8 to 288; 1: beams are lines
+  /// (`Footprint`).
+  std::int64_t sub_rays = 0;
 };
 
 /// A sensor file, `data/lidars/<name>.yaml`.

@@ -1,6 +1,7 @@
 #include "pointflight/lidar/return_model.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -53,14 +54,29 @@ ReturnModel::ReturnModel(const LidarSettings& lidar, const Surroundings& surroun
                reach_),
       false_alarm_(detection_.is_ideal() ? 0.0 : lidar.detection.false_alarm),
       intensity_scale_(lidar.detection.intensity_at_100_percent),
-      range_min_(lidar.range_min) {}
+      range_min_(lidar.range_min),
+      mode_(lidar.detection.returns) {}
 
-double ReturnModel::reflectivity_of(const Hit& hit) const {
+double ReturnModel::reflectivity(const Hit& hit) const {
   double reflectivity = surroundings_.reflectivity;
   if (hit.label == kMapLabel && surroundings_.reflectivity_per_intensity > 0.0) {
     reflectivity = static_cast<double>(hit.intensity) * surroundings_.reflectivity_per_intensity;
   }
   return std::max(kDarkest, reflectivity * static_cast<double>(hit.cos_incidence));
+}
+
+Echo ReturnModel::echo_of(const Hit& hit) const {
+  if (!hit.is_return()) return {};
+  return {hit.range, static_cast<float>(reflectivity(hit)), hit.intensity, hit.label, 1};
+}
+
+bool ReturnModel::may_go_either_way(const Echo& echo, double less, double more) const {
+  if (detection_.is_ideal()) return false;
+  const auto range = static_cast<double>(echo.range);
+  const double margin =
+      detection_.margin(static_cast<double>(echo.reflectivity) * weather_.left_after(range),
+                        std::max(range, kNearest));
+  return detection_.probability(more * margin) - detection_.probability(less * margin) > 0.05;
 }
 
 double ReturnModel::range_sigma(double range, double margin) const {
@@ -75,54 +91,100 @@ float ReturnModel::rounded(double range) const {
   return static_cast<float>(range);
 }
 
-/// What fog or a drop before a surface (or within `range`, where there is none) gives, where that
-/// is stronger. Its margin is by the pure link budget from the darkest rated target on: sheets say
-/// nothing of signals so near and so weak, and their own law, which the sun flattens, would let a
-/// sensor see every wisp of haze.
-Return ReturnModel::from_air(double strength_of_surface,
-                             double range,
-                             const BeamChance& chance) const {
-  const auto soft = weather_.soft(range, chance.drop, chance.drop_place);
-  if (!soft || soft->strength <= strength_of_surface || soft->range < range_min_) return {};
-  const double margin = soft->strength / detection_.least_strength();
-  if (chance.detection >= detection_.probability(margin)) return {};
-  Return made;
-  made.range = rounded(soft->range + range_sigma(soft->range, margin) * chance.normal);
-  made.is_false = true;
-  if (static_cast<double>(made.range) < range_min_) return {};
-  const double seen = soft->strength * soft->range * soft->range;  // as reflectivity
-  made.intensity = static_cast<float>(std::min(kBrightest, intensity_scale_ * seen));
-  return made;
-}
-
-Return ReturnModel::measure(const Hit& hit, const BeamChance& chance) const {
-  Return made;
-  if (chance.detection < false_alarm_) {
-    made.range = rounded(range_min_ + (reach_ - range_min_) * chance.place);
-    made.is_false = true;
-    return made;
-  }
-  const auto range = static_cast<double>(hit.range);
-  double reflectivity = 0.0;
-  if (hit.is_return()) reflectivity = reflectivity_of(hit) * weather_.left_after(range);
-  if (!weather_.is_clear()) {
-    const double near = std::max(range, kNearest);
-    const Return air = hit.is_return() ? from_air(reflectivity / (near * near), range, chance)
-                                       : from_air(0.0, reach_, chance);
-    if (air.range >= 0.0f) return air;
-  }
-  if (!hit.is_return()) return {};
+Return ReturnModel::from_surface(const Echo& echo, const BeamChance& chance) const {
+  const auto range = static_cast<double>(echo.range);
+  const double near = std::max(range, kNearest);
+  const double reflectivity = static_cast<double>(echo.reflectivity) * weather_.left_after(range);
   double margin = std::numeric_limits<double>::infinity();
   if (!detection_.is_ideal()) {
-    margin = detection_.margin(reflectivity, std::max(range, kNearest));
+    margin = detection_.margin(reflectivity, near);
     if (chance.detection >= detection_.probability(margin)) return {};
   }
+  Return made;
   made.range = rounded(range + range_sigma(range, margin) * chance.normal);
   if (static_cast<double>(made.range) < range_min_) return {};
   made.intensity = intensity_scale_ > 0.0
                        ? static_cast<float>(std::min(kBrightest, intensity_scale_ * reflectivity))
-                       : hit.intensity;
+                       : echo.intensity;
+  made.label = echo.label;
+  made.true_range = echo.range;
+  made.strength = reflectivity / (near * near);
   return made;
+}
+
+/// What fog or a drop within `range` gives. Its margin is by the pure link budget from the darkest
+/// rated target on: sheets say nothing of signals so near and so weak, and their own law, which the
+/// sun flattens, would let a sensor see every wisp of haze.
+Return ReturnModel::from_air(double range, const BeamChance& chance) const {
+  const auto soft = weather_.soft(range, chance.drop, chance.drop_place);
+  if (!soft || soft->range < range_min_) return {};
+  const double margin = soft->strength / detection_.least_strength();
+  if (chance.detection >= detection_.probability(margin)) return {};
+  Return made;
+  made.range = rounded(soft->range + range_sigma(soft->range, margin) * chance.normal);
+  if (static_cast<double>(made.range) < range_min_) return {};
+  const double seen = soft->strength * soft->range * soft->range;  // as reflectivity
+  made.intensity = static_cast<float>(std::min(kBrightest, intensity_scale_ * seen));
+  made.label = kFalseReturn;
+  made.true_range = static_cast<float>(soft->range);
+  made.strength = soft->strength;
+  return made;
+}
+
+std::size_t ReturnModel::measure(std::span<const Echo> echoes,
+                                 const ChanceOf& chance_of,
+                                 std::span<Return> returns) const {
+  const BeamChance first = chance_of(0);
+  if (first.detection < false_alarm_) {
+    returns[0] = {};
+    returns[0].range = rounded(range_min_ + (reach_ - range_min_) * first.place);
+    returns[0].true_range = returns[0].range;
+    returns[0].label = kFalseReturn;
+    return 1;
+  }
+  std::array<Return, Echoes::kMost + 1> seen;
+  std::size_t count = 0;
+  for (std::size_t k = 0; k < echoes.size(); ++k) {
+    seen[count] = from_surface(echoes[k], k == 0 ? first : chance_of(k));
+    count += seen[count].is_return() ? 1 : 0;
+  }
+  if (!weather_.is_clear()) {
+    const double end = echoes.empty() ? reach_ : static_cast<double>(echoes.back().range);
+    seen[count] = from_air(end, chance_of(Echoes::kMost));
+    count += seen[count].is_return() ? 1 : 0;
+  }
+  if (count == 0) return 0;
+  const auto all = std::span(seen).first(count);
+  const auto is_nearer = [](const Return& a, const Return& b) { return a.range < b.range; };
+  if (mode_ == ReturnMode::kFirst) {
+    returns[0] = *std::ranges::min_element(all, is_nearer);
+    return 1;
+  }
+  if (mode_ == ReturnMode::kLast) {
+    returns[0] = *std::ranges::max_element(all, is_nearer);
+    return 1;
+  }
+  std::ranges::stable_sort(
+      all, [](const Return& a, const Return& b) { return a.strength > b.strength; });
+  returns[0] = all[0];
+  if (mode_ == ReturnMode::kDual && count > 1) {
+    const auto last = std::ranges::max_element(all, is_nearer);
+    returns[1] = last == all.begin() ? all[1] : *last;
+    return 2;
+  }
+  const std::size_t reported = std::min(count, most_returns(mode_));
+  std::copy(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(reported), returns.begin());
+  return reported;
+}
+
+Return ReturnModel::measure(const Hit& hit, const BeamChance& chance) const {
+  const Echo echo = echo_of(hit);
+  std::array<Return, 3> returns;
+  const std::size_t count = measure(
+      hit.is_return() ? std::span(&echo, 1) : std::span<const Echo>(),
+      [&](std::size_t) { return chance; },
+      returns);
+  return count > 0 ? returns[0] : Return{};
 }
 
 }  // namespace pointflight

@@ -1,7 +1,11 @@
 // What a beam that met something brings back to the sensor.
 #pragma once
 
+#include <functional>
+#include <span>
+
 #include "pointflight/lidar/detection.hpp"
+#include "pointflight/lidar/echoes.hpp"
 #include "pointflight/lidar/lidar_settings.hpp"
 #include "pointflight/lidar/weather.hpp"
 #include "pointflight/render/renderer.hpp"
@@ -30,11 +34,18 @@ struct BeamChance {
   double drop_place = 0.0;  ///< Uniform in [0, 1).
 };
 
+/// The random part of each echo of a beam; that of the air is `Echoes::kMost`.
+using ChanceOf = std::function<BeamChance(std::size_t echo)>;
+
 /// One return as the sensor reports it.
 struct Return {
-  float range = -1.0f;     ///< m; of a depth camera: depth. Negative: no return.
-  float intensity = 0.0f;  ///< In the sensor's own unit, or the map's where it has none.
-  bool is_false = false;   ///< Nothing was there, or nothing but fog, dust or a drop.
+  float range = -1.0f;       ///< m; of a depth camera: depth. Negative: no return.
+  float intensity = 0.0f;    ///< In the sensor's own unit, or the map's where it has none.
+  Label label = kMapLabel;   ///< Of a false one, `kFalseReturn`: nothing, fog, dust or a drop.
+  float true_range = -1.0f;  ///< m, without noise and rounding.
+  double strength = 0.0;     ///< Of the signal, in the unit of `Weather::target`.
+  /// It is one.
+  [[nodiscard]] bool is_return() const { return range >= 0.0f; }
 };
 
 /// A sensor's detection, noise and rounding.
@@ -47,20 +58,32 @@ class ReturnModel {
   [[nodiscard]] bool has_weather() const { return !weather_.is_clear(); }
   /// How far beams have to be followed, m (a depth camera's: depth).
   [[nodiscard]] double reach() const { return reach_; }
+  /// Which echoes are reported.
+  [[nodiscard]] ReturnMode mode() const { return mode_; }
   /// Standard deviation of the range at a range (m) and a margin (`DetectionModel`; infinity where
   /// the sensor has no rated ranges), m.
   [[nodiscard]] double range_sigma(double range, double margin) const;
-  /// Of what a beam met; `hit.range` is what the sensor measures. None where nothing comes back, or
-  /// from nearer than the sensor's least range. A beam whose draw lies below the false alarms'
-  /// share reports a range anywhere. Of a surface and what is in the air before it the stronger
-  /// signal counts, if the sensor detects it.
+  /// Of a surface that a beam met: what the map or the surroundings say, times the cosine of the
+  /// incidence.
+  [[nodiscard]] double reflectivity(const Hit& hit) const;
+  /// The one echo of a beam that is a line.
+  [[nodiscard]] Echo echo_of(const Hit& hit) const;
+  /// False where an echo comes back as often, within 0.05, with `less` and `more` times its light.
+  [[nodiscard]] bool may_go_either_way(const Echo& echo, double less, double more) const;
+  /// What the sensor reports of a beam's echoes, the nearest first, whose ranges are what it
+  /// measures: at most `most_returns`, the strongest first. None where nothing comes back, or from
+  /// nearer than the sensor's least range. A beam whose draw lies below the false alarms' share
+  /// reports a range anywhere. What is in the air before the last echo counts as one more, if it is
+  /// stronger than the surface behind it. Returns how many.
+  std::size_t measure(std::span<const Echo> echoes,
+                      const ChanceOf& chance_of,
+                      std::span<Return> returns) const;
+  /// The same of a beam that is a line, all draws from one chance.
   [[nodiscard]] Return measure(const Hit& hit, const BeamChance& chance) const;
 
  private:
-  [[nodiscard]] double reflectivity_of(const Hit& hit) const;
-  [[nodiscard]] Return from_air(double strength_of_surface,
-                                double range,
-                                const BeamChance& chance) const;
+  [[nodiscard]] Return from_surface(const Echo& echo, const BeamChance& chance) const;
+  [[nodiscard]] Return from_air(double range, const BeamChance& chance) const;
   [[nodiscard]] float rounded(double range) const;
 
   RangeNoiseSettings noise_;
@@ -71,6 +94,7 @@ class ReturnModel {
   double false_alarm_ = 0.0;
   double intensity_scale_ = 0.0;
   double range_min_ = 0.0;
+  ReturnMode mode_;
 };
 
 }  // namespace pointflight

@@ -15,14 +15,15 @@ namespace {
 constexpr std::size_t kFloats = 6;
 
 /// Bytes per point.
-constexpr std::size_t row_size(bool marks_unknown) {
-  return kFloats * sizeof(float) + 2 * sizeof(std::uint16_t) + (marks_unknown ? 1 : 0);
+constexpr std::size_t row_size(const ScanMarks& marks) {
+  return kFloats * sizeof(float) + 2 * sizeof(std::uint16_t) + (marks.unknown ? 1 : 0) +
+         (marks.echoes ? 1 : 0);
 }
 
 }  // namespace
 
 void write_scan_pcd(const std::string& path, const Scan& scan) {
-  const std::size_t row = row_size(scan.marks_unknown);
+  const std::size_t row = row_size(scan.marks);
   std::vector<std::byte> rows(scan.points.size() * row);
   std::byte* at = rows.data();
   for (const ScanPoint& point : scan.points) {
@@ -35,7 +36,9 @@ void write_scan_pcd(const std::string& path, const Scan& scan) {
     std::memcpy(at, values, sizeof values);
     const std::uint16_t integers[2] = {point.ring, static_cast<std::uint16_t>(point.label)};
     std::memcpy(at + sizeof values, integers, sizeof integers);
-    if (scan.marks_unknown) at[row - 1] = std::byte{point.is_unknown};
+    std::byte* mark = at + sizeof values + sizeof integers;
+    if (scan.marks.unknown) *mark++ = std::byte{point.is_unknown};
+    if (scan.marks.echoes) *mark = std::byte{point.echo};
     at += row;
   }
   std::vector<PcdField> columns = {{"x", 'F', 4},
@@ -46,17 +49,18 @@ void write_scan_pcd(const std::string& path, const Scan& scan) {
                                    {"time", 'F', 4},
                                    {"ring", 'U', 2},
                                    {"label", 'U', 2}};
-  if (scan.marks_unknown) columns.push_back({"unknown", 'U', 1});
+  if (scan.marks.unknown) columns.push_back({"unknown", 'U', 1});
+  if (scan.marks.echoes) columns.push_back({"echo", 'U', 1});
   write_pcd(OutputFile(path), columns, scan.points.size(), rows);
 }
 
 std::vector<ScanPoint> read_scan_points(const std::string& path,
                                         std::span<const Beam> beams,
-                                        bool marks_unknown) {
-  const std::size_t row = row_size(marks_unknown);
-  const std::string_view fields = marks_unknown
-                                      ? "FIELDS x y z intensity range time ring label unknown\n"
-                                      : "FIELDS x y z intensity range time ring label\n";
+                                        const ScanMarks& marks) {
+  const std::size_t row = row_size(marks);
+  const std::string fields = fmt::format("FIELDS x y z intensity range time ring label{}{}\n",
+                                         marks.unknown ? " unknown" : "",
+                                         marks.echoes ? " echo" : "");
   constexpr std::string_view kBody = "DATA binary\n";
   const MappedFile file(path);
   const std::string_view text(reinterpret_cast<const char*>(file.bytes().data()),
@@ -75,7 +79,9 @@ std::vector<ScanPoint> read_scan_points(const std::string& path,
     std::uint16_t integers[2];
     std::memcpy(values, at, sizeof values);
     std::memcpy(integers, at + sizeof values, sizeof integers);
-    point.is_unknown = marks_unknown && at[row - 1] != 0;
+    const char* mark = at + sizeof values + sizeof integers;
+    if (marks.unknown) point.is_unknown = *mark++ != 0;
+    if (marks.echoes) point.echo = static_cast<std::uint8_t>(*mark);
     at += row;
     point.position_sensor = {values[0], values[1], values[2]};
     point.intensity = values[3];
@@ -94,7 +100,9 @@ std::vector<ScanPoint> read_scan_points(const std::string& path,
           fmt::format("{}: its points are not the sensor's; was its file changed?", path));
     }
     point.time_offset = beams[beam].time_offset;
-    point.beam = static_cast<std::uint32_t>(beam++);
+    point.beam = static_cast<std::uint32_t>(beam);
+    // without echoes each beam has one point
+    if (!marks.echoes) ++beam;
   }
   return points;
 }

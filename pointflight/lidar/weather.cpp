@@ -15,21 +15,20 @@ constexpr Named<WeatherKind> kKinds[] = {{WeatherKind::kClear, "clear"},
                                          {WeatherKind::kRain, "rain"},
                                          {WeatherKind::kSnow, "snow"}};
 
-constexpr double kLightSpeed = 299792458.0;  // m/s
-constexpr double kPulse = 20e-9;             // s: tau
-constexpr double kOverlapBegins = 0.9;       // m
-constexpr double kOverlapEnds = 1.0;         // m
-constexpr double kFogStep = 0.05;            // m
-constexpr double kFogReach = 60.0;           // m: the peak lies within the first metres
-constexpr double kPeak = 0.5;                // of the strongest: how wide a peak counts
-constexpr double kBackscatter = 0.046;       // beta times the visibility, 1/sr
-constexpr double kLeastDrop = 0.05;          // mm
-constexpr double kRainIndex = 1.328;         // refractive, of water at 905 nm
-constexpr double kSnowIndex = 1.3031;        // of ice
-constexpr std::size_t kDropCells = 48;       // along a beam
-constexpr double kDropReach = 100.0;         // m: farther ones are too weak to be seen
-constexpr std::size_t kStrengths = 128;      // of signals, in the table
-constexpr double kStrengthSpan = 1e9;        // from the strongest to the weakest of them
+constexpr double kPulse = 20e-9;         // s: tau
+constexpr double kOverlapBegins = 0.9;   // m
+constexpr double kOverlapEnds = 1.0;     // m
+constexpr double kFogStep = 0.05;        // m
+constexpr double kFogReach = 60.0;       // m: the peak lies within the first metres
+constexpr double kPeak = 0.5;            // of the strongest: how wide a peak counts
+constexpr double kBackscatter = 0.046;   // beta times the visibility, 1/sr
+constexpr double kLeastDrop = 0.05;      // mm
+constexpr double kRainIndex = 1.328;     // refractive, of water at 905 nm
+constexpr double kSnowIndex = 1.3031;    // of ice
+constexpr std::size_t kDropCells = 48;   // along a beam
+constexpr double kDropReach = 100.0;     // m: farther ones are too weak to be seen
+constexpr std::size_t kStrengths = 128;  // of signals, in the table
+constexpr double kStrengthSpan = 1e9;    // from the strongest to the weakest of them
 
 double squared(double x) {
   return x * x;

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <limits>
 
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/input_error.hpp"
@@ -21,6 +22,7 @@ namespace pointflight {
 namespace {
 
 HWY_EXPORT(trace);
+HWY_EXPORT(trace_sub_rays);
 
 }  // namespace
 
@@ -51,6 +53,22 @@ std::uint64_t trace_beams(const KernelMap& map,
                           BeamGrouping grouping) {
   return HWY_DYNAMIC_DISPATCH(trace)(
       map, rays.data(), order.data(), order.size(), grouping, hits.data());
+}
+
+std::uint64_t trace_footprints(const KernelMap& map,
+                               std::span<const Ray> rays,
+                               std::span<const std::uint32_t> order,
+                               std::span<KernelHit> hits,
+                               std::span<float> nearest) {
+  if (map.node_count == 0) {
+    for (const std::uint32_t i : order) {
+      hits[i] = {};
+      nearest[i / 8] = std::numeric_limits<float>::infinity();
+    }
+    return 0;
+  }
+  return HWY_DYNAMIC_DISPATCH(trace_sub_rays)(
+      map, rays.data(), order.data(), order.size(), hits.data(), nearest.data());
 }
 
 std::vector<std::string> kernel_names() {

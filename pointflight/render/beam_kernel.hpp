@@ -61,6 +61,18 @@ std::uint64_t trace_beams(const KernelMap& map,
                           std::span<KernelHit> hits,
                           BeamGrouping grouping = BeamGrouping::kAsSuits);
 
+/// The same for beams of eight sub-rays each: rays 8 k to 8 k + 7 are beam k's, leave from one
+/// place, and follow each other in `order`, whose length is a multiple of eight. Besides
+/// `nearest[k]`: how far the centre of the nearest surfel is that reaches into the rectangle around
+/// beam k's sub-rays by more than its fringe (m, along the beam; very large or infinite where there
+/// is none, and where the sub-rays are farther than 0.1 rad apart). It tells whether anything lies
+/// between them; which beams share a call may change it, but not the hits.
+std::uint64_t trace_footprints(const KernelMap& map,
+                               std::span<const Ray> rays,
+                               std::span<const std::uint32_t> order,
+                               std::span<KernelHit> hits,
+                               std::span<float> nearest);
+
 /// Names of the kernels that this processor can run, the best first.
 std::vector<std::string> kernel_names();
 

@@ -1,6 +1,7 @@
 #include "pointflight/render/beam_renderer.hpp"
 
 #include <array>
+#include <numeric>
 #include <vector>
 
 #include "pointflight/core/argument.hpp"
@@ -10,7 +11,8 @@
 namespace pointflight {
 namespace {
 
-constexpr std::size_t kChunk = 1024;  // beams
+constexpr std::size_t kChunk = 1024;  // rays
+static_assert(kChunk % kSubRays == 0);
 
 const SurfelMap& map_of(const Scene& scene) {
   require_argument(scene.map != nullptr, "BeamRenderer: the scene has no map");
@@ -22,6 +24,23 @@ const SurfelMap& map_of(const Scene& scene) {
 BeamRenderer::BeamRenderer(const Scene& scene, BeamGrouping grouping)
     : map_(scene.map), kernel_map_(kernel_map_of(map_of(scene))), grouping_(grouping) {}
 
+/// Traces the rays of `order` in chunks with `trace`.
+template <class Trace>
+void BeamRenderer::render_with(const RayBatch& batch,
+                               std::span<const std::uint32_t> order,
+                               std::span<Hit> hits,
+                               const Executor& executor,
+                               const Trace& trace) const {
+  std::vector<KernelHit> found(batch.rays.size());
+  executor.parallel_for(order.size(), kChunk, [&](std::size_t begin, std::size_t end) {
+    const std::span part(order.data() + begin, end - begin);
+    const std::uint64_t overflows = trace(part, std::span(found));
+    if (overflows > 0) overflows_ += overflows;
+    for (const std::uint32_t i : part) hits[i] = hit_of(found[i]);
+  });
+  render_bodies(batch, hits, executor);
+}
+
 void BeamRenderer::render(const RayBatch& batch,
                           std::span<Hit> hits,
                           const Executor& executor) const {
@@ -32,14 +51,23 @@ void BeamRenderer::render(const RayBatch& batch,
     own_order = direction_order(batch.rays, executor);
     order = own_order;
   }
-  std::vector<KernelHit> found(batch.rays.size());
-  executor.parallel_for(order.size(), kChunk, [&](std::size_t begin, std::size_t end) {
-    const std::span part(order.data() + begin, end - begin);
-    const std::uint64_t overflows = trace_beams(kernel_map_, batch.rays, part, found, grouping_);
-    if (overflows > 0) overflows_ += overflows;
-    for (const std::uint32_t i : part) hits[i] = hit_of(found[i]);
+  render_with(batch, order, hits, executor, [&](std::span<const std::uint32_t> part, auto found) {
+    return trace_beams(kernel_map_, batch.rays, part, found, grouping_);
   });
-  render_bodies(batch, hits, executor);
+}
+
+void BeamRenderer::render_footprints(const RayBatch& batch,
+                                     std::span<Hit> hits,
+                                     std::span<float> nearest,
+                                     const Executor& executor) const {
+  check(batch, hits);
+  require_argument(batch.rays.size() == kSubRays * nearest.size(),
+                   "render_footprints: eight rays per beam are wanted");
+  std::vector<std::uint32_t> order(batch.rays.size());
+  std::iota(order.begin(), order.end(), 0u);
+  render_with(batch, order, hits, executor, [&](std::span<const std::uint32_t> part, auto found) {
+    return trace_footprints(kernel_map_, batch.rays, part, found, nearest);
+  });
 }
 
 Hit BeamRenderer::trace(const Ray& ray) const {

@@ -19,6 +19,11 @@ class BeamRenderer : public Renderer {
 
   void render(const RayBatch& batch, std::span<Hit> hits, const Executor& executor) const override;
 
+  void render_footprints(const RayBatch& batch,
+                         std::span<Hit> hits,
+                         std::span<float> nearest,
+                         const Executor& executor) const override;
+
   [[nodiscard]] Hit trace(const Ray& ray) const override;
 
   /// Beams whose list of surfels overflowed and lost its farthest entry: there the result may
@@ -28,6 +33,12 @@ class BeamRenderer : public Renderer {
   [[nodiscard]] Scene scene() const { return {map_}; }
 
  private:
+  template <class Trace>
+  void render_with(const RayBatch& batch,
+                   std::span<const std::uint32_t> order,
+                   std::span<Hit> hits,
+                   const Executor& executor,
+                   const Trace& trace) const;
   [[nodiscard]] Hit hit_of(const KernelHit& found) const;
 
   std::shared_ptr<const SurfelMap> map_;

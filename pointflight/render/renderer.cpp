@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <limits>
 #include <variant>
 
 #include "pointflight/core/argument.hpp"
@@ -25,6 +26,14 @@ Registry<RendererKind>& RendererKind::table() {
            },
        .one_pose = true}};
   return table;
+}
+
+void Renderer::render_footprints(const RayBatch& batch,
+                                 std::span<Hit> hits,
+                                 std::span<float> nearest,
+                                 const Executor& executor) const {
+  std::fill(nearest.begin(), nearest.end(), std::numeric_limits<float>::infinity());
+  render(batch, hits, executor);
 }
 
 void Renderer::check(const RayBatch& batch, std::span<const Hit> hits) {

@@ -44,6 +44,9 @@ struct RayBatch {
   }
 };
 
+/// Rays that stand for one beam in `Renderer::render_footprints`.
+inline constexpr std::size_t kSubRays = 8;
+
 /// What a ray met.
 struct Hit {
   float range = -1.0f;         ///< Metres along the ray; negative where it met nothing.
@@ -69,6 +72,16 @@ class Renderer {
   virtual void render(const RayBatch& batch,
                       std::span<Hit> hits,
                       const Executor& executor) const = 0;
+
+  /// The same for beams of eight sub-rays each: rays 8 k to 8 k + 7 are beam k's and leave from one
+  /// place. Beams that follow each other should point the same way; `batch.order` is not used.
+  /// `nearest[k]`: how far the nearest surface of the map is that reaches between beam k's
+  /// sub-rays, m; infinity, as here, where the renderer does not look. A beam with something there
+  /// that none of its sub-rays met needs more of them.
+  virtual void render_footprints(const RayBatch& batch,
+                                 std::span<Hit> hits,
+                                 std::span<float> nearest,
+                                 const Executor& executor) const;
 
   /// One ray against the map by itself.
   [[nodiscard]] virtual Hit trace(const Ray& ray) const;

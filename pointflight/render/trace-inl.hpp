@@ -174,7 +174,7 @@ static std::uint64_t trace_packets(const Beams& beams,
     const std::size_t groups = fill(beams, order, count, widths, at, packet, taken, waiting);
     if (!waiting.has_room()) trace_waiting();
     if (groups == 0) continue;
-    set_up_packet(packet, groups);
+    set_up_packet(packet, groups, false);
     walk(beams.map, packet);
     for (std::size_t g = 0; g < groups; ++g) {
       const std::uint32_t* eight = order + taken[g];
@@ -187,6 +187,49 @@ static std::uint64_t trace_packets(const Beams& beams,
   }
   trace_waiting();
   return overflows + trace_singly(beams, order + at, count - at);
+}
+
+/// Footprints wider than this (radius, rad) go down by themselves, a sub-ray at a time.
+inline constexpr float kWidestFootprint = 0.1f;
+
+/// Beams of eight sub-rays, one after the other in `order`: `trace_footprints` of beam_kernel.hpp.
+static std::uint64_t trace_sub_rays(const KernelMap& map,
+                                    const Ray* rays,
+                                    const std::uint32_t* order,
+                                    std::size_t count,
+                                    KernelHit* hits,
+                                    float* nearest) {
+  const Beams beams{map, rays, hits};
+  thread_local const auto room = std::make_unique_for_overwrite<Packet>();
+  Packet& packet = *room;
+  const Widths widths{kWidestFootprint, 8.0f * map.widest_group};
+  std::uint64_t overflows = 0;
+  std::size_t at = 0;
+  Waiting waiting;
+  std::size_t taken[kGroups];
+  const auto trace_waiting = [&] {
+    overflows += trace_singly(beams, waiting.beams, waiting.count);
+    for (std::size_t i = 0; i < waiting.count; i += 8) nearest[waiting.beams[i] / 8] = kNever;
+    waiting.count = 0;
+  };
+  while (at < count) {
+    const std::size_t groups = fill(beams, order, count, widths, at, packet, taken, waiting);
+    if (!waiting.has_room()) trace_waiting();
+    if (groups == 0) continue;
+    set_up_packet(packet, groups, true);
+    walk(map, packet);
+    for (std::size_t g = 0; g < groups; ++g) {
+      const std::uint32_t* eight = order + taken[g];
+      if ((packet.failed >> g & 1u) != 0) {
+        overflows += trace_singly(beams, eight, 8);
+      } else {
+        finish(map, packet.groups[g], packet.rows[g], eight, hits);
+      }
+      nearest[eight[0] / 8] = least(load(packet.nearest[g]));
+    }
+  }
+  trace_waiting();
+  return overflows;
 }
 
 /// True if most groups of eight lie close enough together for packets: a look at a few of them.

@@ -236,9 +236,9 @@ struct RecordedRun::Files {
     const PoseTrack track = tracks[scan.vehicle].with_mount(mounted.T_body_sensor());
     const std::vector<Beam> beams = mounted.beams_of(scan.index, executor);
     scan.snapshot = mounted.takes_snapshots();
-    scan.marks_unknown = mounted.marks_unknown();
+    scan.marks = mounted.marks();
     scan.middle = mounted.lidar().middle_of(scan.start, beams, scan.snapshot);
-    scan.points = read_scan_points(path, beams, mounted.marks_unknown());
+    scan.points = read_scan_points(path, beams, scan.marks);
     return ScanSample{std::make_shared<const Scan>(std::move(scan)), track};
   }
 

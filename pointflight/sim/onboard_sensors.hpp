@@ -69,8 +69,8 @@ class MountedLidar : public IntervalSensor {
   /// True where all beams of a scan leave from one pose.
   [[nodiscard]] bool takes_snapshots() const { return snapshot_ || renderer_->is_snapshot(); }
 
-  /// Its points say whether they came through unknown space.
-  [[nodiscard]] bool marks_unknown() const { return known_ != nullptr; }
+  /// What its points say besides.
+  [[nodiscard]] ScanMarks marks() const { return {known_ != nullptr, lidar_.reports_echoes()}; }
 
   [[nodiscard]] double reach() const override;
   [[nodiscard]] bool loses(std::int64_t index) const override;

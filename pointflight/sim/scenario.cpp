@@ -36,6 +36,14 @@ void describe_lidar(SettingsVisitor& v, LidarMount& s) {
             s.snapshot);
   });
   v.value({"noise", "", "of ranges and directions, by the sensor file"}, s.noise);
+  v.value(
+      {"sub_rays",
+       "",
+       "rays over each beam's cross-section; 0: as many as it takes, 1: beams are lines, -1: as "
+       "the sensor file says",
+       -1,
+       4096},
+      s.sub_rays);
   v.value({"mark_unknown",
            "",
            "points say whether their beams crossed space that no survey saw (a map made or fitted "

@@ -30,6 +30,7 @@ struct LidarMount {
   Choice<RendererKind> renderer{};               ///< "beam", "paper" or an own one.
   bool snapshot = false;                         ///< One pose per scan, as in the paper.
   bool noise = true;                             ///< Of ranges and directions.
+  std::int64_t sub_rays = -1;                    ///< `OpticsSettings::sub_rays`; -1: the file's.
   bool mark_unknown = false;  ///< Points say whether they came through space no survey saw.
 };
 

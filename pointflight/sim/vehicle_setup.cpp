@@ -120,7 +120,9 @@ void VehicleAgent::mount_sensors(const Scenario& scenario, SharedParts& shared) 
       const SharedParts::LidarModel& model = shared.lidar(entry.model);
       const auto surroundings =
           scenario.legacy ? std::nullopt : std::optional(scenario.surroundings);
-      Lidar made(model.settings, MountedLidar::entity_of(site(i)), model.beams, surroundings);
+      LidarSettings settings = model.settings;
+      if (entry.sub_rays >= 0) settings.optics.sub_rays = entry.sub_rays;
+      Lidar made(settings, MountedLidar::entity_of(site(i)), model.beams, surroundings);
       return std::make_unique<MountedLidar>(
           entry, std::move(made), site(i), shared.renderer(entry.renderer), shared.map(), faults_);
     });

@@ -198,8 +198,8 @@ TEST(Lidar, MarksWhatCameThroughSpaceThatNoSurveySaw) {
   const Scan plain = lidar.take(request, still, *renderer, Executor(2));
   request.known = &*known;
   const Scan marked = lidar.take(request, still, *renderer, Executor(2));
-  EXPECT_FALSE(plain.marks_unknown);
-  EXPECT_TRUE(marked.marks_unknown);
+  EXPECT_FALSE(plain.marks.unknown);
+  EXPECT_TRUE(marked.marks.unknown);
   ASSERT_EQ(marked.points.size(), plain.points.size());
   std::size_t unknown = 0;
   for (std::size_t i = 0; i < marked.points.size(); ++i) {
@@ -215,13 +215,13 @@ TEST(Lidar, MarksWhatCameThroughSpaceThatNoSurveySaw) {
   write_scan_pcd(folder / "s.pcd", marked);
   testing::expect_contains(testing::read_file(folder / "s.pcd"), "ring label unknown\n");
   const auto beams = lidar.beams(0, Executor(1));
-  const auto back = read_scan_points(folder / "s.pcd", beams, true);
+  const auto back = read_scan_points(folder / "s.pcd", beams, {.unknown = true});
   ASSERT_EQ(back.size(), marked.points.size());
   for (std::size_t i = 0; i < back.size(); ++i) {
     EXPECT_EQ(back[i].is_unknown, marked.points[i].is_unknown);
   }
   testing::expect_contains(
-      testing::error_of([&] { read_scan_points(folder / "s.pcd", beams, false); }), "no scan");
+      testing::error_of([&] { read_scan_points(folder / "s.pcd", beams); }), "no scan");
 }
 
 TEST(Scan, PcdHasAllFields) {

@@ -71,7 +71,7 @@ TEST(ReturnModel, RangeNoiseIsAsTheFormulaSaysAtFiveRangesAndFourIncidences) {
       std::vector<double> samples;
       for (std::uint64_t i = 0; i < kBeams; ++i) {
         const Return made = model.measure(hit, chance_of(draw++));
-        if (made.range < 0.0f || made.is_false) continue;
+        if (made.range < 0.0f || made.label == kFalseReturn) continue;
         samples.push_back((static_cast<double>(made.range) - range) / sigma);
       }
       if (samples.size() < 1000) continue;  // hardly anything comes back from there
@@ -104,7 +104,7 @@ TEST(ReturnModel, EmptyBeamsReportFalseRangesAnywhere) {
   for (std::uint64_t i = 0; i < kBeams; ++i) {
     const Return made = model.measure(Hit{}, chance_of(i));
     if (made.range < 0.0f) continue;
-    EXPECT_TRUE(made.is_false);
+    EXPECT_EQ(made.label, kFalseReturn);
     ranges.push_back(static_cast<double>(made.range));
   }
   EXPECT_NEAR(static_cast<double>(ranges.size()), 100.0, 40.0);  // 1e-4 of a million, four sigma

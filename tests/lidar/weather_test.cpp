@@ -160,7 +160,7 @@ std::pair<double, double> shares(const Surroundings& around, double range) {
     const auto [drop, drop_place] = random.uniform2(3 * i + 2);
     const Return made = model.measure(wall, {normal, detection, place, drop, drop_place});
     if (made.range < 0.0f) continue;
-    (made.is_false ? of_air : of_wall)++;
+    (made.label == kFalseReturn ? of_air : of_wall)++;
   }
   return {static_cast<double>(of_wall) / kBeams, static_cast<double>(of_air) / kBeams};
 }

@@ -1,0 +1,56 @@
+// Where the light of a beam comes back from: a beam is wide, and parts of it may meet different
+// things.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "pointflight/map/body.hpp"
+
+namespace pointflight {
+
+/// What part of a beam met.
+struct BeamPart {
+  float range = -1.0f;        ///< m; negative: nothing.
+  float share = 1.0f;         ///< Of the beam's light.
+  float reflectivity = 0.0f;  ///< Of the surface, times the cosine of the incidence.
+  float intensity = 0.0f;     ///< The map's.
+  Label label = kMapLabel;    ///< What it is of.
+  /// It met something.
+  [[nodiscard]] bool is_return() const { return range >= 0.0f; }
+};
+
+/// One pulse that comes back.
+struct Echo {
+  float range = -1.0f;        ///< m: mean over its parts, by their energy.
+  float reflectivity = 0.0f;  ///< Of a target as wide as the beam that gave as much light.
+  float intensity = 0.0f;     ///< The map's: mean over its parts, by their energy.
+  Label label = kMapLabel;    ///< Of the part that gave most.
+  std::uint16_t parts = 0;    ///< How many.
+  float depth = 0.0f;         ///< From the nearest to the farthest part, m.
+  /// It comes from somewhere.
+  [[nodiscard]] bool is_return() const { return range >= 0.0f; }
+};
+
+/// The echoes of one beam, the nearest first.
+struct Echoes {
+  static constexpr std::size_t kMost = 4;  ///< The strongest are kept.
+  std::array<Echo, kMost> all{};
+  std::size_t count = 0;
+
+  [[nodiscard]] std::span<const Echo> span() const { return {all.data(), count}; }
+};
+
+/// Strength of its signal, in the unit of `Weather::target`.
+double energy_of(const Echo& echo);
+
+/// Parts of a beam as the receiver tells them apart: those that follow within `merge` (m, half a
+/// pulse's length, c tau / 2) of each other in range are one pulse. Sorts `parts`.
+Echoes echoes_of(std::span<BeamPart> parts, float merge);
+
+/// All parts as one pulse, however far apart: a surface that the beam grazes stretches it.
+Echo merged(std::span<const BeamPart> parts);
+
+}  // namespace pointflight

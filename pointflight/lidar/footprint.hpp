@@ -1,0 +1,69 @@
+// A beam as wide as the sensor's is: sub-rays over its cross-section, and what they meet.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "pointflight/core/parallel.hpp"
+#include "pointflight/lidar/echoes.hpp"
+#include "pointflight/lidar/lidar_settings.hpp"
+#include "pointflight/lidar/return_model.hpp"
+#include "pointflight/render/renderer.hpp"
+
+namespace pointflight {
+
+/// The beams of a scan in the world.
+struct WideBeams {
+  const RayBatch& middles;  ///< Their axes; times, bodies and order as for a renderer.
+  /// Of each, the horizontal of the sensor across the beam: unit vectors in the world.
+  std::span<const Vector3f> across;
+};
+
+/// A beam's cross-section: light falls off as an elliptical Gaussian and ends where its density is
+/// 1 / e^2 of the middle's (2 sigma; sigma = full angle at half maximum / 2.3548), the beam's
+/// radius in optics.
+///
+/// Eight sub-rays tell whether a beam meets one surface: its middle and a heptagon around its rim.
+/// Where they do, they are the beam. Where they do not (ranges off a plane by more than 0.2 m, some
+/// meet nothing, or the renderer knows of a surface between them that is nearer) and what is
+/// reported hangs on the shares of light, 32 sub-rays spread over the cross-section are taken
+/// instead; then 96 and 288, while it hangs on an echo that at most eight of them met. Each beam's
+/// are turned by an angle of its own, so that errors of neighbours differ. With `optics.sub_rays`
+/// from 2 to 8 the eight are all; above it there are so many, spread, for every beam.
+class Footprint {
+ public:
+  /// Of a sensor without divergence beams are lines.
+  explicit Footprint(const OpticsSettings& optics);
+
+  /// True if beams are lines.
+  [[nodiscard]] bool is_line() const { return sub_rays_ == 1; }
+  /// Finds the echoes of each beam; by `returns` surfaces give back light, and echoes count.
+  void trace(const WideBeams& beams,
+             const Renderer& renderer,
+             const ReturnModel& returns,
+             std::span<Echoes> echoes,
+             const Executor& executor) const;
+
+ private:
+  /// A sub-ray: its place across the beam in sigmas, and its share of the light.
+  struct SubRay {
+    float x, y, share;
+  };
+  struct Task;
+
+  [[nodiscard]] static std::vector<SubRay> rim();
+  [[nodiscard]] static std::vector<SubRay> spread(std::size_t count);
+  [[nodiscard]] std::vector<std::uint32_t> trace_with(const Task& task,
+                                                      std::size_t level,
+                                                      std::span<const std::uint32_t> beams) const;
+
+  std::int64_t sub_rays_;
+  float sigma_across_, sigma_up_;               ///< rad
+  float merge_;                                 ///< m, of `echoes_of`.
+  std::vector<std::vector<SubRay>> levels_;     ///< The next where one is not enough.
+  std::array<std::array<float, 2>, 64> turns_;  ///< Cosine and sine.
+};
+
+}  // namespace pointflight
