@@ -37,9 +37,9 @@ struct Echo {
 /// The echoes of one beam, the nearest first.
 struct Echoes {
   static constexpr std::size_t kMost = 4;  ///< The strongest are kept.
-  std::array<Echo, kMost> all{};
-  std::size_t count = 0;
-
+  std::array<Echo, kMost> all{};           ///< The first `count` of these.
+  std::size_t count = 0;                   ///< How many there are.
+  /// Them.
   [[nodiscard]] std::span<const Echo> span() const { return {all.data(), count}; }
 };
 

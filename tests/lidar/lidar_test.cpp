@@ -220,8 +220,8 @@ TEST(Lidar, MarksWhatCameThroughSpaceThatNoSurveySaw) {
   for (std::size_t i = 0; i < back.size(); ++i) {
     EXPECT_EQ(back[i].is_unknown, marked.points[i].is_unknown);
   }
-  testing::expect_contains(
-      testing::error_of([&] { read_scan_points(folder / "s.pcd", beams); }), "no scan");
+  testing::expect_contains(testing::error_of([&] { read_scan_points(folder / "s.pcd", beams); }),
+                           "no scan");
 }
 
 TEST(Scan, PcdHasAllFields) {
