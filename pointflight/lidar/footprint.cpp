@@ -34,6 +34,16 @@ float nearest_of(std::span<const BeamPart> parts) {
   return nearest;
 }
 
+/// What one sub-ray gives back.
+BeamPart part_of(const Hit& hit, float share, const ReturnModel& returns) {
+  if (!hit.is_return()) return {.share = share};
+  return {.range = hit.range,
+          .share = share,
+          .reflectivity = static_cast<float>(returns.reflectivity(hit)),
+          .intensity = hit.intensity,
+          .label = hit.label};
+}
+
 /// Parts that met one plane: there the inverse of the range is linear across the beam.
 template <class SubRays>
 bool lie_in_plane(std::span<const BeamPart> parts, const SubRays& sub_rays) {
@@ -202,6 +212,47 @@ std::vector<Footprint::SubRay> Footprint::spread(std::size_t count) {
   return sub_rays;
 }
 
+/// The sub-rays of one beam in the world.
+void Footprint::aim(const WideBeams& beams,
+                    std::size_t beam,
+                    std::span<const SubRay> sub_rays,
+                    std::span<Ray> rays) const {
+  const Ray& middle = beams.middles.rays[beam];
+  const Vector3f across = beams.across[beam];
+  const Vector3f up = middle.direction_world.cross(across);
+  const auto [c, s] = turns_[beam % turns_.size()];
+  for (std::size_t i = 0; i < sub_rays.size(); ++i) {
+    const float x = sigma_across_ * (c * sub_rays[i].x - s * sub_rays[i].y);
+    const float y = sigma_up_ * (s * sub_rays[i].x + c * sub_rays[i].y);
+    rays[i] = middle;
+    rays[i].direction_world = (middle.direction_world + x * across + y * up).normalized();
+  }
+}
+
+/// Makes one beam's echoes of what its sub-rays met. `known`: the nearest that reaches between
+/// them, m. True if the beam needs more of them.
+bool Footprint::judge(std::size_t level,
+                      std::span<BeamPart> parts,
+                      float known,
+                      float range_max,
+                      const ReturnModel& returns,
+                      Echoes& echoes) const {
+  const float met = std::min(nearest_of(parts), range_max);
+  bool in_doubt = false;
+  if (level == 0 && lie_in_plane(parts, levels_[level])) {
+    echoes = {};
+    echoes.count = 1;
+    echoes.all[0] = merged(parts);
+  } else {
+    const Echoes before = echoes;
+    echoes = echoes_of(parts, merge_);
+    in_doubt = level == 0 ? is_in_doubt(echoes, returns) : may_lack(before, echoes, returns);
+  }
+  // what so many have not met by then is no surface, only surfels
+  const bool has_more = parts.size() <= kEnough && known < met - kBefore;
+  return in_doubt || (has_more && may_count(known, echoes, returns));
+}
+
 /// Finds the echoes of these beams; returns those that need more sub-rays.
 std::vector<std::uint32_t> Footprint::trace_with(const Task& task,
                                                  std::size_t level,
@@ -209,6 +260,7 @@ std::vector<std::uint32_t> Footprint::trace_with(const Task& task,
   const RayBatch& middles = task.beams.middles;
   const std::span<const SubRay> sub_rays = levels_[level];
   const std::size_t n = sub_rays.size();
+  const std::size_t groups = n / kSubRays;
   const std::size_t at_once = std::max<std::size_t>(1, kRaysAtOnce / n);
   std::vector<Ray> rays;
   std::vector<Duration> offsets;
@@ -220,23 +272,14 @@ std::vector<std::uint32_t> Footprint::trace_with(const Task& task,
     const std::span now = beams.subspan(from, std::min(at_once, beams.size() - from));
     rays.resize(now.size() * n);
     hits.resize(rays.size());
-    nearest.resize(rays.size() / kSubRays);
+    nearest.resize(now.size() * groups);
     wants_more.assign(now.size(), 0);
     offsets.resize(middles.time_offsets.empty() ? 0 : rays.size());
     task.executor.parallel_for(now.size(), kBeamsPerChunk, [&](std::size_t begin, std::size_t end) {
       for (std::size_t b = begin; b < end; ++b) {
-        const Ray& middle = middles.rays[now[b]];
-        const Vector3f across = task.beams.across[now[b]];
-        const Vector3f up = middle.direction_world.cross(across);
-        const auto [c, s] = turns_[now[b] % turns_.size()];
-        for (std::size_t i = 0; i < n; ++i) {
-          const float x = sigma_across_ * (c * sub_rays[i].x - s * sub_rays[i].y);
-          const float y = sigma_up_ * (s * sub_rays[i].x + c * sub_rays[i].y);
-          Ray& ray = rays[b * n + i];
-          ray = middle;
-          ray.direction_world = (middle.direction_world + x * across + y * up).normalized();
-          if (!offsets.empty()) offsets[b * n + i] = middles.time_offsets[now[b]];
-        }
+        aim(task.beams, now[b], sub_rays, std::span(rays).subspan(b * n, n));
+        if (offsets.empty()) continue;
+        std::fill_n(&offsets[b * n], n, middles.time_offsets[now[b]]);
       }
     });
     RayBatch batch = middles;
@@ -249,35 +292,12 @@ std::vector<std::uint32_t> Footprint::trace_with(const Task& task,
       std::vector<BeamPart> parts(n);
       for (std::size_t b = begin; b < end; ++b) {
         for (std::size_t i = 0; i < n; ++i) {
-          const Hit& hit = hits[b * n + i];
-          parts[i] = {};
-          parts[i].share = sub_rays[i].share;
-          if (!hit.is_return()) continue;
-          parts[i].range = hit.range;
-          parts[i].reflectivity = static_cast<float>(task.returns.reflectivity(hit));
-          parts[i].intensity = hit.intensity;
-          parts[i].label = hit.label;
+          parts[i] = part_of(hits[b * n + i], sub_rays[i].share, task.returns);
         }
-        Echoes& echoes = task.echoes[now[b]];
-        float known = std::numeric_limits<float>::infinity();
-        for (std::size_t g = 0; g < n / kSubRays; ++g) {
-          known = std::min(known, nearest[b * (n / kSubRays) + g]);
-        }
-        const float met = std::min(nearest_of(parts), middles.rays[now[b]].range_max);
-        const Echoes before = echoes;
-        bool in_doubt = false;
-        if (level == 0 && lie_in_plane(parts, sub_rays)) {
-          echoes = {};
-          echoes.count = 1;
-          echoes.all[0] = merged(parts);
-        } else {
-          echoes = echoes_of(parts, merge_);
-          in_doubt = level == 0 ? is_in_doubt(echoes, task.returns)
-                                : may_lack(before, echoes, task.returns);
-        }
-        // what so many have not met by then is no surface, only surfels
-        const bool has_more = n <= kEnough && known < met - kBefore;
-        wants_more[b] = in_doubt || (has_more && may_count(known, echoes, task.returns)) ? 1 : 0;
+        const float known = *std::min_element(&nearest[b * groups], &nearest[b * groups] + groups);
+        const float range_max = middles.rays[now[b]].range_max;
+        wants_more[b] =
+            judge(level, parts, known, range_max, task.returns, task.echoes[now[b]]) ? 1 : 0;
       }
     });
     for (std::size_t b = 0; b < now.size(); ++b) {

@@ -55,6 +55,16 @@ class Footprint {
 
   [[nodiscard]] static std::vector<SubRay> rim();
   [[nodiscard]] static std::vector<SubRay> spread(std::size_t count);
+  void aim(const WideBeams& beams,
+           std::size_t beam,
+           std::span<const SubRay> sub_rays,
+           std::span<Ray> rays) const;
+  [[nodiscard]] bool judge(std::size_t level,
+                           std::span<BeamPart> parts,
+                           float known,
+                           float range_max,
+                           const ReturnModel& returns,
+                           Echoes& echoes) const;
   [[nodiscard]] std::vector<std::uint32_t> trace_with(const Task& task,
                                                       std::size_t level,
                                                       std::span<const std::uint32_t> beams) const;
