@@ -1,6 +1,9 @@
+#include <fmt/format.h>
+
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <memory>
@@ -11,10 +14,14 @@
 #include "apps/error_picture.hpp"
 #include "apps/error_table.hpp"
 #include "apps/flags.hpp"
+#include "apps/sensor_picture.hpp"
 #include "apps/settings_json.hpp"
+#include "apps/surroundings_flags.hpp"
 #include "apps/terminal.hpp"
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/fidelity/scan_comparison.hpp"
+#include "pointflight/fidelity/sensor_comparison.hpp"
+#include "pointflight/lidar/lidar.hpp"
 
 namespace pointflight::apps {
 namespace {
@@ -26,6 +33,8 @@ struct CompareFlags {
   std::string cloud;
   std::string renderer = "beam";
   bool floor = false;
+  std::string lidar;
+  Surroundings surroundings;
   std::string png;
   bool force = false;
   bool json = false;
@@ -65,10 +74,100 @@ ErrorCollector compare_floor(const std::vector<RealScan>& scans,
   return floor;
 }
 
+nlohmann::ordered_json sensor_json(const SensorComparison& made) {
+  const auto of_sides = [](const Sides& sides) {
+    return nlohmann::ordered_json{
+        {"real", sides.real}, {"modelled", sides.modelled}, {"plain", sides.plain}};
+  };
+  nlohmann::ordered_json shares = nlohmann::ordered_json::array();
+  for (std::size_t r = 0; r < made.shares.size(); ++r) {
+    for (std::size_t i = 0; i < made.shares[r].size(); ++i) {
+      const ReturnShare& share = made.shares[r][i];
+      if (share.beams <= 0.0) continue;
+      shares.push_back({{"range", {SensorComparison::kRanges[r], SensorComparison::kRanges[r + 1]}},
+                        {"incidence_deg",
+                         {SensorComparison::kIncidences[i], SensorComparison::kIncidences[i + 1]}},
+                        {"beams", share.beams},
+                        {"returns", of_sides(share.returns)}});
+    }
+  }
+  nlohmann::ordered_json edges = nlohmann::ordered_json::array();
+  for (const Sides& bin : made.edges) edges.push_back(of_sides(bin));
+  const Sides share = made.share_distance();
+  const Sides edge = made.edge_distance();
+  return {{"beams", made.beams},
+          {"returns", made.returns},
+          {"blocked_beams", made.blocked},
+          {"least_range", made.least_range},
+          {"share_distance", {{"modelled", share.modelled}, {"plain", share.plain}}},
+          {"edge_distance", {{"modelled", edge.modelled}, {"plain", edge.plain}}},
+          {"shares", shares},
+          {"edge_error_limits", SensorComparison::kErrors},
+          {"edges", edges}};
+}
+
+std::string nearer(const Sides& distance) {
+  if (distance.plain <= 0.0) return "";
+  return fmt::format(": {:.0f} % nearer", 100.0 * (1.0 - distance.modelled / distance.plain));
+}
+
+/// Rows of ranges, columns of incidences: real and modelled shares of returns, %.
+void print_sensor(const SensorComparison& made) {
+  fmt::print("\nbeams that come back, %: real / by the model; columns: incidence, degrees\n{:>10}",
+             "range, m");
+  for (std::size_t i = 0; i + 1 < SensorComparison::kIncidences.size(); ++i) {
+    fmt::print(
+        "{:>11}",
+        fmt::format(
+            "{:g}-{:g}", SensorComparison::kIncidences[i], SensorComparison::kIncidences[i + 1]));
+  }
+  fmt::print("\n");
+  for (std::size_t r = 0; r < made.shares.size(); ++r) {
+    const auto& row = made.shares[r];
+    if (std::none_of(row.begin(), row.end(), SensorComparison::counts)) continue;
+    fmt::print(
+        "{:>10}",
+        fmt::format("{:g}-{:g}", SensorComparison::kRanges[r], SensorComparison::kRanges[r + 1]));
+    for (const ReturnShare& share : row) {
+      fmt::print("{:>11}",
+                 SensorComparison::counts(share)
+                     ? fmt::format("{:.0f} / {:.0f}",
+                                   100.0 * share.returns.real / share.beams,
+                                   100.0 * share.returns.modelled / share.beams)
+                     : "");
+    }
+    fmt::print("\n");
+  }
+  const Sides share = made.share_distance();
+  const Sides edge = made.edge_distance();
+  double at_edges = 0.0;
+  for (const Sides& bin : made.edges) at_edges += bin.real;
+  fmt::print("mean difference from the real share: {:.3f} by the model, {:.3f} without it{}\n",
+             share.modelled,
+             share.plain,
+             nearer(share));
+  fmt::print(
+      "errors of {:.0f} returns at edges, half the sum of differences from their real "
+      "distribution: "
+      "{:.3f} by the model, {:.3f} without it{}\n",
+      at_edges,
+      edge.modelled,
+      edge.plain,
+      nearer(edge));
+  if (static_cast<double>(made.returns) > made.beams) {
+    log(fmt::format(
+        "warning: {} real returns of {:.0f} beams: is it this sensor, with these columns?",
+        made.returns,
+        made.beams));
+  }
+}
+
 void compare(const CompareFlags& flags) {
   if (!flags.png.empty()) make_picture_folder(flags.png, flags.force);
   const Executor executor(flags.threads);
   const auto map = SurfelMap::open(flags.map);
+  std::optional<LidarSettings> lidar;
+  if (!flags.lidar.empty()) lidar = load_lidar(flags.lidar);
   const auto scans = read_real_scans(flags.scans, flags.poses);
   std::optional<SupportCloud> cloud;
   if (!flags.cloud.empty()) cloud.emplace(flags.cloud);
@@ -94,6 +193,14 @@ void compare(const CompareFlags& flags) {
   }
   std::optional<ErrorCollector> floor;
   if (flags.floor) floor = compare_floor(scans, executor, progress);
+  std::optional<SensorComparison> sensor;
+  if (lidar) {
+    sensor = compare_sensor(scans, *lidar, flags.surroundings, *renderer, executor, progress);
+    if (!flags.png.empty()) {
+      draw_sensor_comparison(
+          *sensor, flags.lidar + " beside real scans", flags.png + "/sensor.png");
+    }
+  }
   end_progress();
   if (flags.json) {
     nlohmann::ordered_json json = {{"overall",
@@ -101,12 +208,14 @@ void compare(const CompareFlags& flags) {
                                      {"supported", table.json(supported.statistics())}}},
                                    {"scans", rows}};
     if (floor) json["floor"] = table.json(floor->statistics());
+    if (sensor) json["sensor"] = sensor_json(*sensor);
     print_json(json);
     return;
   }
   table.print_row("all", all.statistics());
   if (cloud) table.print_row("all, supported", supported.statistics());
   if (floor) table.print_row("scans among themselves", floor->statistics());
+  if (sensor) print_sensor(*sensor);
 }
 
 }  // namespace
@@ -128,6 +237,14 @@ void add_compare_command(CLI::App& parent, int& /*exit_code*/) {
   app->add_flag("--floor",
                 flags->floor,
                 "Also each scan against the local planes of the others: what the data allow");
+  auto* lidar = app->add_option(
+      "--lidar",
+      flags->lidar,
+      "What took the scans: also how many beams come back by range and incidence, and where they "
+      "lie at edges, beside what its sensor file says; the scans must be whole");
+  for (CLI::Option* option : add_surroundings_flags(*app, flags->surroundings)) {
+    option->needs(lidar);
+  }
   app->add_option("--png", flags->png, "Folder for a picture of each scan's errors");
   add_force_flag(*app, flags->force);
   app->add_flag("--json", flags->json, "JSON on stdout");

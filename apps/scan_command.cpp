@@ -11,6 +11,7 @@
 #include "apps/flags.hpp"
 #include "apps/pictures.hpp"
 #include "apps/settings_json.hpp"
+#include "apps/surroundings_flags.hpp"
 #include "apps/terminal.hpp"
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/lidar/lidar.hpp"
@@ -144,22 +145,9 @@ void add_scan_command(CLI::App& parent, int& /*exit_code*/) {
                     flags->legacy,
                     "All that a beam meets within range_max comes back, with the map's intensity, "
                     "instead of what the hardware would report by reflectivity, range and sun");
-  app->add_option("--sun", flags->surroundings.sun_klx, "Kilolux: 100 in full sun, 0 at night")
-      ->check(within(0.0, 200.0))
-      ->capture_default_str()
-      ->excludes(legacy);
-  app->add_option("--reflectivity",
-                  flags->surroundings.reflectivity,
-                  "Of surfaces of which the map does not say it")
-      ->check(within(0.001, 1.0))
-      ->capture_default_str()
-      ->excludes(legacy);
-  app->add_option("--reflectivity-per-intensity",
-                  flags->surroundings.reflectivity_per_intensity,
-                  "Of the map's surfaces, per unit of its intensity; 0: not calibrated")
-      ->check(within(0.0, 1e6))
-      ->capture_default_str()
-      ->excludes(legacy);
+  for (CLI::Option* option : add_surroundings_flags(*app, flags->surroundings)) {
+    option->excludes(legacy);
+  }
   app->add_option(
          "--sub-rays",
          flags->sub_rays,
@@ -176,24 +164,6 @@ void add_scan_command(CLI::App& parent, int& /*exit_code*/) {
                   "(strongest and last), or triple")
       ->check(CLI::IsMember(modes))
       ->excludes(legacy);
-  std::vector<CLI::Option*> weathers;
-  const auto weather = [&](const char* name, const char* help, WeatherKind kind, bool by_rate) {
-    auto* option = app->add_option_function<double>(
-        name,
-        [flags, kind, by_rate](double figure) {
-          WeatherSettings& w = flags->surroundings.weather;
-          w.kind = kind;
-          (by_rate ? w.rate : w.visibility) = figure;
-        },
-        help);
-    option->check(by_rate ? within(0.1, 200.0) : within(5.0, 1e5))->excludes(legacy);
-    for (CLI::Option* other : weathers) option->excludes(other);
-    weathers.push_back(option);
-  };
-  weather("--fog", "Visibility in fog, m", WeatherKind::kFog, false);
-  weather("--dust", "Visibility in dust, m", WeatherKind::kDust, false);
-  weather("--rain", "Rain, mm/h", WeatherKind::kRain, true);
-  weather("--snow", "Snow, mm of water per hour", WeatherKind::kSnow, true);
   app->add_option(
       "-o,--output",
       flags->output,

@@ -19,6 +19,8 @@ class ScanBeams {
  public:
   /// Throws InputError.
   explicit ScanBeams(const LidarSettings& settings) : pattern_(make_pattern(settings)) {}
+  /// Of a pattern that no settings name; not null.
+  explicit ScanBeams(std::unique_ptr<BeamPattern> pattern) : pattern_(std::move(pattern)) {}
 
   /// Of one scan.
   struct Ordered {

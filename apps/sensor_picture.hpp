@@ -1,0 +1,15 @@
+#pragma once
+
+#include <string>
+
+#include "pointflight/fidelity/sensor_comparison.hpp"
+
+namespace pointflight::apps {
+
+/// Shares of returns over range, and errors at edges: real, by the sensor's model, without it.
+/// Throws InputError if it cannot be written.
+void draw_sensor_comparison(const SensorComparison& comparison,
+                            const std::string& title,
+                            const std::string& path);
+
+}  // namespace pointflight::apps

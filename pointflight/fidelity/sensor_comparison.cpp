@@ -1,0 +1,335 @@
+#include "pointflight/fidelity/sensor_comparison.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <utility>
+
+#include "pointflight/core/constants.hpp"
+#include "pointflight/lidar/lidar.hpp"
+
+namespace pointflight {
+namespace {
+
+constexpr double kCell = 5.0;         // deg, of directions
+constexpr std::size_t kColumns = 72;  // of cells
+constexpr std::size_t kRows = 36;
+constexpr double kBlocked = 0.15;        // share of returns below which a direction is
+constexpr double kLeastQuantile = 1e-3;  // of real ranges: nothing is reported from nearer
+constexpr double kMargin = 0.1;          // m, of what is too near
+constexpr double kOffPlane = 0.3;        // m
+constexpr double kLeastWidth = 0.1;      // deg, about lines
+constexpr double kFwhmPerSigma = 2.3548;
+constexpr std::size_t kRim = 8;  // lines around a beam
+
+/// Beams of one scan, in directions that were given.
+class GivenBeams : public BeamPattern {
+ public:
+  explicit GivenBeams(std::span<const Vector3f> directions_sensor) {
+    beams_.resize(directions_sensor.size());
+    for (std::size_t i = 0; i < beams_.size(); ++i) {
+      beams_[i].direction_sensor = directions_sensor[i];
+    }
+  }
+  [[nodiscard]] std::vector<Beam> beams(std::uint64_t /*index*/,
+                                        const Executor& /*executor*/) const override {
+    return beams_;
+  }
+  [[nodiscard]] bool repeats() const override { return true; }
+
+ private:
+  std::vector<Beam> beams_;
+};
+
+std::size_t cell_of(const Vector3f& direction_sensor) {
+  const Vector3d d = direction_sensor.cast<double>();
+  const double azimuth = std::atan2(d.y(), d.x()) / kDegree + 180.0;
+  const double elevation = std::asin(std::clamp(d.z(), -1.0, 1.0)) / kDegree + 90.0;
+  const auto column = std::min(static_cast<std::size_t>(azimuth / kCell), kColumns - 1);
+  const auto row = std::min(static_cast<std::size_t>(elevation / kCell), kRows - 1);
+  return row * kColumns + column;
+}
+
+template <class Limits>
+std::size_t bin_of(const Limits& limits, double value) {
+  const auto above = std::upper_bound(limits.begin(), limits.end(), value);
+  return static_cast<std::size_t>(above - limits.begin());
+}
+
+/// The share that a hit belongs to; null where it counts for none.
+ReturnShare* share_of(SensorComparison& made, const Hit& hit) {
+  if (!hit.is_return() || static_cast<double>(hit.range) < made.least_range + kMargin) {
+    return nullptr;
+  }
+  const std::size_t range = bin_of(SensorComparison::kRanges, static_cast<double>(hit.range));
+  if (range == SensorComparison::kRanges.size()) return nullptr;
+  const double cos = std::clamp(static_cast<double>(hit.cos_incidence), 0.0, 1.0);
+  const std::size_t incidence =
+      std::min(bin_of(SensorComparison::kIncidences, std::acos(cos) / kDegree),
+               SensorComparison::kIncidences.size() - 1);
+  return &made.shares[range - 1][incidence - 1];
+}
+
+std::vector<Vector3f> directions_of(const RealScan& scan) {
+  std::vector<Vector3f> directions;
+  directions.reserve(scan.points_sensor.size());
+  for (const Vector3f& point : scan.points_sensor) directions.push_back(point.normalized());
+  return directions;
+}
+
+double least_range_of(const std::vector<RealScan>& scans) {
+  std::vector<float> ranges;
+  for (const RealScan& scan : scans) {
+    for (const Vector3f& point : scan.points_sensor) ranges.push_back(point.norm());
+  }
+  if (ranges.empty()) return 0.0;
+  const auto at = ranges.begin() +
+                  static_cast<std::ptrdiff_t>(kLeastQuantile * static_cast<double>(ranges.size()));
+  std::nth_element(ranges.begin(), at, ranges.end());
+  return static_cast<double>(*at);
+}
+
+/// Counts the scans of one sensor into a comparison.
+class Counter {
+ public:
+  Counter(const std::vector<RealScan>& scans,
+          const LidarSettings& lidar,
+          const Surroundings& surroundings,
+          const Renderer& renderer,
+          const Executor& executor)
+      : scans_(scans),
+        settings_(lidar),
+        surroundings_(surroundings),
+        renderer_(renderer),
+        executor_(executor),
+        modelled_(lidar, 0, nullptr, surroundings) {
+    settings_.detection.returns = lidar.detection.returns == ReturnMode::kFirst ||
+                                          lidar.detection.returns == ReturnMode::kLast
+                                      ? lidar.detection.returns
+                                      : ReturnMode::kStrongest;
+    const double width = std::max({kLeastWidth,
+                                   lidar.optics.divergence_horizontal_deg,
+                                   lidar.optics.divergence_vertical_deg});
+    radius_ = static_cast<float>(2.0 * width * kDegree / kFwhmPerSigma);
+    made_.least_range = std::max(lidar.range_min, least_range_of(scans));
+    find_blocked();
+  }
+
+  void add(std::size_t scan) {
+    count_returns(scan);
+    count_edges(scan);
+  }
+
+  [[nodiscard]] const SensorComparison& made() const { return made_; }
+
+ private:
+  void find_blocked() {
+    std::vector<double> fired(kColumns * kRows);
+    std::vector<double> real(fired.size());
+    for (std::size_t i = 0; i < scans_.size(); ++i) {
+      for (const Beam& beam : modelled_.beams(modelled_.pattern_scan(i, 0), executor_)) {
+        fired[cell_of(beam.direction_sensor)] += 1.0;
+        made_.beams += 1.0;
+      }
+      for (const Vector3f& direction : directions_of(scans_[i])) real[cell_of(direction)] += 1.0;
+      made_.returns += scans_[i].points_sensor.size();
+    }
+    blocked_.resize(fired.size());
+    for (std::size_t i = 0; i < fired.size(); ++i) {
+      blocked_[i] = real[i] < kBlocked * fired[i];
+      if (blocked_[i]) made_.blocked += fired[i];
+    }
+  }
+
+  [[nodiscard]] std::vector<Hit> lines(const Pose& T_world_sensor,
+                                       std::span<const Vector3f> origins_sensor,
+                                       std::span<const Vector3f> directions_sensor) const {
+    const auto far = static_cast<float>(SensorComparison::kRanges.back());
+    std::vector<Ray> rays(directions_sensor.size());
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+      rays[i].origin_world = T_world_sensor.translation;
+      if (!origins_sensor.empty()) {
+        rays[i].origin_world = T_world_sensor * origins_sensor[i].cast<double>();
+      }
+      rays[i].direction_world =
+          (T_world_sensor.rotation * directions_sensor[i].cast<double>()).cast<float>();
+      rays[i].range_max = far;
+    }
+    std::vector<Hit> hits(rays.size());
+    RayBatch batch;
+    batch.rays = rays;
+    batch.T_world_sensor = T_world_sensor;
+    batch.range_max = far;
+    renderer_.render(batch, hits, executor_);
+    return hits;
+  }
+
+  void count_returns(std::size_t scan) {
+    const Pose& pose = scans_[scan].T_world_sensor;
+    ScanRequest request;
+    request.index = scan;
+    const std::vector<Beam> beams = modelled_.beams(modelled_.pattern_scan(scan, 0), executor_);
+    std::vector<Vector3f> origins;
+    std::vector<Vector3f> directions;
+    for (const Beam& beam : beams) {
+      origins.push_back(beam.origin_sensor);
+      directions.push_back(beam.direction_sensor);
+    }
+    const std::vector<Hit> fired = lines(pose, origins, directions);
+    std::vector<ReturnShare*> of_beam(beams.size());
+    for (std::size_t i = 0; i < beams.size(); ++i) {
+      if (blocked_[cell_of(directions[i])]) continue;
+      of_beam[i] = share_of(made_, fired[i]);
+      if (of_beam[i] == nullptr) continue;
+      of_beam[i]->beams += 1.0;
+      if (static_cast<double>(fired[i].range) <= settings_.range_max) {
+        of_beam[i]->returns.plain += 1.0;
+      }
+    }
+    const Scan modelled = modelled_.take(request, PoseTrack(pose), renderer_, executor_);
+    for (const ScanPoint& point : modelled.points) {
+      ReturnShare* share = of_beam[point.beam];
+      if (share != nullptr && point.echo == 0) share->returns.modelled += 1.0;
+    }
+    const std::vector<Vector3f> real = directions_of(scans_[scan]);
+    const std::vector<Hit> met = lines(pose, {}, real);
+    for (std::size_t i = 0; i < real.size(); ++i) {
+      ReturnShare* share = blocked_[cell_of(real[i])] ? nullptr : share_of(made_, met[i]);
+      if (share != nullptr) share->returns.real += 1.0;
+    }
+  }
+
+  /// Whether lines around each direction meet something off the plane that others meet.
+  [[nodiscard]] std::vector<bool> at_edges(const Pose& pose,
+                                           std::span<const Vector3f> directions,
+                                           std::span<const Hit> middles) const {
+    std::vector<Vector3f> around;
+    around.reserve(kRim * directions.size());
+    for (const Vector3f& d : directions) {
+      const Vector3f across =
+          (std::abs(d.z()) < 0.9f ? d.cross(Vector3f::UnitZ()) : d.cross(Vector3f::UnitX()))
+              .normalized();
+      const Vector3f up = d.cross(across);
+      for (std::size_t k = 0; k < kRim; ++k) {
+        const double angle = 2.0 * kPi * static_cast<double>(k) / static_cast<double>(kRim);
+        const auto x = radius_ * static_cast<float>(std::cos(angle));
+        const auto y = radius_ * static_cast<float>(std::sin(angle));
+        around.push_back((d + x * across + y * up).normalized());
+      }
+    }
+    const std::vector<Hit> hits = lines(pose, {}, around);
+    std::vector<bool> edges(directions.size());
+    for (std::size_t i = 0; i < directions.size(); ++i) {
+      if (!middles[i].is_return()) continue;
+      const auto r = static_cast<double>(middles[i].range);
+      for (std::size_t k = 0; k < kRim / 2 && !edges[i]; ++k) {
+        const Hit& one = hits[kRim * i + k];
+        const Hit& other = hits[kRim * i + k + kRim / 2];
+        if (!one.is_return() || !other.is_return()) {
+          edges[i] = true;
+          break;
+        }
+        // on a plane the inverse of the range is linear across the beam
+        const double mean =
+            0.5 * (1.0 / static_cast<double>(one.range) + 1.0 / static_cast<double>(other.range));
+        edges[i] = std::abs(1.0 / mean - r) > kOffPlane;
+      }
+    }
+    return edges;
+  }
+
+  void count_edges(std::size_t scan) {
+    const RealScan& real = scans_[scan];
+    const std::vector<Vector3f> all = directions_of(real);
+    const std::vector<Hit> middles = lines(real.T_world_sensor, {}, all);
+    const std::vector<bool> edges = at_edges(real.T_world_sensor, all, middles);
+    std::vector<Vector3f> directions;
+    std::vector<double> rendered;
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      if (!edges[i]) continue;
+      directions.push_back(all[i]);
+      rendered.push_back(static_cast<double>(middles[i].range));
+      count_error(&Sides::real,
+                  static_cast<double>(real.points_sensor[i].norm()) - rendered.back());
+    }
+    const auto beams = std::make_shared<const ScanBeams>(std::make_unique<GivenBeams>(directions));
+    const auto count = [&](double Sides::*side, const std::optional<Surroundings>& surroundings) {
+      const Lidar lidar(settings_, 0, beams, surroundings);
+      ScanRequest request;
+      request.index = scan;
+      const Scan made = lidar.take(request, PoseTrack(real.T_world_sensor), renderer_, executor_);
+      for (const ScanPoint& point : made.points) {
+        count_error(side, static_cast<double>(point.range) - rendered[point.beam]);
+      }
+    };
+    count(&Sides::modelled, surroundings_);
+    count(&Sides::plain, std::nullopt);
+  }
+
+  void count_error(double Sides::*side, double error) {
+    made_.edges[bin_of(SensorComparison::kErrors, error)].*side += 1.0;
+  }
+
+  const std::vector<RealScan>& scans_;
+  LidarSettings settings_;
+  Surroundings surroundings_;
+  const Renderer& renderer_;
+  const Executor& executor_;
+  Lidar modelled_;
+  float radius_ = 0.0f;  // tangent of what a beam's edge is off its middle
+  std::vector<bool> blocked_;
+  SensorComparison made_;
+};
+
+}  // namespace
+
+Sides SensorComparison::share_distance() const {
+  Sides distance;
+  double beams = 0.0;
+  for (const OfIncidences& row : shares) {
+    for (const ReturnShare& share : row) {
+      if (!counts(share)) continue;
+      beams += share.beams;
+      distance.modelled += std::abs(share.returns.modelled - share.returns.real);
+      distance.plain += std::abs(share.returns.plain - share.returns.real);
+    }
+  }
+  if (beams > 0.0) {
+    distance.modelled /= beams;
+    distance.plain /= beams;
+  }
+  return distance;
+}
+
+Sides SensorComparison::edge_distance() const {
+  Sides all;
+  for (const Sides& bin : edges) {
+    all.real += bin.real;
+    all.modelled += bin.modelled;
+    all.plain += bin.plain;
+  }
+  Sides distance;
+  if (all.real <= 0.0 || all.modelled <= 0.0 || all.plain <= 0.0) return distance;
+  for (const Sides& bin : edges) {
+    distance.modelled += 0.5 * std::abs(bin.modelled / all.modelled - bin.real / all.real);
+    distance.plain += 0.5 * std::abs(bin.plain / all.plain - bin.real / all.real);
+  }
+  return distance;
+}
+
+SensorComparison compare_sensor(const std::vector<RealScan>& scans,
+                                const LidarSettings& lidar,
+                                const Surroundings& surroundings,
+                                const Renderer& renderer,
+                                const Executor& executor,
+                                const Progress& progress) {
+  Counter counter(scans, lidar, surroundings, renderer, executor);
+  for (std::size_t i = 0; i < scans.size(); ++i) {
+    report(
+        progress, "comparing returns", static_cast<double>(i) / static_cast<double>(scans.size()));
+    counter.add(i);
+  }
+  return counter.made();
+}
+
+}  // namespace pointflight
