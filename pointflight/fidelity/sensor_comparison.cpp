@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "pointflight/core/constants.hpp"
+#include "pointflight/core/math.hpp"
 #include "pointflight/lidar/lidar.hpp"
 
 namespace pointflight {
@@ -43,8 +44,8 @@ class GivenBeams : public BeamPattern {
 
 std::size_t cell_of(const Vector3f& direction_sensor) {
   const Vector3d d = direction_sensor.cast<double>();
-  const double azimuth = std::atan2(d.y(), d.x()) / kDegree + 180.0;
-  const double elevation = std::asin(std::clamp(d.z(), -1.0, 1.0)) / kDegree + 90.0;
+  const double azimuth = math::atan2(d.y(), d.x()) / kDegree + 180.0;
+  const double elevation = math::asin(std::clamp(d.z(), -1.0, 1.0)) / kDegree + 90.0;
   const auto column = std::min(static_cast<std::size_t>(azimuth / kCell), kColumns - 1);
   const auto row = std::min(static_cast<std::size_t>(elevation / kCell), kRows - 1);
   return row * kColumns + column;
@@ -65,7 +66,7 @@ ReturnShare* share_of(SensorComparison& made, const Hit& hit) {
   if (range == SensorComparison::kRanges.size()) return nullptr;
   const double cos = std::clamp(static_cast<double>(hit.cos_incidence), 0.0, 1.0);
   const std::size_t incidence =
-      std::min(bin_of(SensorComparison::kIncidences, std::acos(cos) / kDegree),
+      std::min(bin_of(SensorComparison::kIncidences, math::acos(cos) / kDegree),
                SensorComparison::kIncidences.size() - 1);
   return &made.shares[range - 1][incidence - 1];
 }
@@ -212,8 +213,8 @@ class Counter {
       const Vector3f up = d.cross(across);
       for (std::size_t k = 0; k < kRim; ++k) {
         const double angle = 2.0 * kPi * static_cast<double>(k) / static_cast<double>(kRim);
-        const auto x = radius_ * static_cast<float>(std::cos(angle));
-        const auto y = radius_ * static_cast<float>(std::sin(angle));
+        const auto x = radius_ * static_cast<float>(math::cos(angle));
+        const auto y = radius_ * static_cast<float>(math::sin(angle));
         around.push_back((d + x * across + y * up).normalized());
       }
     }

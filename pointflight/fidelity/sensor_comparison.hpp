@@ -43,6 +43,7 @@ struct SensorComparison {
   /// A bin with fewer beams does not count.
   static constexpr double kLeastBeams = 300.0;
 
+  /// Of one range, by incidence.
   using OfIncidences = std::array<ReturnShare, kIncidences.size() - 1>;
   std::array<OfIncidences, kRanges.size() - 1> shares{};  ///< By range, then incidence.
   /// Returns at edges by measured minus rendered range, the range that a line along the beam has;
