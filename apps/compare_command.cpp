@@ -156,7 +156,8 @@ void print_sensor(const SensorComparison& made) {
       nearer(edge));
   if (static_cast<double>(made.returns) > made.beams) {
     log(fmt::format(
-        "warning: {} real returns of {:.0f} beams: is it this sensor, with these columns?",
+        "warning: {} real returns of {:.0f} beams: is it this sensor, with these columns "
+        "(rings.columns of its file)?",
         made.returns,
         made.beams));
   }
@@ -195,7 +196,8 @@ void compare(const CompareFlags& flags) {
   if (flags.floor) floor = compare_floor(scans, executor, progress);
   std::optional<SensorComparison> sensor;
   if (lidar) {
-    sensor = compare_sensor(scans, *lidar, flags.surroundings, *renderer, executor, progress);
+    sensor = compare_sensor(
+        scans, *lidar, surroundings_in(*map, flags.surroundings), *renderer, executor, progress);
     if (!flags.png.empty()) {
       draw_sensor_comparison(
           *sensor, flags.lidar + " beside real scans", flags.png + "/sensor.png");

@@ -142,6 +142,9 @@ void print_info(const SurfelMap& map, const InfoFlags& flags) {
     json["bytes"] = map.file_size();
     json["bytes_per_surfel"] = bytes_each;
     json["has_intensity"] = map.has_intensity();
+    if (map.reflectivity_per_intensity() > 0.0) {
+      json["reflectivity_per_intensity"] = map.reflectivity_per_intensity();
+    }
     if (known != nullptr) {
       json["known_space"]["share"] = known->known_share();
       json["known_space"]["cell"] = known->grid().cell;
@@ -165,7 +168,11 @@ void print_info(const SurfelMap& map, const InfoFlags& flags) {
              bytes_each);
   print_findings(metadata, map.resolution());
   fmt::print("  coverage    {:.2f} makes a return\n", map.model().tau);
-  fmt::print("  intensity   {}\n", map.has_intensity() ? "yes" : "no");
+  fmt::print("  intensity   {}{}\n",
+             map.has_intensity() ? "yes" : "no",
+             map.reflectivity_per_intensity() > 0.0
+                 ? fmt::format(", reflectivity is {:.4g} of it", map.reflectivity_per_intensity())
+                 : "");
   if (known != nullptr) {
     fmt::print(
         "  seen space  {:.0f} % of the box of map and survey, {:.0f} % unknown (cells of {:.2g} "

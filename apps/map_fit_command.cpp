@@ -34,11 +34,13 @@ void run_fit(const MapFitFlags& flags) {
   const Executor executor(flags.threads);
   const Progress progress = interruptible_progress();
   const auto survey = open_survey(flags.fit, progress);
+  check_signal(flags.fit, *survey);
   const auto rays = [&] { return survey->open(); };
   FitReport report;
   EditedMap fitted = fit_map(
       *map, rays, fit_options(flags.fit), edit_options(flags, {}), executor, report, progress);
   append_note(fitted, fit_note(*survey, report));
+  paint_by_signal(fitted, flags.fit, *survey, edit_options(flags, {}), executor, progress);
   const auto written =
       SurfelMap::from_bytes(map_bytes(fitted.tree, fitted.description), flags.output);
   const OwnRays after =

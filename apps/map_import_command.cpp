@@ -36,6 +36,7 @@ struct ImportFlags {
   std::string scratch;
   std::string format;
   FitFlags fit;
+  double reflectivity = 0.0;  ///< 0: not calibrated.
   bool force = false;
   int threads = 0;
 };
@@ -81,6 +82,15 @@ void refuse_same_files(const ImportFlags& flags) {
   }
 }
 
+/// What --reflectivity says of a map's intensities.
+void calibrate(const ImportFlags& flags, MapDescription& description) {
+  if (flags.reflectivity <= 0.0) return;
+  if (!description.has_intensity) {
+    throw InputError("--reflectivity: the points carry no intensity");
+  }
+  set_reflectivity(description, flags.reflectivity);
+}
+
 /// From scans with poses: their points make the map, or clouds that were made of them; their rays
 /// fit it.
 void import_survey(const ImportFlags& flags) {
@@ -101,6 +111,7 @@ void import_survey(const ImportFlags& flags) {
   const Executor executor(flags.threads);
   const Progress progress = interruptible_progress();
   const auto survey = open_survey(flags.fit, progress);
+  check_signal(flags.fit, *survey);
   const ImportOptions options = import_options(flags);
   const auto sources = cloud_sources(flags.inputs, flags.format, options.scratch_folder, progress);
   SurveyPoints points;
@@ -111,9 +122,12 @@ void import_survey(const ImportFlags& flags) {
     points.names.push_back(source.name());
   }
   points.open = [&](std::size_t i) { return sources[i].open(); };
-  const SurveyMap made =
-      map_survey(*survey, points, options, fit_options(flags.fit), executor, progress);
+  SurveyMap made = map_survey(*survey, points, options, fit_options(flags.fit), executor, progress);
   end_progress();
+  calibrate(flags, made.map.description);
+  EditOptions edit;
+  edit.scratch_folder = options.scratch_folder;
+  paint_by_signal(made.map, flags.fit, *survey, edit, executor, progress);
   write_map(std::move(output), made.map.tree, made.map.description);
   if (outliers) {
     write_cloud_pcd(std::move(*outliers), made.outliers, made.imported.has_intensity);
@@ -145,8 +159,9 @@ void import_map(const ImportFlags& flags) {
   const Progress progress = interruptible_progress();
   const std::vector<CloudSource> sources =
       cloud_sources(flags.inputs, flags.format, options.scratch_folder, progress);
-  const ImportedMap map = import_clouds(sources, options, executor, progress);
+  ImportedMap map = import_clouds(sources, options, executor, progress);
   end_progress();
+  calibrate(flags, map.description);
   if (outliers) write_cloud_pcd(std::move(*outliers), map.outliers, map.report.has_intensity);
   write_map(std::move(output), map.tree, map.description);
   print_report(map.report, options);
@@ -216,7 +231,14 @@ void add_import(CLI::App& parent) {
       ->capture_default_str();
   app->add_option(
       "--export-outliers", flags->outliers_out, "Write the dropped cells as a PCD cloud");
+  auto* reflectivity =
+      app->add_option("--reflectivity",
+                      flags->reflectivity,
+                      "Reflectivity (0 to 1, at the laser's wavelength) per unit of the points' "
+                      "intensity, where this is calibrated: 0.01 for percent");
+  reflectivity->check(within(1e-9, 1e6));
   add_fit_flags(*app, flags->fit, false);
+  reflectivity->excludes(app->get_option("--signal-of"));
   add_force_flag(*app, flags->force);
   app->add_option("--threads", flags->threads, "0: all cores")->check(CLI::Range(0, 1024));
   app->callback([flags] {

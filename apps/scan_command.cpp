@@ -96,7 +96,10 @@ void take_scan(const ScanFlags& flags) {
     if (flags.returns == mode.name) settings.detection.returns = mode.value;
   }
   const Lidar lidar(
-      settings, 0, nullptr, flags.legacy ? std::nullopt : std::optional(flags.surroundings));
+      settings,
+      0,
+      nullptr,
+      flags.legacy ? std::nullopt : std::optional(surroundings_in(*map, flags.surroundings)));
   const auto renderer = make_renderer(flags.renderer, Scene{map});
   const Executor executor(flags.threads);
   ScanRequest request;

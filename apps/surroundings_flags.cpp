@@ -14,12 +14,14 @@ std::vector<CLI::Option*> add_surroundings_flags(CLI::App& app, Surroundings& su
           ->capture_default_str(),
       app.add_option("--reflectivity",
                      surroundings.reflectivity,
-                     "Of surfaces of which the map does not say it")
-          ->check(within(0.001, 1.0))
+                     "Of surfaces of which the map does not say it; 0: it varies from surfel to "
+                     "surfel, half of them above 0.15")
+          ->check(within(0.0, 1.0))
           ->capture_default_str(),
-      app.add_option("--reflectivity-per-intensity",
-                     surroundings.reflectivity_per_intensity,
-                     "Of the map's surfaces, per unit of its intensity; 0: not calibrated")
+      app.add_option(
+             "--reflectivity-per-intensity",
+             surroundings.reflectivity_per_intensity,
+             "Of the map's surfaces, per unit of its intensity; 0: what the map says, if it does")
           ->check(within(0.0, 1e6))
           ->capture_default_str()};
   std::vector<CLI::Option*> weathers;

@@ -14,7 +14,9 @@
 #include "apps/terminal.hpp"
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/core/mapped_file.hpp"
+#include "pointflight/fit/survey_signal.hpp"
 #include "pointflight/io/pcd_writer.hpp"
+#include "pointflight/lidar/lidar_settings.hpp"
 #include "recording/mcap_reader.hpp"
 #include "recording/recorded_survey.hpp"
 
@@ -133,6 +135,18 @@ void add_fit_flags(CLI::App& app, FitFlags& flags, bool required) {
       ->check(within(0.1, 100.0))
       ->capture_default_str()
       ->needs(scans);
+  auto* signal = app.add_option(
+      "--signal-of",
+      flags.signal_of,
+      "What took the scans, if their intensity is the signal that it received (Ouster's 'signal'): "
+      "the map gets reflectivities of it, which decide what comes back");
+  signal->needs(scans);
+  app.add_option("--signal-limit",
+                 flags.signal_limit,
+                 "The weakest signal that it reports; without it what 1 % of the returns do not "
+                 "reach")
+      ->check(within(1e-6, 1e9))
+      ->needs(signal);
   app.add_option("--export-ghosts",
                  flags.ghosts_out,
                  "Write where what moved through the survey was taken out, as a PCD cloud")
@@ -176,6 +190,52 @@ void print_fit(const FitReport& report, const OwnRays& after) {
   log(fmt::format("ghosts        {} surfels of what moved removed, {} that only stood in the way",
                   report.ghosts.size(),
                   report.blamed));
+}
+
+void check_signal(const FitFlags& flags, const SurveySource& survey) {
+  if (flags.signal_of.empty()) return;
+  if (load_lidar(flags.signal_of).detection.rated.empty()) {
+    throw InputError(fmt::format(
+        "--signal-of {}: its file states no rated ranges (detection.rated): signals mean nothing",
+        flags.signal_of));
+  }
+  const auto reader = survey.open();
+  std::vector<SurveyRay> batch;
+  bool has_signal = false;
+  while (!has_signal && reader->read(batch)) {
+    has_signal = std::any_of(
+        batch.begin(), batch.end(), [](const SurveyRay& ray) { return ray.intensity > 0.0f; });
+  }
+  if (!has_signal) {
+    throw InputError(
+        fmt::format("--signal-of {}: the scans carry no intensities", flags.signal_of));
+  }
+}
+
+void paint_by_signal(EditedMap& map,
+                     const FitFlags& flags,
+                     const SurveySource& survey,
+                     const EditOptions& options,
+                     const Executor& executor,
+                     const Progress& progress) {
+  if (flags.signal_of.empty()) return;
+  SignalOptions signal;
+  signal.detection = load_lidar(flags.signal_of).detection;
+  if (flags.signal_limit > 0.0) signal.limit = flags.signal_limit;
+  SignalReport report;
+  paint_reflectivity(
+      map, [&] { return survey.open(); }, signal, options, executor, report, progress);
+  end_progress();
+  log(fmt::format(
+      "reflectivity  {:.2g} to {:.2g}, half of the surfels above {:.2g}; the weakest signal is "
+      "{:.3g}{}",
+      report.reflectivities[0],
+      report.reflectivities[2],
+      report.reflectivities[1],
+      report.limit,
+      report.unseen > 0 ? fmt::format(", {} surfels that no return met are dark",
+                                      short_count(static_cast<double>(report.unseen)))
+                        : ""));
 }
 
 std::optional<OutputFile> open_ghosts(const FitFlags& flags) {

@@ -20,10 +20,12 @@ struct FitFlags {
   std::string sensor_pose;
   std::string ghosts_out;
   double leak_weight = FitOptions{}.leak_weight;
+  std::string signal_of;
+  double signal_limit = 0.0;  ///< 0: found.
 };
 
 /// --scans, --poses, --scan-topic, --pose-topic, --sensor-pose, --free, --deskewed, --leak-weight,
-/// --export-ghosts.
+/// --export-ghosts, --signal-of, --signal-limit.
 void add_fit_flags(CLI::App& app, FitFlags& flags, bool required);
 
 /// The survey of --scans: a folder of clouds, a recording or a folder of MCAP files. Throws
@@ -40,6 +42,17 @@ std::string fit_note(const SurveySource& survey, const FitReport& report);
 
 /// What became of the survey's rays, and of ghosts, on stderr.
 void print_fit(const FitReport& report, const OwnRays& after);
+
+/// Refuses a --signal-of that cannot be done, before a fit has taken its time. Throws InputError.
+void check_signal(const FitFlags& flags, const SurveySource& survey);
+
+/// Does what --signal-of asks for, and says on stderr what came of it.
+void paint_by_signal(EditedMap& map,
+                     const FitFlags& flags,
+                     const SurveySource& survey,
+                     const EditOptions& options,
+                     const Executor& executor,
+                     const Progress& progress);
 
 /// The file of --export-ghosts, opened before any work is done; nothing where none was asked for.
 std::optional<OutputFile> open_ghosts(const FitFlags& flags);

@@ -17,7 +17,7 @@ allowed() {
     render) echo "core geometry map render" ;;
     lidar) echo "core geometry io map render lidar" ;;
     vehicle) echo "core geometry io vehicle" ;;
-    fit) echo "core geometry io map render fit" ;;
+    fit) echo "core geometry io map render lidar fit" ;;
     fidelity) echo "core geometry io map render lidar fit fidelity" ;;
     world) echo "core geometry io map world" ;;
     sim) echo "core geometry io map render lidar vehicle world sim" ;;

@@ -23,15 +23,10 @@ constexpr double kLeastWidth = 0.1;      // deg, about lines
 constexpr double kFwhmPerSigma = 2.3548;
 constexpr std::size_t kRim = 8;  // lines around a beam
 
-/// Beams of one scan, in directions that were given.
+/// Beams of one scan that were given.
 class GivenBeams : public BeamPattern {
  public:
-  explicit GivenBeams(std::span<const Vector3f> directions_sensor) {
-    beams_.resize(directions_sensor.size());
-    for (std::size_t i = 0; i < beams_.size(); ++i) {
-      beams_[i].direction_sensor = directions_sensor[i];
-    }
-  }
+  explicit GivenBeams(std::vector<Beam> beams) : beams_(std::move(beams)) {}
   [[nodiscard]] std::vector<Beam> beams(std::uint64_t /*index*/,
                                         const Executor& /*executor*/) const override {
     return beams_;
@@ -71,13 +66,6 @@ ReturnShare* share_of(SensorComparison& made, const Hit& hit) {
   return &made.shares[range - 1][incidence - 1];
 }
 
-std::vector<Vector3f> directions_of(const RealScan& scan) {
-  std::vector<Vector3f> directions;
-  directions.reserve(scan.points_sensor.size());
-  for (const Vector3f& point : scan.points_sensor) directions.push_back(point.normalized());
-  return directions;
-}
-
 double least_range_of(const std::vector<RealScan>& scans) {
   std::vector<float> ranges;
   for (const RealScan& scan : scans) {
@@ -89,6 +77,13 @@ double least_range_of(const std::vector<RealScan>& scans) {
   std::nth_element(ranges.begin(), at, ranges.end());
   return static_cast<double>(*at);
 }
+
+/// The beams that real returns came along.
+struct RealBeams {
+  std::vector<Vector3f> origins_sensor;
+  std::vector<Vector3f> directions_sensor;
+  std::vector<float> ranges;
+};
 
 /// Counts the scans of one sensor into a comparison.
 class Counter {
@@ -127,19 +122,42 @@ class Counter {
   void find_blocked() {
     std::vector<double> fired(kColumns * kRows);
     std::vector<double> real(fired.size());
+    origins_.resize(fired.size(), Vector3f::Zero());
     for (std::size_t i = 0; i < scans_.size(); ++i) {
       for (const Beam& beam : modelled_.beams(modelled_.pattern_scan(i, 0), executor_)) {
-        fired[cell_of(beam.direction_sensor)] += 1.0;
+        const std::size_t cell = cell_of(beam.direction_sensor);
+        fired[cell] += 1.0;
+        origins_[cell] += beam.origin_sensor;
         made_.beams += 1.0;
       }
-      for (const Vector3f& direction : directions_of(scans_[i])) real[cell_of(direction)] += 1.0;
-      made_.returns += scans_[i].points_sensor.size();
+    }
+    for (std::size_t i = 0; i < fired.size(); ++i) {
+      if (fired[i] > 0.0) origins_[i] /= static_cast<float>(fired[i]);
+    }
+    for (const RealScan& scan : scans_) {
+      for (const Vector3f& direction : beams_of(scan).directions_sensor) {
+        real[cell_of(direction)] += 1.0;
+      }
+      made_.returns += scan.points_sensor.size();
     }
     blocked_.resize(fired.size());
     for (std::size_t i = 0; i < fired.size(); ++i) {
       blocked_[i] = real[i] < kBlocked * fired[i];
       if (blocked_[i]) made_.blocked += fired[i];
     }
+  }
+
+  /// Where beams leave the sensor changes little within a cell.
+  [[nodiscard]] RealBeams beams_of(const RealScan& scan) const {
+    RealBeams real;
+    for (const Vector3f& point : scan.points_sensor) {
+      const Vector3f& origin = origins_[cell_of(point.normalized())];
+      const Vector3f way = point - origin;
+      real.origins_sensor.push_back(origin);
+      real.ranges.push_back(way.norm());
+      real.directions_sensor.push_back(way / real.ranges.back());
+    }
+    return real;
   }
 
   [[nodiscard]] std::vector<Hit> lines(const Pose& T_world_sensor,
@@ -192,21 +210,26 @@ class Counter {
       ReturnShare* share = of_beam[point.beam];
       if (share != nullptr && point.echo == 0) share->returns.modelled += 1.0;
     }
-    const std::vector<Vector3f> real = directions_of(scans_[scan]);
-    const std::vector<Hit> met = lines(pose, {}, real);
-    for (std::size_t i = 0; i < real.size(); ++i) {
-      ReturnShare* share = blocked_[cell_of(real[i])] ? nullptr : share_of(made_, met[i]);
+    const RealBeams real = beams_of(scans_[scan]);
+    const std::vector<Hit> met = lines(pose, real.origins_sensor, real.directions_sensor);
+    for (std::size_t i = 0; i < met.size(); ++i) {
+      const bool blocked = blocked_[cell_of(real.directions_sensor[i])];
+      ReturnShare* share = blocked ? nullptr : share_of(made_, met[i]);
       if (share != nullptr) share->returns.real += 1.0;
     }
   }
 
   /// Whether lines around each direction meet something off the plane that others meet.
   [[nodiscard]] std::vector<bool> at_edges(const Pose& pose,
-                                           std::span<const Vector3f> directions,
+                                           const RealBeams& real,
                                            std::span<const Hit> middles) const {
+    std::vector<Vector3f> origins;
     std::vector<Vector3f> around;
-    around.reserve(kRim * directions.size());
-    for (const Vector3f& d : directions) {
+    around.reserve(kRim * middles.size());
+    origins.reserve(kRim * middles.size());
+    for (std::size_t i = 0; i < middles.size(); ++i) {
+      const Vector3f& d = real.directions_sensor[i];
+      origins.insert(origins.end(), kRim, real.origins_sensor[i]);
       const Vector3f across =
           (std::abs(d.z()) < 0.9f ? d.cross(Vector3f::UnitZ()) : d.cross(Vector3f::UnitX()))
               .normalized();
@@ -218,9 +241,9 @@ class Counter {
         around.push_back((d + x * across + y * up).normalized());
       }
     }
-    const std::vector<Hit> hits = lines(pose, {}, around);
-    std::vector<bool> edges(directions.size());
-    for (std::size_t i = 0; i < directions.size(); ++i) {
+    const std::vector<Hit> hits = lines(pose, origins, around);
+    std::vector<bool> edges(middles.size());
+    for (std::size_t i = 0; i < middles.size(); ++i) {
       if (!middles[i].is_return()) continue;
       const auto r = static_cast<double>(middles[i].range);
       for (std::size_t k = 0; k < kRim / 2 && !edges[i]; ++k) {
@@ -241,19 +264,22 @@ class Counter {
 
   void count_edges(std::size_t scan) {
     const RealScan& real = scans_[scan];
-    const std::vector<Vector3f> all = directions_of(real);
-    const std::vector<Hit> middles = lines(real.T_world_sensor, {}, all);
+    const RealBeams all = beams_of(real);
+    const std::vector<Hit> middles =
+        lines(real.T_world_sensor, all.origins_sensor, all.directions_sensor);
     const std::vector<bool> edges = at_edges(real.T_world_sensor, all, middles);
-    std::vector<Vector3f> directions;
+    std::vector<Beam> chosen;
     std::vector<double> rendered;
-    for (std::size_t i = 0; i < all.size(); ++i) {
+    for (std::size_t i = 0; i < middles.size(); ++i) {
       if (!edges[i]) continue;
-      directions.push_back(all[i]);
+      chosen.emplace_back();
+      chosen.back().origin_sensor = all.origins_sensor[i];
+      chosen.back().direction_sensor = all.directions_sensor[i];
       rendered.push_back(static_cast<double>(middles[i].range));
-      count_error(&Sides::real,
-                  static_cast<double>(real.points_sensor[i].norm()) - rendered.back());
+      count_error(&Sides::real, static_cast<double>(all.ranges[i]) - rendered.back());
     }
-    const auto beams = std::make_shared<const ScanBeams>(std::make_unique<GivenBeams>(directions));
+    const auto beams =
+        std::make_shared<const ScanBeams>(std::make_unique<GivenBeams>(std::move(chosen)));
     const auto count = [&](double Sides::*side, const std::optional<Surroundings>& surroundings) {
       const Lidar lidar(settings_, 0, beams, surroundings);
       ScanRequest request;
@@ -279,6 +305,7 @@ class Counter {
   Lidar modelled_;
   float radius_ = 0.0f;  // tangent of what a beam's edge is off its middle
   std::vector<bool> blocked_;
+  std::vector<Vector3f> origins_;  // of beams, mean of each cell, m in the sensor frame
   SensorComparison made_;
 };
 

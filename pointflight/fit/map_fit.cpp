@@ -15,11 +15,10 @@
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/math.hpp"
 #include "pointflight/fit/surfel_evidence.hpp"
+#include "pointflight/fit/survey_meetings.hpp"
 #include "pointflight/map/known_space.hpp"
 #include "pointflight/map/map_file.hpp"
 #include "pointflight/map/surfel_gathering.hpp"
-#include "pointflight/render/direction_order.hpp"
-#include "pointflight/render/meeting_kernel.hpp"
 
 namespace pointflight {
 namespace {
@@ -65,41 +64,6 @@ class FateCounts {
 
   std::array<std::atomic<std::uint64_t>, 8> counts_{};
 };
-
-/// Follows every ray of the survey to its end, and as far behind a return as decides its fate.
-/// Returns how many lists of surfels overflowed.
-std::uint64_t follow_survey(
-    const SurfelMap& map,
-    const SurveyOpener& survey,
-    double right,
-    const Executor& executor,
-    const std::string& stage,
-    const Progress& progress,
-    const std::function<void(const SurveyRay&, const RayMeetings&)>& visit) {
-  constexpr std::size_t kChunk = 1024;
-  const KernelMap kernel = kernel_map_of(map);
-  const float behind = static_cast<float>(right) + kernel.window;
-  const auto reader = survey();
-  std::vector<SurveyRay> batch;
-  std::vector<Ray> rays;
-  std::atomic<std::uint64_t> overflows{0};
-  while (reader->read(batch)) {
-    report(progress, stage, reader->share_read());
-    rays.clear();
-    for (const SurveyRay& ray : batch) {
-      rays.push_back(
-          {ray.origin_world, ray.direction_world, ray.is_return ? ray.range + behind : ray.range});
-    }
-    const auto order = direction_order(rays, executor);
-    executor.parallel_for(order.size(), kChunk, [&](std::size_t begin, std::size_t end) {
-      overflows += meet_all(
-          kernel, rays, std::span(order).subspan(begin, end - begin), [&](const auto& way) {
-            visit(batch[way.ray], way);
-          });
-    });
-  }
-  return overflows;
-}
 
 /// A surfel with its standard deviations scaled, its place as it was.
 SurfelWord resized(SurfelWord word, const std::array<double, 3>& factors) {

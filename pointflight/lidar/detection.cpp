@@ -66,6 +66,12 @@ void describe(SettingsVisitor& v, DetectionSettings& s) {
   v.value({"probability", "", "of a return at the rated ranges", 0.01, 0.999}, s.probability);
   v.value({"false_alarm", "", "share of beams that report what is not there", 0, 0.1},
           s.false_alarm);
+  v.list({"near", "", "what is seen of signals from nearer than the receiver is made for"},
+         s.near,
+         [](SettingsVisitor& w, NearShare& near) {
+           w.value({"range", "m", "ascending; straight lines between", 0, 1e3}, near.range);
+           w.value({"share", "", "of the signal; all beyond the last range", 0.001, 1}, near.share);
+         });
   v.value({"range_limit", "m", "nothing farther is reported, however bright; 0: no limit", 0, 1e5},
           s.range_limit);
   v.value({"intensity_at_100_percent",
@@ -81,6 +87,10 @@ DetectionModel::DetectionModel(const DetectionSettings& settings, double sun_klx
     : limit_(settings.range_limit) {
   threshold_ = -math::normal_quantile(std::max(settings.false_alarm, kLeastAlarm));
   slope_ = threshold_ + math::normal_quantile(settings.probability);
+  for (const NearShare& near : settings.near) {
+    near_ranges_.push_back(near.range);
+    near_shares_.push_back(near.share);
+  }
   std::map<double, std::map<double, double>> levels;
   for (const RatedRange& rated : settings.rated) {
     levels[rated.sun_klx][rated.reflectivity] = rated.range;
@@ -115,8 +125,18 @@ double DetectionModel::rated_reflectivity(double range) const {
   return math::exp(on_line(log_ranges_, log_reflectivities_, math::log(range)));
 }
 
+double DetectionModel::near_share(double range) const {
+  if (near_ranges_.empty() || range >= near_ranges_.back()) return 1.0;
+  if (range <= near_ranges_.front()) return near_shares_.front();
+  return on_line(near_ranges_, near_shares_, range);
+}
+
+double DetectionModel::margin_at(double probability) const {
+  return (threshold_ + math::normal_quantile(probability)) / slope_;
+}
+
 double DetectionModel::margin(double reflectivity, double range) const {
-  return reflectivity / rated_reflectivity(range);
+  return reflectivity * near_share(range) / rated_reflectivity(range);
 }
 
 double DetectionModel::probability(double margin) const {
@@ -128,8 +148,7 @@ double DetectionModel::least_strength() const {
 }
 
 double DetectionModel::reach() const {
-  const double least = (threshold_ + math::normal_quantile(kFurthestShare)) / slope_;
-  const double reach = rated_range(1.0 / std::max(least, 0.01));
+  const double reach = rated_range(1.0 / std::max(margin_at(kFurthestShare), 0.01));
   return limit_ > 0.0 ? std::min(limit_, reach) : reach;
 }
 

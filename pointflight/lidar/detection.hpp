@@ -18,6 +18,15 @@ struct RatedRange {
   bool operator==(const RatedRange&) const = default;
 };
 
+/// What a receiver sees of a target so near that the beam and its field of view do not overlap
+/// fully, or that its optics are not in focus.
+struct NearShare {
+  double range = 1.0;  ///< m
+  double share = 1.0;  ///< Of the signal that it would see otherwise.
+  /// The same figures.
+  bool operator==(const NearShare&) const = default;
+};
+
 /// Which echoes of a beam a sensor reports.
 enum class ReturnMode {
   kStrongest,  ///< One: the strongest.
@@ -37,7 +46,9 @@ struct DetectionSettings {
   std::vector<RatedRange> rated;  ///< None: whatever a beam meets comes back.
   double probability = 0.5;       ///< Of a return at the rated ranges.
   double false_alarm = 1e-4;      ///< Share of beams that report what is not there.
-  double range_limit = 0.0;       ///< m, nothing farther is reported however bright; 0: no limit.
+  /// By ascending range; straight lines between, the first one's share below, all beyond.
+  std::vector<NearShare> near;
+  double range_limit = 0.0;  ///< m, nothing farther is reported however bright; 0: no limit.
   /// What the sensor reports of a diffuse target of 100 %, face on; 0: the map's intensity.
   double intensity_at_100_percent = 0.0;
   ReturnMode returns = ReturnMode::kStrongest;  ///< Where a beam has several echoes.
@@ -54,7 +65,8 @@ void describe(SettingsVisitor& visitor, DetectionSettings& settings);
 /// and less where sheets say so (0.25 for an Avia at 100 klx). Here the law is the sheet's own:
 /// rated ranges are met exactly, and lie on a straight line in (log reflectivity, log range)
 /// between and beyond. With one rated range gamma is 0.5. Light changes the ranges in proportion
-/// between the levels that are rated, and keeps the nearest level's beyond.
+/// between the levels that are rated, and keeps the nearest level's beyond. Signals from within
+/// `DetectionSettings::near` are weakened by its share.
 class DetectionModel {
  public:
   /// `settings` as `describe` admits; `sun_klx`: background light, 0 at night, 100 in full sun.
@@ -67,6 +79,10 @@ class DetectionModel {
   /// Reflectivity of the target that is rated for a range (> 0, m); above 1 for one that no diffuse
   /// target reaches.
   [[nodiscard]] double rated_reflectivity(double range) const;
+  /// Share of the signal that is seen from `range` (m), by `near`.
+  [[nodiscard]] double near_share(double range) const;
+  /// Margin of a signal that comes back so often, 0 to 1, both exclusive: `probability`, inverted.
+  [[nodiscard]] double margin_at(double probability) const;
   /// Of the signal from `range` (> 0, m); `reflectivity` is the surface's times the cosine of the
   /// incidence, times what the air lets through, there and back.
   [[nodiscard]] double margin(double reflectivity, double range) const;
@@ -86,6 +102,8 @@ class DetectionModel {
   double threshold_ = 0.0;                  ///< T
   double slope_ = 0.0;                      ///< T + z
   double limit_ = 0.0;                      ///< `range_limit`
+  std::vector<double> near_ranges_;         ///< Of `near`, two at least, or none.
+  std::vector<double> near_shares_;         ///< Beside them.
 };
 
 }  // namespace pointflight

@@ -181,9 +181,14 @@ void check_channels(const RingsSettings& s, const Fail& fail) {
   }
 }
 
-/// In each light a brighter target is seen from farther away.
+/// In each light a brighter target is seen from farther away; ranges of `near` ascend.
 template <class Fail>
 void check_detection(const DetectionSettings& s, const Fail& fail) {
+  for (std::size_t i = 1; i < s.near.size(); ++i) {
+    if (s.near[i].range > s.near[i - 1].range) continue;
+    fail("detection.near",
+         fmt::format("{} m after {} m: ranges ascend", s.near[i].range, s.near[i - 1].range));
+  }
   for (std::size_t i = 0; i < s.rated.size(); ++i) {
     for (std::size_t k = 0; k < i; ++k) {
       const RatedRange& a = s.rated[k];
@@ -323,6 +328,7 @@ std::string lidar_reference() {
   LidarSettings defaults;  // with one of each, so that all keys are listed
   defaults.prisms.wedges.resize(1);
   defaults.detection.rated.resize(1);
+  defaults.detection.near.resize(1);
   SettingsTable table;
   describe(table, defaults);
   return table.text();

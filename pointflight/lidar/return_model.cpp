@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <vector>
 
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/math.hpp"
@@ -15,6 +16,26 @@ constexpr double kDarkest = 1e-3;                   // reflectivity of anything
 constexpr double kNearest = 0.01;                   // m, of signals
 constexpr double kBrightest = 255.0;                // a byte, in every maker's packets
 constexpr double kUsualDivergence = 0.2 * kDegree;  // rad, where a sensor file gives none
+
+constexpr std::size_t kTexture = 4096;  // reflectivities that unknown surfels have
+
+/// Quantiles of the usual distribution.
+std::vector<float> usual_reflectivities() {
+  std::vector<float> all(kTexture);
+  for (std::size_t i = 0; i < kTexture; ++i) {
+    const double share = (static_cast<double>(i) + 0.5) / static_cast<double>(kTexture);
+    all[i] = static_cast<float>(
+        std::min(1.0, kUsualReflectivity * math::exp(kUsualSpread * math::normal_quantile(share))));
+  }
+  return all;
+}
+
+/// One of them, always the same for a surfel: twelve bits of a multiplicative hash (Knuth, The Art
+/// of Computer Programming, vol. 3, 6.4).
+double usual_reflectivity(std::uint32_t surfel) {
+  static const std::vector<float> all = usual_reflectivities();
+  return static_cast<double>(all[(surfel * 2654435769u) >> 20]);
+}
 
 /// Mean full angle of the beam, rad.
 double divergence_of(const OpticsSettings& optics) {
@@ -29,18 +50,26 @@ void describe(SettingsVisitor& v, Surroundings& s) {
   v.value({"sun_klx", "klx", "background light: 100 in full sun, 0 at night", 0, 200}, s.sun_klx);
   v.value({"reflectivity",
            "",
-           "of surfaces of which the map does not say it, at the laser's wavelength",
-           0.001,
+           "of surfaces of which the map does not say it, at the laser's wavelength; 0: it varies "
+           "from surfel to surfel, half of them above 0.15",
+           0,
            1},
           s.reflectivity);
   v.value({"reflectivity_per_intensity",
            "",
-           "of the map's surfaces, per unit of its intensity; 0: intensities are not calibrated",
+           "of the map's surfaces, per unit of its intensity; 0: what the map says, if it does",
            0,
            1e6},
           s.reflectivity_per_intensity);
   v.section({"weather", "", "what is in the air"},
             [&](SettingsVisitor& w) { describe(w, s.weather); });
+}
+
+Surroundings surroundings_in(const SurfelMap& map, Surroundings surroundings) {
+  if (surroundings.reflectivity_per_intensity <= 0.0 && map.has_intensity()) {
+    surroundings.reflectivity_per_intensity = map.reflectivity_per_intensity();
+  }
+  return surroundings;
 }
 
 ReturnModel::ReturnModel(const LidarSettings& lidar, const Surroundings& surroundings)
@@ -61,6 +90,8 @@ double ReturnModel::reflectivity(const Hit& hit) const {
   double reflectivity = surroundings_.reflectivity;
   if (hit.label == kMapLabel && surroundings_.reflectivity_per_intensity > 0.0) {
     reflectivity = static_cast<double>(hit.intensity) * surroundings_.reflectivity_per_intensity;
+  } else if (reflectivity <= 0.0) {
+    reflectivity = hit.surfel == kNoSurfel ? kUsualReflectivity : usual_reflectivity(hit.surfel);
   }
   return std::max(kDarkest, reflectivity * static_cast<double>(hit.cos_incidence));
 }

@@ -12,18 +12,29 @@
 
 namespace pointflight {
 
+/// How reflectivities of unknown surfaces are distributed: log-normal. The figures are those that
+/// the signals of a real survey gave (a hall at 865 nm, docs/validation.md).
+///@{
+inline constexpr double kUsualReflectivity = 0.15;  ///< Median; of bodies, all of them.
+inline constexpr double kUsualSpread = 0.8;         ///< Standard deviation of the logarithm.
+///@}
+
 /// What returns depend on beside the sensor.
 struct Surroundings {
   double sun_klx = 100.0;  ///< Background light, kilolux: 100 in full sun, 0 at night.
-  double reflectivity =
-      0.3;  ///< Of surfaces of which the map does not say it, at the laser's line.
-  /// Reflectivity of a surface per unit of the map's intensity; 0: intensities are not calibrated.
+  /// Of surfaces of which the map does not say it, at the laser's wavelength; 0: it varies from
+  /// surfel to surfel, as `kUsualReflectivity` says.
+  double reflectivity = 0.0;
+  /// Reflectivity of a surface per unit of the map's intensity; 0: what the map says, if it does.
   double reflectivity_per_intensity = 0.0;
   WeatherSettings weather{};  ///< What is in the air.
 };
 
 /// Their keys.
 void describe(SettingsVisitor& visitor, Surroundings& surroundings);
+
+/// The same with the map's own scale of reflectivities where they give none.
+Surroundings surroundings_in(const SurfelMap& map, Surroundings surroundings);
 
 /// The random part of one beam.
 struct BeamChance {
@@ -63,8 +74,8 @@ class ReturnModel {
   /// Standard deviation of the range at a range (m) and a margin (`DetectionModel`; infinity where
   /// the sensor has no rated ranges), m.
   [[nodiscard]] double range_sigma(double range, double margin) const;
-  /// Of a surface that a beam met: what the map or the surroundings say, times the cosine of the
-  /// incidence.
+  /// Of a surface that a beam met: what the map or the surroundings say, times the cosine
+  /// of the incidence.
   [[nodiscard]] double reflectivity(const Hit& hit) const;
   /// The one echo of a beam that is a line.
   [[nodiscard]] Echo echo_of(const Hit& hit) const;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <utility>
@@ -119,6 +120,11 @@ void join_intensities(const std::vector<PlacedMap>& maps, MapDescription& descri
     high = std::max(high, placed.map->intensity_offset() + 255.0f * placed.map->intensity_step());
   }
   description.has_intensity = low <= high;
+  const double scale = maps.front().map->reflectivity_per_intensity();
+  const bool is_shared = std::all_of(maps.begin(), maps.end(), [&](const PlacedMap& placed) {
+    return placed.map->reflectivity_per_intensity() == scale;
+  });
+  if (!is_shared) set_reflectivity(description, 0.0);
   if (!description.has_intensity) return;
   description.intensity_offset = low;
   description.intensity_step = (high - low) / 255.0f;
@@ -151,9 +157,9 @@ MapDescription description_of(const SurfelMap& map) {
   d.intensity_step = map.intensity_step();
   d.surfel_count = map.surfel_count();
   d.metadata = std::string(map.metadata());
-  if (map.known_space() != nullptr) {
-    const auto bytes = map.section(KnownSpace::kSection);
-    d.extra.push_back({KnownSpace::kSection, {bytes.begin(), bytes.end()}});
+  for (const char* name : {KnownSpace::kSection, kReflectivitySection}) {
+    const auto bytes = map.section(name);
+    if (!bytes.empty()) d.extra.push_back({name, {bytes.begin(), bytes.end()}});
   }
   return d;
 }
@@ -161,6 +167,12 @@ MapDescription description_of(const SurfelMap& map) {
 void set_section(MapDescription& description, const char* name, std::vector<std::byte> bytes) {
   std::erase_if(description.extra, [&](const ExtraSection& extra) { return extra.name == name; });
   if (!bytes.empty()) description.extra.push_back({name, std::move(bytes)});
+}
+
+void set_reflectivity(MapDescription& description, double per_intensity) {
+  std::vector<std::byte> bytes(per_intensity > 0.0 ? sizeof per_intensity : 0);
+  if (!bytes.empty()) std::memcpy(bytes.data(), &per_intensity, sizeof per_intensity);
+  set_section(description, kReflectivitySection, std::move(bytes));
 }
 
 void append_note(EditedMap& edited, const std::string& note) {
@@ -171,6 +183,7 @@ void append_note(EditedMap& edited, const std::string& note) {
   }
   json["edited"].push_back(note);
   json["surfels"] = edited.surfels;
+  if (json.contains("has_intensity")) json["has_intensity"] = edited.description.has_intensity;
   json.erase("planar_surfels");  // of the import; `map info` counts
   edited.description.metadata = json.dump(1, ' ', false, nlohmann::json::error_handler_t::replace);
 }

@@ -32,11 +32,15 @@ struct EditOptions {
   std::string note = {};  ///< What was done, appended to the metadata's list "edited".
 };
 
-/// What `write_map` needs to write the same map again; of further sections the known space.
+/// What `write_map` needs to write the same map again; of further sections the known space and the
+/// scale of reflectivities.
 MapDescription description_of(const SurfelMap& map);
 
 /// Puts a section in the place of what has its name; empty bytes take it away.
 void set_section(MapDescription& description, const char* name, std::vector<std::byte> bytes);
+
+/// Says what reflectivity a unit of the map's intensity stands for; 0: that it is not known.
+void set_reflectivity(MapDescription& description, double per_intensity);
 
 /// Appends what was done to the metadata's list "edited".
 void append_note(EditedMap& edited, const std::string& note);
@@ -62,8 +66,8 @@ struct PlacedMap {
 
 /// Joins maps of one resolution. A surfel of a later one that lies within the cell of an earlier
 /// one's is left out: twice the coverage would make edges fat. Space is known where one of them
-/// knows it, if all say what they know. Throws InputError where resolutions differ or the whole is
-/// too wide.
+/// knows it, if all say what they know. Intensities keep their reflectivity if all have one scale.
+/// Throws InputError where resolutions differ or the whole is too wide.
 EditedMap merge_maps(const std::vector<PlacedMap>& maps,
                      const EditOptions& options,
                      const Executor& executor,

@@ -290,6 +290,15 @@ void SurfelMap::attach(std::span<const std::byte> bytes, const std::string& name
       fail(static_cast<std::size_t>(known.data() - bytes.data()),
            "the section 'known_space' is corrupt");
   }
+  if (const auto scale = section(kReflectivitySection); !scale.empty()) {
+    if (scale.size() == sizeof reflectivity_) {
+      std::memcpy(&reflectivity_, scale.data(), sizeof reflectivity_);
+    }
+    if (!(reflectivity_ > 0.0) || !std::isfinite(reflectivity_)) {
+      fail(static_cast<std::size_t>(scale.data() - bytes.data()),
+           "the section 'reflectivity' is corrupt");
+    }
+  }
   name_ = name;
   file_size_ = bytes.size();
   resolution_ = header.resolution;

@@ -19,6 +19,7 @@
 ///   ...         section: metadata   JSON: how the map was made, from what, with which version;
 ///   optional
 ///   ...         section: known_space  which space a survey saw (known_space.hpp); optional
+///   ...         section: reflectivity  f64: reflectivity per unit of intensity; optional
 ///   ...         any others, which readers that do not know them leave alone
 ///
 /// Version 1 had these four sections and no names for them: its table is four MapSectionV1.

@@ -31,6 +31,9 @@ struct MapSection {
   std::uint64_t checksum;  ///< XXH3-64 of the bytes.
 };
 
+/// Name of the section that says what reflectivity an intensity stands for.
+inline constexpr char kReflectivitySection[] = "reflectivity";
+
 /// The nearest thing to a point.
 struct Nearest {
   double distance;        ///< To the surfel's box, m; 0 inside it.
@@ -89,6 +92,9 @@ class SurfelMap {
 
   /// What space the survey saw that the map was fitted to; null where the file does not say.
   [[nodiscard]] const KnownSpace* known_space() const { return known_ ? &*known_ : nullptr; }
+
+  /// Reflectivity of its surfaces per unit of intensity; 0 where it does not say.
+  [[nodiscard]] double reflectivity_per_intensity() const { return reflectivity_; }
 
   /// How the map was made, as JSON text.
   [[nodiscard]] std::string_view metadata() const { return metadata_; }
@@ -163,6 +169,7 @@ class SurfelMap {
   std::uint64_t file_size_ = 0;
   float intensity_offset_ = 0.0f;
   float intensity_step_ = 0.0f;
+  double reflectivity_ = 0.0;
 };
 
 /// What space the map's survey saw. Throws InputError where the map does not say.

@@ -83,6 +83,7 @@ Hit BeamRenderer::hit_of(const KernelHit& found) const {
   hit.range = found.range;
   hit.cos_incidence = found.cos_incidence;
   hit.intensity = map_->intensity(found.strongest);
+  hit.surfel = found.strongest;
   return hit;
 }
 

@@ -223,6 +223,7 @@ void meet_points(const RayBatch& batch,
     hit.cos_incidence = found[k].cos_incidence;
     hit.intensity = map.intensity(found[k].strongest);
     hit.label = body.label;
+    hit.surfel = kNoSurfel;
   }
 }
 

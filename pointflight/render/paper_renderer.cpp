@@ -108,7 +108,7 @@ Hit look_up(const PaperImage& image, float azimuth, float elevation) {
   const std::size_t at =
       static_cast<std::size_t>(row) * image.stride + static_cast<std::size_t>(column);
   if (!(image.depth[at] <= image.range_max)) return {};
-  return {image.depth[at], image.cosine[at], image.intensity[at], kMapLabel};
+  return {image.depth[at], image.cosine[at], image.intensity[at], kMapLabel, kNoSurfel};
 }
 
 /// The paper's point of a cell: half the diagonal of its cube, m.
@@ -335,7 +335,7 @@ void PaperRenderer::render(const RayBatch& batch,
     if (!met.is_return() || met.range > batch.rays[i].range_max) continue;
     if (hits[i].is_return() && hits[i].range <= met.range) continue;
     const Body& body = batch.bodies[static_cast<std::size_t>(met.intensity)];
-    hits[i] = {met.range, met.cos_incidence, body.intensity, body.label};
+    hits[i] = {met.range, met.cos_incidence, body.intensity, body.label, kNoSurfel};
   }
 }
 

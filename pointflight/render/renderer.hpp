@@ -47,12 +47,18 @@ struct RayBatch {
 /// Rays that stand for one beam in `Renderer::render_footprints`.
 inline constexpr std::size_t kSubRays = 8;
 
+/// No surfel of the map.
+inline constexpr std::uint32_t kNoSurfel = 0xffffffffu;
+
 /// What a ray met.
 struct Hit {
   float range = -1.0f;         ///< Metres along the ray; negative where it met nothing.
   float cos_incidence = 0.0f;  ///< |cos| of the angle between the ray and the surface normal.
   float intensity = 0.0f;      ///< The cloud's own scale; 0 where it had none.
   Label label = kMapLabel;     ///< What it is of.
+  /// Of the map, which gave most of the return: its index in `SurfelMap::words()`; `kNoSurfel` of
+  /// bodies and where the renderer does not say.
+  std::uint32_t surfel = kNoSurfel;
   /// False: it met nothing within its range.
   [[nodiscard]] bool is_return() const { return range >= 0.0f; }
 };

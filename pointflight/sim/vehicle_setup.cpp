@@ -119,7 +119,8 @@ void VehicleAgent::mount_sensors(const Scenario& scenario, SharedParts& shared) 
     auto lidar = scenario.at(key, [&] {
       const SharedParts::LidarModel& model = shared.lidar(entry.model);
       const auto surroundings =
-          scenario.legacy ? std::nullopt : std::optional(scenario.surroundings);
+          scenario.legacy ? std::nullopt
+                          : std::optional(surroundings_in(shared.map(), scenario.surroundings));
       LidarSettings settings = model.settings;
       if (entry.sub_rays >= 0) settings.optics.sub_rays = entry.sub_rays;
       Lidar made(settings, MountedLidar::entity_of(site(i)), model.beams, surroundings);

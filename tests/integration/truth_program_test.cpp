@@ -207,5 +207,79 @@ TEST_F(Program, ComparesRealScansWithAMap) {
       "bad.tum:1: ");
 }
 
+TEST_F(Program, ComparesASensorWithRealScans) {
+  const TemporaryFolder folder;
+  std::string poses;
+  for (int i = 0; i < 2; ++i) {
+    const std::string name = fmt::format("scan{}.pcd", i);
+    ASSERT_EQ(run(fmt::format("scan {} --lidar vlp16 --pose {},10,4,0,0,0 --reflectivity 0.05 "
+                              "--seed 9 --index {} -o {}",
+                              map(),
+                              10 + 2 * i,
+                              i,
+                              folder / name))
+                  .code,
+              0);
+    poses += fmt::format("{} {} 10 4 0 0 0 1 {}\n", i, 10 + 2 * i, name);
+  }
+  write_file(folder / "poses.tum", poses);
+  const std::string real =
+      fmt::format("compare {} --scans {} --poses {}", map(), folder.path(), folder / "poses.tum");
+  const Result compared = run(
+      fmt::format("{} --lidar vlp16 --reflectivity 0.05 --json --png {}", real, folder / "png"));
+  ASSERT_EQ(compared.code, 0) << compared.err;
+  const auto sensor = nlohmann::json::parse(compared.out)["sensor"];
+  EXPECT_GT(sensor["returns"].get<int>(), 5000);
+  EXPECT_LT(sensor["share_distance"]["modelled"].get<double>(), 0.05);
+  EXPECT_GT(sensor["shares"].size(), 3u);
+  EXPECT_EQ(sensor["edges"].size(), sensor["edge_error_limits"].size() + 1);
+  EXPECT_TRUE(std::filesystem::exists(folder / "png/sensor.png"));
+  const Result text = run(real + " --lidar vlp16");
+  ASSERT_EQ(text.code, 0) << text.err;
+  EXPECT_NE(text.out.find("mean difference from the real share"), std::string::npos) << text.out;
+  expect_user_error(run(real + " --lidar nosuch"), "nosuch");
+  expect_user_error(run(real + " --sun 0"), "--lidar");
+}
+
+TEST_F(Program, MapsHaveReflectivities) {
+  const TemporaryFolder folder;
+  write_file(folder / "grey.xyz", [] {
+    std::string rows;
+    for (int i = 0; i < 60; ++i) {
+      for (int k = 0; k < 60; ++k) rows += fmt::format("5 {} {} 20\n", 0.1 * i - 3, 0.1 * k - 3);
+    }
+    return rows;
+  }());
+  const std::string import = fmt::format(
+      "map import {} -o {} --resolution 0.2 --force", folder / "grey.xyz", folder / "grey.pfmap");
+  ASSERT_EQ(run(import + " --reflectivity 0.01").code, 0);
+  const auto info =
+      nlohmann::json::parse(run(fmt::format("map info {} --json", folder / "grey.pfmap")).out);
+  EXPECT_EQ(info["reflectivity_per_intensity"].get<double>(), 0.01);
+  // a Mid-360 gives a diffuse target of 20 % an intensity of 0.2 times that of 100 %
+  const auto scanned = run(
+      fmt::format("scan {} --pose 0,0,0,0,0,0 -o {}", folder / "grey.pfmap", folder / "scan.pcd"));
+  ASSERT_EQ(scanned.code, 0) << scanned.err;
+  expect_user_error(
+      run(fmt::format("map import {} -o {} --reflectivity 0.01", cloud(), folder / "none.pfmap")),
+      "no intensity");
+  expect_user_error(run(import + " --signal-of os0_64"), "--scans");
+  EXPECT_FALSE(std::filesystem::exists(folder / "none.pfmap"));
+}
+
+TEST_F(Program, PaintsAMapBySignals) {
+  const TemporaryFolder folder;
+  const std::string scans = survey_the_room(folder);
+  const Result bare = run(fmt::format(
+      "map import {} --resolution 0.1 --signal-of os0_64 -o {}", scans, folder / "painted.pfmap"));
+  // its scans have no intensity
+  expect_user_error(bare, "--signal-of os0_64: the scans carry no intensities");
+  expect_user_error(run(fmt::format("map import {} --signal-of marsim_grid --resolution 0.1 -o {}",
+                                    scans,
+                                    folder / "painted.pfmap")),
+                    "no rated ranges");
+  EXPECT_FALSE(std::filesystem::exists(folder / "painted.pfmap"));
+}
+
 }  // namespace
 }  // namespace pointflight

@@ -18,6 +18,13 @@
 namespace pointflight {
 namespace {
 
+/// All surfaces are of 30 %.
+Surroundings even_surfaces() {
+  Surroundings where;
+  where.reflectivity = 0.3;
+  return where;
+}
+
 using testing::map_of;
 
 constexpr double kFwhm = 2.3548;  // sigmas
@@ -57,7 +64,7 @@ std::vector<Echoes> echoes_at(const LidarSettings& settings,
                               const Renderer& renderer,
                               std::size_t threads = 1) {
   const Footprint footprint(settings.optics);
-  const ReturnModel returns(settings, Surroundings{});
+  const ReturnModel returns(settings, even_surfaces());
   const std::vector<Vector3f> across(rays.size(), Vector3f::UnitY());
   std::vector<Echoes> echoes(rays.size());
   RayBatch batch;
@@ -108,7 +115,7 @@ TEST(Footprint, SharesAtAnEdgeAreThoseOfTheGaussian) {
   for (const std::int64_t sub_rays : {0, 1000}) {
     const LidarSettings os1 = sensor("os1_32", sub_rays, ReturnMode::kDual);
     const double sigma = os1.optics.divergence_horizontal_deg * kDegree / kFwhm;
-    const ReturnModel returns(os1, Surroundings{});
+    const ReturnModel returns(os1, even_surfaces());
     const std::vector<double> places = even(2.5 * sigma, 500);
     const auto echoes = echoes_at(os1, beams_beside(places), walls);
     double worst = 0.0;
@@ -181,7 +188,7 @@ Shares shares_of(const LidarSettings& settings,
                  const Renderer& renderer,
                  float between) {
   const auto echoes = echoes_at(settings, rays, renderer);
-  const ReturnModel returns(settings, Surroundings{});
+  const ReturnModel returns(settings, even_surfaces());
   const RandomStream random(5, StreamId::kTest, 0);
   Shares shares;
   for (std::size_t i = 0; i < rays.size(); ++i) {
@@ -252,7 +259,7 @@ TEST(Footprint, TheSameBytesWithAnyThreadsAndInstructionSet) {
       make_renderer("beam", Scene{map_of(make_forest({.size_x = 12.0, .size_y = 12.0}), 0.1)});
   LidarSettings vlp = load_lidar("vlp16");
   vlp.detection.returns = ReturnMode::kTriple;
-  const Lidar lidar(vlp, 0, nullptr, Surroundings{});
+  const Lidar lidar(vlp, 0, nullptr, even_surfaces());
   // 4 m/s and 90 deg/s
   std::vector<TimedPose> poses;
   for (int ms = 0; ms <= 100; ++ms) {
@@ -325,7 +332,7 @@ TEST(ReturnModel, ModesReportWhatMakersSay) {
   const auto ranges = [&](ReturnMode mode, std::span<const Echo> seen) {
     LidarSettings os1 = sensor("os1_32", 0, mode);
     os1.noise = {};
-    const ReturnModel model(os1, Surroundings{});
+    const ReturnModel model(os1, even_surfaces());
     std::array<Return, 3> returns;
     const std::size_t count = model.measure(
         seen, [](std::size_t) { return BeamChance{}; }, returns);
@@ -354,7 +361,7 @@ TEST(Footprint, FilesKeepTheEchoes) {
   const auto renderer = make_renderer("beam", Scene{map});
   LidarSettings vlp = load_lidar("vlp16");
   vlp.detection.returns = ReturnMode::kDual;
-  const Lidar lidar(vlp, 0, nullptr, Surroundings{});
+  const Lidar lidar(vlp, 0, nullptr, even_surfaces());
   const Executor executor(1);
   const Scan scan = lidar.take({}, PoseTrack(Pose{}), *renderer, executor);
   ASSERT_TRUE(scan.marks.echoes);

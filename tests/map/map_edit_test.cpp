@@ -223,6 +223,17 @@ TEST(MergeMaps, PosesAndWhatCannotBeJoined) {
                     merge_maps({{map, {}}, {coarse, {}}}, {}, executor);
                   }),
                   "resolutions of 0.1 m and 0.2 m");
+  // intensities keep their meaning where all mean the same
+  MapDescription told = description_of(*map);
+  set_reflectivity(told, 0.01);
+  const EditedMap same = transform_map(*map, {}, {}, executor);
+  const auto percent = SurfelMap::from_bytes(map_bytes(same.tree, told), "percent");
+  const auto scale = [&](const std::vector<PlacedMap>& maps) {
+    return opened(merge_maps(maps, {}, executor))->reflectivity_per_intensity();
+  };
+  EXPECT_EQ(scale({{percent, {}}, {percent, beside}}), 0.01);
+  EXPECT_EQ(scale({{percent, {}}, {map, beside}}), 0.0);
+  EXPECT_EQ(scale({{map, {}}, {percent, beside}}), 0.0);
   expect_contains(error_of([&] { merge_maps({}, {}, executor); }), "no maps");
   expect_contains(error_of([&] { merge_maps({{nullptr, {}}}, {}, executor); }), "null");
   const Pose wrong{Quaterniond(2.0, 0.0, 0.0, 0.0), Vector3d::Zero()};

@@ -8,6 +8,7 @@
 #include "pointflight/core/hash.hpp"
 #include "pointflight/geometry/shape_scene.hpp"
 #include "pointflight/map/map_builder.hpp"
+#include "pointflight/map/map_edit.hpp"
 #include "tests/support.hpp"
 
 namespace pointflight {
@@ -75,6 +76,25 @@ TEST(MapFile, Version1OpensAndIsTheSameMap) {
   EXPECT_TRUE(std::equal(
       old->words().begin(), old->words().end(), now->words().begin(), now->words().end()));
   EXPECT_EQ(old->intensity(20), now->intensity(20));
+}
+
+TEST(MapFile, SaysWhatReflectivityAnIntensityStandsFor) {
+  MapDescription description = ball().description;
+  const auto plain = opened(map_bytes(ball().tree, description));
+  EXPECT_EQ(plain->reflectivity_per_intensity(), 0.0);
+  set_reflectivity(description, 0.01);
+  const auto map = opened(map_bytes(ball().tree, description));
+  EXPECT_EQ(map->reflectivity_per_intensity(), 0.01);
+  EXPECT_NE(map->hash(), plain->hash()) << "returns hang on it";
+  EXPECT_EQ(description_of(*map).extra.size(), 1u) << "edits keep it";
+  set_reflectivity(description, 0.0);
+  EXPECT_TRUE(description.extra.empty());
+  for (const std::vector<std::byte>& wrong :
+       {std::vector<std::byte>(4, std::byte{1}), std::vector<std::byte>(8, std::byte{0xff})}) {
+    set_section(description, kReflectivitySection, wrong);
+    const auto bytes = map_bytes(ball().tree, description);
+    expect_contains(error_of([&] { opened(bytes); }), "the section 'reflectivity' is corrupt");
+  }
 }
 
 TEST(MapFile, UnknownSectionsAreLeftAloneAndCanBeRead) {

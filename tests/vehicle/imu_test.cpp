@@ -165,6 +165,45 @@ TEST(Imu, AllanDeviationGivesBackDensityInstabilityAndWalk) {
   }
 }
 
+/// A sampling interval a sixtieth of the time at which white noise passes the floor, and as many
+/// samples as last fifteen times longer than until the walk passes it.
+struct Record {
+  double dt;
+  std::size_t samples;
+};
+Record record_for(const TriadErrors& e) {
+  const double floor = 0.664 * e.bias_instability;
+  const double white_until = std::pow(e.noise_density / floor, 2);
+  const double walk_from = 3.0 * std::pow(floor / e.bias_walk, 2);
+  const double dt = white_until / 60.0;
+  return {dt, static_cast<std::size_t>(15.0 * std::max(walk_from, 10.0 * white_until) / dt)};
+}
+
+class EachPart : public ::testing::TestWithParam<std::string> {};
+
+TEST_P(EachPart, AllanDeviationGivesBackWhatItsFileSays) {
+  // at such intervals 16 bits would round white noise away, which does not happen at 200 Hz
+  ImuErrors errors = load_imu_part(GetParam()).errors;
+  errors.bits = 0;
+  errors.gyro.range = errors.accel.range = 0.0;
+  for (const bool gyro : {true, false}) {
+    SCOPED_TRACE(gyro ? "gyro" : "accelerometer");
+    const TriadErrors& truth = gyro ? errors.gyro : errors.accel;
+    ASSERT_GT(truth.bias_instability, 0.0);
+    const Record record = record_for(truth);
+    const auto variances = recorded_variances(errors, 1.0 / record.dt, record.samples, gyro);
+    const Terms found = fit_terms(variances, record.dt);
+    EXPECT_NEAR(found.density / truth.noise_density, 1.0, 0.05);
+    EXPECT_NEAR(found.instability / truth.bias_instability, 1.0, 0.2);
+    EXPECT_NEAR(found.walk / truth.bias_walk, 1.0, 0.2);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(ImuParts,
+                         EachPart,
+                         ::testing::ValuesIn(model_names("imus")),
+                         [](const auto& part) { return part.param; });
+
 /// Allan variance of a first-order Gauss-Markov process of deviation s and time constant T:
 /// 2 s^2 T / tau (1 - T / (2 tau) (3 - 4 e^(-tau / T) + e^(-2 tau / T))).
 double gauss_markov_variance(double s, double constant, double tau) {

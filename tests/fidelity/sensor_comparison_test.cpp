@@ -1,0 +1,102 @@
+// A sensor's model beside scans that were made with it: it must find itself, and only itself.
+#include "pointflight/fidelity/sensor_comparison.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "pointflight/geometry/rotation.hpp"
+#include "pointflight/lidar/lidar.hpp"
+#include "pointflight/lidar/lidar_settings.hpp"
+#include "tests/support.hpp"
+
+namespace pointflight {
+namespace {
+
+using testing::map_of;
+
+/// A hall of 70 x 30 x 8 m with pillars.
+ShapeScene hall() {
+  ShapeScene scene;
+  scene.add_box({-35, -15, 0}, {35, 15, 8});
+  for (int i = -3; i <= 3; ++i) {
+    scene.add_box({8.0 * i, 4, 0}, {8.0 * i + 0.3, 4.3, 8});
+    scene.add_box({8.0 * i + 3, -6, 0}, {8.0 * i + 3.2, -5.8, 8});
+  }
+  return scene;
+}
+
+Surroundings reflecting(double reflectivity) {
+  Surroundings where;
+  where.reflectivity = reflectivity;
+  return where;
+}
+
+class SensorComparisonTest : public ::testing::Test {
+ protected:
+  SensorComparisonTest() {
+    for (int i = 0; i < 3; ++i) {
+      // tilted, so that rings of beams do not lie on the limits of bins
+      const Pose pose{quaternion_from_rpy(0.03, 0.02, 0.4 * i), {-12.0 + 11.0 * i, 1.0, 1.5}};
+      ScanRequest request;
+      request.index = static_cast<std::uint64_t>(i);
+      request.seed = 1234;  // not the draws of the comparison
+      const Lidar lidar(sensor_, 0, nullptr, reflecting(0.3));
+      const Scan scan = lidar.take(request, PoseTrack(pose), *renderer_, executor_);
+      RealScan real{"scan", pose, {}};
+      for (const ScanPoint& point : scan.points) {
+        real.points_sensor.push_back(point.position_sensor);
+      }
+      scans_.push_back(std::move(real));
+    }
+  }
+
+  [[nodiscard]] SensorComparison against(const Surroundings& where) const {
+    return compare_sensor(scans_, sensor_, where, *renderer_, executor_);
+  }
+
+  LidarSettings sensor_ = load_lidar("os0_32");
+  Executor executor_{2};
+  std::unique_ptr<Renderer> renderer_ = make_renderer("beam", Scene{map_of(hall(), 0.1)});
+  std::vector<RealScan> scans_;
+};
+
+TEST_F(SensorComparisonTest, AModelFindsItself) {
+  const SensorComparison same = against(reflecting(0.3));
+  EXPECT_EQ(same.beams, 3.0 * 32768.0);
+  EXPECT_LT(same.blocked, 0.05 * same.beams);
+  EXPECT_LT(same.share_distance().modelled, 0.02);
+  EXPECT_GT(same.share_distance().plain, 0.2);
+  EXPECT_EQ(same.share_distance().real, 0.0);
+  EXPECT_LT(same.edge_distance().modelled, 0.1);
+  EXPECT_GT(same.edge_distance().plain, 0.3);
+  double real = 0.0;
+  double fired = 0.0;
+  for (const auto& row : same.shares) {
+    for (const ReturnShare& share : row) {
+      real += share.returns.real;
+      fired += share.beams;
+      EXPECT_LE(share.returns.plain, share.beams);
+    }
+  }
+  EXPECT_NEAR(real, static_cast<double>(same.returns), 0.03 * real);
+  EXPECT_NEAR(fired + same.blocked, same.beams, 0.02 * fired) << "the hall is closed";
+}
+
+TEST_F(SensorComparisonTest, AnotherReflectivityIsFartherOff) {
+  EXPECT_GT(against(reflecting(0.9)).share_distance().modelled, 0.1);
+  EXPECT_GT(against(reflecting(0.08)).share_distance().modelled, 0.1);
+}
+
+TEST_F(SensorComparisonTest, DirectionsThatSomethingBlocksDoNotCount) {
+  for (RealScan& scan : scans_) {  // the mast behind the sensor
+    std::erase_if(scan.points_sensor, [](const Vector3f& p) { return p.x() < -std::abs(p.y()); });
+  }
+  const SensorComparison made = against(reflecting(0.3));
+  EXPECT_NEAR(made.blocked, 0.25 * made.beams, 0.05 * made.beams);
+  EXPECT_LT(made.share_distance().modelled, 0.03);
+}
+
+}  // namespace
+}  // namespace pointflight
