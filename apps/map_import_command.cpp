@@ -3,6 +3,7 @@
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
+#include <algorithm>
 #include <chrono>
 #include <filesystem>
 #include <memory>
@@ -159,6 +160,14 @@ void import_map(const ImportFlags& flags) {
   const Progress progress = interruptible_progress();
   const std::vector<CloudSource> sources =
       cloud_sources(flags.inputs, flags.format, options.scratch_folder, progress);
+  if (flags.reflectivity > 0.0) {
+    const bool any = std::any_of(sources.begin(), sources.end(), [](const CloudSource& source) {
+      if (source.is_mesh()) return false;
+      const auto cloud = source.open();
+      return cloud->has_intensity() || cloud->has_color();
+    });
+    if (!any) throw InputError("--reflectivity: the points carry no intensity");
+  }
   ImportedMap map = import_clouds(sources, options, executor, progress);
   end_progress();
   calibrate(flags, map.description);

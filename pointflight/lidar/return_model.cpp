@@ -14,6 +14,7 @@ namespace {
 
 constexpr double kDarkest = 1e-3;                   // reflectivity of anything
 constexpr double kNearest = 0.01;                   // m, of signals
+constexpr double kShortestPulse = 0.1;              // ns
 constexpr double kBrightest = 255.0;                // a byte, in every maker's packets
 constexpr double kUsualDivergence = 0.2 * kDegree;  // rad, where a sensor file gives none
 
@@ -79,6 +80,7 @@ ReturnModel::ReturnModel(const LidarSettings& lidar, const Surroundings& surroun
       reach_(detection_.is_ideal() ? lidar.range_max : detection_.reach()),
       weather_(detection_.is_ideal() ? WeatherSettings{} : surroundings.weather,
                divergence_of(lidar.optics),
+               1e-9 * std::max(kShortestPulse, lidar.optics.pulse_ns),
                lidar.range_min,
                reach_),
       false_alarm_(detection_.is_ideal() ? 0.0 : lidar.detection.false_alarm),

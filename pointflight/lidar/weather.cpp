@@ -15,7 +15,6 @@ constexpr Named<WeatherKind> kKinds[] = {{WeatherKind::kClear, "clear"},
                                          {WeatherKind::kRain, "rain"},
                                          {WeatherKind::kSnow, "snow"}};
 
-constexpr double kPulse = 20e-9;         // s: tau
 constexpr double kOverlapBegins = 0.9;   // m
 constexpr double kOverlapEnds = 1.0;     // m
 constexpr double kFogStep = 0.05;        // m
@@ -55,10 +54,11 @@ void describe(SettingsVisitor& v, WeatherSettings& s) {
             });
 }
 
-Weather::Weather(const WeatherSettings& settings, double divergence, double nearest, double reach)
+Weather::Weather(
+    const WeatherSettings& settings, double divergence, double pulse, double nearest, double reach)
     : kind_(settings.kind), divergence_(divergence) {
   if (kind_ == WeatherKind::kFog || kind_ == WeatherKind::kDust) {
-    set_up_fog(settings.visibility, nearest, reach);
+    set_up_fog(settings.visibility, pulse, nearest, reach);
   } else if (kind_ != WeatherKind::kClear) {
     set_up_drops(settings.rate, divergence, nearest, reach);
   }
@@ -72,10 +72,10 @@ double Weather::target(double reflectivity, double range) const {
   return reflectivity * left_after(range) / squared(range);
 }
 
-void Weather::set_up_fog(double visibility, double nearest, double reach) {
+void Weather::set_up_fog(double visibility, double pulse, double nearest, double reach) {
   extinction_ = math::log(20.0) / visibility;
   const double beta = kBackscatter / visibility;
-  const double length = kLightSpeed * kPulse;  // of c t / 2 over 2 tau
+  const double length = kLightSpeed * pulse;  // of c t / 2 over 2 tau
   const auto steps = static_cast<std::size_t>(std::min(reach, kFogReach) / kFogStep);
   constexpr int kParts = 120;
   for (std::size_t i = 0; i <= steps; ++i) {

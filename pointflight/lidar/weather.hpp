@@ -35,8 +35,9 @@ void describe(SettingsVisitor& visitor, WeatherSettings& settings);
 ///
 /// Fog and dust: alpha = ln 20 / visibility, backscatter beta = 0.046 / visibility; the signal from
 /// range R is that of the pulse's length, pi beta times the integral of
-/// sin^2(pi t / 2 tau) e^(-2 alpha r) xi(r) / r^2 over r = R - c t / 2, tau = 20 ns, xi the overlap
-/// of beam and receiver, 0 up to 0.9 m and 1 from 1 m on (Hahner et al., ICCV 2021).
+/// sin^2(pi t / 2 tau) e^(-2 alpha r) xi(r) / r^2 over r = R - c t / 2, tau the pulse's width at
+/// half its power, xi the overlap of beam and receiver, 0 up to 0.9 m and 1 from 1 m on (Hahner et
+/// al., ICCV 2021, who take tau = 20 ns).
 ///
 /// Rain and snow: drops of diameters D (mm) with N(D) = N0 e^(-L D) per m^3 and mm, L = 4.1 R^-0.21
 /// and N0 = 8000 for rain (Marshall, Palmer 1948), L = 2.55 R^-0.48 and N0 = 7600 R^-0.87 for snow,
@@ -45,9 +46,13 @@ void describe(SettingsVisitor& visitor, WeatherSettings& settings);
 /// beam's cone the strongest counts (Kilic et al., LISA, arXiv 2107.07004).
 class Weather {
  public:
-  /// `divergence`: mean full angle of the beam, rad (> 0); signals from nearer than `nearest` m are
-  /// not seen, nor from farther than `reach`.
-  Weather(const WeatherSettings& settings, double divergence, double nearest, double reach);
+  /// `divergence`: mean full angle of the beam, rad (> 0); `pulse`: its width, s (> 0); signals
+  /// from nearer than `nearest` m are not seen, nor from farther than `reach`.
+  Weather(const WeatherSettings& settings,
+          double divergence,
+          double pulse,
+          double nearest,
+          double reach);
 
   /// False in clear air.
   [[nodiscard]] bool is_clear() const { return kind_ == WeatherKind::kClear; }
@@ -68,7 +73,7 @@ class Weather {
   [[nodiscard]] std::optional<Soft> soft(double range, double first, double second) const;
 
  private:
-  void set_up_fog(double visibility, double nearest, double reach);
+  void set_up_fog(double visibility, double pulse, double nearest, double reach);
   void set_up_drops(double rate, double divergence, double nearest, double reach);
   void tabulate_drops();
   [[nodiscard]] std::optional<Soft> fog_before(double range, double first) const;

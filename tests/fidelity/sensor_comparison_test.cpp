@@ -42,7 +42,7 @@ class SensorComparisonTest : public ::testing::Test {
       ScanRequest request;
       request.index = static_cast<std::uint64_t>(i);
       request.seed = 1234;  // not the draws of the comparison
-      const Lidar lidar(sensor_, 0, nullptr, reflecting(0.3));
+      const Lidar lidar(sensor_, 0, nullptr, reflecting(0.2));
       const Scan scan = lidar.take(request, PoseTrack(pose), *renderer_, executor_);
       RealScan real{"scan", pose, {}};
       for (const ScanPoint& point : scan.points) {
@@ -63,11 +63,11 @@ class SensorComparisonTest : public ::testing::Test {
 };
 
 TEST_F(SensorComparisonTest, AModelFindsItself) {
-  const SensorComparison same = against(reflecting(0.3));
+  const SensorComparison same = against(reflecting(0.2));
   EXPECT_EQ(same.beams, 3.0 * 32768.0);
   EXPECT_LT(same.blocked, 0.05 * same.beams);
   EXPECT_LT(same.share_distance().modelled, 0.02);
-  EXPECT_GT(same.share_distance().plain, 0.2);
+  EXPECT_GT(same.share_distance().plain, 0.1);
   EXPECT_EQ(same.share_distance().real, 0.0);
   EXPECT_LT(same.edge_distance().modelled, 0.1);
   EXPECT_GT(same.edge_distance().plain, 0.3);
@@ -85,15 +85,15 @@ TEST_F(SensorComparisonTest, AModelFindsItself) {
 }
 
 TEST_F(SensorComparisonTest, AnotherReflectivityIsFartherOff) {
-  EXPECT_GT(against(reflecting(0.9)).share_distance().modelled, 0.1);
-  EXPECT_GT(against(reflecting(0.08)).share_distance().modelled, 0.1);
+  EXPECT_GT(against(reflecting(0.9)).share_distance().modelled, 0.06);
+  EXPECT_GT(against(reflecting(0.06)).share_distance().modelled, 0.06);
 }
 
 TEST_F(SensorComparisonTest, DirectionsThatSomethingBlocksDoNotCount) {
   for (RealScan& scan : scans_) {  // the mast behind the sensor
     std::erase_if(scan.points_sensor, [](const Vector3f& p) { return p.x() < -std::abs(p.y()); });
   }
-  const SensorComparison made = against(reflecting(0.3));
+  const SensorComparison made = against(reflecting(0.2));
   EXPECT_NEAR(made.blocked, 0.25 * made.beams, 0.05 * made.beams);
   EXPECT_LT(made.share_distance().modelled, 0.03);
 }

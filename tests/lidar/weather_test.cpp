@@ -15,13 +15,14 @@ namespace pointflight {
 namespace {
 
 constexpr double kDivergence = 0.2 * kDegree;
+constexpr double kPulse = 8e-9;
 
 Weather of(WeatherKind kind, double figure, double nearest = 0.1, double reach = 100.0) {
   WeatherSettings settings;
   settings.kind = kind;
   settings.visibility = figure;
   settings.rate = figure;
-  return {settings, kDivergence, nearest, reach};
+  return {settings, kDivergence, kPulse, nearest, reach};
 }
 
 TEST(Weather, ExtinctionIsThatOfItsSources) {
@@ -53,11 +54,11 @@ TEST(Weather, FogGivesBackThePulsesIntegral) {
   const auto signal = [&](double range) {
     double sum = 0.0;
     const double dt = 1e-11;
-    for (double t = 0.5 * dt; t < 40e-9; t += dt) {
+    for (double t = 0.5 * dt; t < 2.0 * kPulse; t += dt) {
       const double r = range - 0.5 * 299792458.0 * t;
       if (r <= 0.9) break;
       const double xi = std::min(1.0, (r - 0.9) / 0.1);
-      const double pulse = std::pow(std::sin(kPi * t / 40e-9), 2);
+      const double pulse = std::pow(std::sin(kPi * t / (2.0 * kPulse)), 2);
       sum += pulse * std::exp(-2.0 * alpha * r) * xi / (r * r) * 0.5 * 299792458.0 * dt;
     }
     return kPi * beta * sum;
