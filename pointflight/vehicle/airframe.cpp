@@ -99,6 +99,7 @@ void describe_controller(SettingsVisitor& v, ControllerSettings& c) {
   v.value({"error_max", "m", "position errors count no more than this", 0.01, 1e4}, c.error_max);
   v.value({"integral_max", "m/s^2", "position loops allow for disturbances up to this", 0, 100},
           c.integral_max);
+  v.value({"reallocate", "", "the other rotors take over from one that fails"}, c.reallocate);
   v.value({"body_rate_max", "rad/s", "demanded rates", 0.1, 100}, c.body_rate_max);
 }
 
@@ -262,6 +263,8 @@ void describe(SettingsVisitor& v, VehicleSettings& s) {
 }
 
 void make_legacy(VehicleSettings& settings) {
+  settings.controller.reallocate = false;
+  settings.controller.legacy = true;
   ImuErrors& errors = settings.imu.errors;
   const auto noise_of = [](const TriadErrors& triad) {
     TriadErrors noise;

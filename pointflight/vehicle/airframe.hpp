@@ -70,6 +70,8 @@ struct ControllerSettings {
   double error_max = 5.0;                 ///< Position errors count no more than this, m.
   double integral_max = 4.0;              ///< Disturbance that the position loops allow for, m/s^2.
   double body_rate_max = 10.0;            ///< Demanded rates, rad/s.
+  bool reallocate = true;                 ///< Rotors that fail are allowed for.
+  bool legacy = false;                    ///< As in version 0.1 (`make_legacy`); no key of files.
 };
 
 /// Where an IMU sits and how it errs (REP 145 axes).

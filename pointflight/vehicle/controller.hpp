@@ -33,6 +33,10 @@ struct ControllerMemory {
   double yaw_torque = 0.0;                        ///< Filtered, N m.
   std::size_t level = std::variant_npos;          ///< Of the last setpoint.
   LimitsReached limits;                           ///< Over the last period.
+  /// Share of the commanded speed that each rotor turns at, as its speed controller reports; empty:
+  /// all of it.
+  std::vector<double> rotor_shares;
+  bool spins = false;  ///< The rotors that are left cannot hold a heading.
 };
 
 /// Turns setpoints into rotor speeds. It sees the true state.

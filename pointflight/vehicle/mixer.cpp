@@ -7,7 +7,9 @@
 #include <cassert>
 #include <cmath>
 
+#include "pointflight/core/constants.hpp"
 #include "pointflight/core/input_error.hpp"
+#include "pointflight/vehicle/bounded_least_squares.hpp"
 
 namespace pointflight {
 namespace {
@@ -27,6 +29,15 @@ double feasible_share(const Eigen::VectorXd& base,
   return std::max(0.0, share);
 }
 
+// What gives way to what, where not all can be had: squared, these weigh shares of the weight, and
+// of the torques that it makes at the arms and by the rotors' drag.
+constexpr double kThrustWeight = 30.0;
+constexpr double kTiltWeight = 300.0;
+constexpr double kYawWeight = 3.0;
+constexpr double kEvenWeight = 0.1;    // of rotors that do alike
+constexpr double kLeastShare = 0.05;   // a rotor with less is as good as lost
+constexpr double kHeadingShare = 0.2;  // of a rotor's torque in hover, left over when it spins
+
 }  // namespace
 
 Mixer::Mixer(const VehicleSettings& settings)
@@ -34,7 +45,8 @@ Mixer::Mixer(const VehicleSettings& settings)
       places_(settings.rotors),
       thrust_coefficient_(settings.rotor.thrust_coefficient),
       thrust_min_(thrust_coefficient_ * settings.rotor.speed_min * settings.rotor.speed_min),
-      thrust_max_(thrust_coefficient_ * settings.rotor.speed_max * settings.rotor.speed_max) {
+      thrust_max_(thrust_coefficient_ * settings.rotor.speed_max * settings.rotor.speed_max),
+      weight_(settings.mass * kGravity) {
   const auto n = static_cast<Eigen::Index>(settings.rotors.size());
   allocation_.resize(4, n);
   const double torque_per_thrust = settings.rotor.torque_coefficient / thrust_coefficient_;
@@ -89,6 +101,57 @@ std::vector<double> Mixer::speeds(const Wrench& wrench, const AirMotion& motion)
     }
   }
   return speeds;
+}
+
+Eigen::VectorXd Mixer::thrusts_of_what_is_left(const Wrench& wrench,
+                                               std::span<const double> shares) const {
+  const Eigen::Index n = allocation_.cols();
+  assert(static_cast<Eigen::Index>(shares.size()) == n);
+  const double even = weight_ / static_cast<double>(n);  // the unit of unknowns
+  // torques in shares of what the weight makes at the farthest arm, or by drag
+  const double arm =
+      std::max(allocation_.row(1).cwiseAbs().maxCoeff(), allocation_.row(2).cwiseAbs().maxCoeff());
+  const double drag = allocation_.row(3).cwiseAbs().maxCoeff();
+  const Eigen::Vector4d scale(kThrustWeight / weight_,
+                              kTiltWeight / (weight_ * arm),
+                              kTiltWeight / (weight_ * arm),
+                              kYawWeight / (weight_ * drag));
+  Eigen::MatrixXd a(4 + n, n);
+  a.topRows(4) = even * scale.asDiagonal() * allocation_;
+  a.bottomRows(n) = kEvenWeight * Eigen::MatrixXd::Identity(n, n);
+  Eigen::VectorXd b = Eigen::VectorXd::Constant(4 + n, kEvenWeight * wrench.thrust / weight_);
+  b.head<4>() = scale.cwiseProduct(
+      Eigen::Vector4d(wrench.thrust, wrench.torque.x(), wrench.torque.y(), wrench.torque.z()));
+  Eigen::VectorXd low(n);
+  Eigen::VectorXd high(n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const double share = shares[static_cast<std::size_t>(i)];
+    const double square = share < kLeastShare ? 0.0 : share * share;
+    low[i] = square * thrust_min_ / even;
+    high[i] = square * thrust_max_ / even;
+  }
+  return even * bounded_least_squares(a, b, low, high);
+}
+
+std::vector<double> Mixer::speeds_of_what_is_left(const Wrench& wrench,
+                                                  const AirMotion& motion,
+                                                  std::span<const double> shares) const {
+  const Eigen::VectorXd thrusts = thrusts_of_what_is_left(wrench, shares);
+  std::vector<double> speeds(shares.size());
+  for (std::size_t i = 0; i < speeds.size(); ++i) {
+    if (shares[i] < kLeastShare) continue;  // told to stop
+    const double turning =
+        rotor_.speed_for(thrusts[static_cast<Eigen::Index>(i)], climb_of(i, motion));
+    speeds[i] = std::clamp(turning / shares[i], rotor_.speed_min, rotor_.speed_max);
+  }
+  return speeds;
+}
+
+bool Mixer::holds_heading(std::span<const double> shares) const {
+  const Eigen::VectorXd thrusts = thrusts_of_what_is_left({weight_, Vector3d::Zero()}, shares);
+  const double most =
+      weight_ / static_cast<double>(allocation_.cols()) * allocation_.row(3).cwiseAbs().maxCoeff();
+  return std::abs(allocation_.row(3).dot(thrusts)) < kHeadingShare * most;
 }
 
 Wrench Mixer::wrench(const std::vector<double>& speeds, const AirMotion& motion) const {

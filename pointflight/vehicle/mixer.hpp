@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <span>
 #include <vector>
 
 #include "pointflight/vehicle/airframe.hpp"
@@ -33,12 +34,22 @@ class Mixer {
   [[nodiscard]] std::vector<double> speeds(const Wrench& wrench,
                                            const AirMotion& motion = {}) const;
 
+  /// The same where rotors turn at a share of what they are told (0 to 1, one each): those that are
+  /// left make roll and pitch before thrust, and yaw last, as nearly as they can.
+  [[nodiscard]] std::vector<double> speeds_of_what_is_left(const Wrench& wrench,
+                                                           const AirMotion& motion,
+                                                           std::span<const double> shares) const;
+  /// True where these can hover without spinning.
+  [[nodiscard]] bool holds_heading(std::span<const double> shares) const;
+
   /// Wrench of given speeds (without drag and lag): the inverse of `speeds` inside the limits.
   /// One speed per rotor.
   [[nodiscard]] Wrench wrench(const std::vector<double>& speeds,
                               const AirMotion& motion = {}) const;
 
  private:
+  [[nodiscard]] Eigen::VectorXd thrusts_of_what_is_left(const Wrench& wrench,
+                                                        std::span<const double> shares) const;
   [[nodiscard]] double climb_of(std::size_t rotor, const AirMotion& motion) const;
 
   RotorModel rotor_;
@@ -48,6 +59,7 @@ class Mixer {
   double thrust_coefficient_;
   double thrust_min_;
   double thrust_max_;
+  double weight_ = 0.0;  ///< N
 };
 
 }  // namespace pointflight

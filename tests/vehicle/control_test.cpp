@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <functional>
+#include <utility>
 
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/resources.hpp"
@@ -236,6 +237,65 @@ TEST_P(ShippedVehicles, OvershootNoMoreThanTheirDampingPromises) {
       SCOPED_TRACE(name + " " + r.name);
       EXPECT_LT(r.overshoot, overshoot_of(r.design.damping) + 0.002);
       EXPECT_NEAR(r.value.back(), 1.0, 0.003);
+    }
+  }
+}
+
+/// Step response of a second-order system at `t` (s).
+double second_order(double wn, double damping, double t) {
+  if (std::abs(damping - 1.0) < 1e-6) return 1.0 - std::exp(-wn * t) * (1.0 + wn * t);
+  if (damping < 1.0) {
+    const double wd = wn * std::sqrt(1.0 - damping * damping);
+    return 1.0 -
+           std::exp(-damping * wn * t) * (std::cos(wd * t) + damping * wn / wd * std::sin(wd * t));
+  }
+  const double root = std::sqrt(damping * damping - 1.0);
+  const double slow = wn * (damping - root);
+  const double fast = wn * (damping + root);
+  return 1.0 - (fast * std::exp(-slow * t) - slow * std::exp(-fast * t)) / (fast - slow);
+}
+
+/// The second-order system nearest to a response, by a search that halves its steps.
+LoopDesign nearest_design(const StepResponse& response) {
+  LoopDesign found = response.design;
+  const auto distance = [&](const LoopDesign& d) {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < response.value.size(); i += 10) {
+      const double t = response.step * static_cast<double>(i);
+      const double off = response.value[i] - second_order(d.natural_frequency, d.damping, t);
+      sum += off * off;
+    }
+    return sum;
+  };
+  double least = distance(found);
+  for (double step = 0.2; step > 1e-4;) {
+    bool is_nearer = false;
+    for (const auto& [dw, dz] : {std::pair(step, 0.0), {-step, 0.0}, {0.0, step}, {0.0, -step}}) {
+      LoopDesign tried = found;
+      tried.natural_frequency *= 1.0 + dw;
+      tried.damping += dz;
+      const double now = distance(tried);
+      if (now >= least) continue;
+      least = now;
+      found = tried;
+      is_nearer = true;
+    }
+    if (!is_nearer) step *= 0.5;
+  }
+  return found;
+}
+
+TEST_P(ShippedVehicles, AnswerWithTheNaturalFrequencyAndDampingOfTheirFile) {
+  for (const std::string& name : model_names("vehicles")) {
+    VehicleSettings settings = load_vehicle(name);
+    settings.controller.kind = GetParam();
+    for (const StepResponse& r : step_responses(settings)) {
+      if (!r.name.starts_with("position")) continue;
+      SCOPED_TRACE(name + " " + r.name);
+      const LoopDesign found = nearest_design(r);
+      EXPECT_NEAR(found.damping, r.design.damping, 0.05);
+      EXPECT_NEAR(found.natural_frequency / r.design.natural_frequency, 1.0, 0.05);
+      EXPECT_LT(r.overshoot, 0.03);
     }
   }
 }

@@ -9,6 +9,11 @@
 namespace pointflight {
 namespace {
 
+constexpr double kSpinningAxisRate = 0.5;  // of the attitude loop's natural frequency
+// Of a spinning body's nutation, whose damping is to be right for wobbles that keep still in the
+// body as well: between -0.3 and -0.6 all shipped quadrotors that spin up are stable.
+constexpr double kDampingLead = -0.45;
+
 Vector3d limited(const Vector3d& v, double length) {
   const double norm = v.norm();
   return norm > length ? Vector3d(v * (length / norm)) : v;
@@ -55,8 +60,11 @@ std::vector<double> LoopController::update(const RigidBodyState& state,
       const AttitudeDemand demand = self.demanded_attitude(state, a, jerk, yaw, yaw_rate);
       const Vector3d f = a + Vector3d(0, 0, kGravity);
       memory.limits.tilt = differ(f, self.tilt_limited(f));
-      const Vector3d torque = self.demanded_torque(state, demand, dt, memory);
-      return self.speeds(state, demand.thrust, torque, dt, memory);
+      return self.speeds(state, demand.thrust, torque(demand), dt, memory);
+    }
+    [[nodiscard]] Vector3d torque(const AttitudeDemand& demand) const {
+      if (memory.spins) return self.spinning_torque(state, demand.R_world_body.col(2));
+      return self.demanded_torque(state, demand, dt, memory);
     }
     std::vector<double> operator()(const RotorSpeedCommand& c) const { return c.speeds; }
     std::vector<double> operator()(const BodyRateCommand& c) const {
@@ -64,8 +72,7 @@ std::vector<double> LoopController::update(const RigidBodyState& state,
     }
     std::vector<double> operator()(const AttitudeCommand& c) const {
       const AttitudeDemand demand{c.q_world_body.toRotationMatrix(), c.omega_body, c.thrust};
-      const Vector3d torque = self.demanded_torque(state, demand, dt, memory);
-      return self.speeds(state, demand.thrust, torque, dt, memory);
+      return self.speeds(state, demand.thrust, torque(demand), dt, memory);
     }
     std::vector<double> operator()(const AccelerationCommand& c) const {
       const Vector3d a = self.allowed(c.a_world, memory);
@@ -79,7 +86,7 @@ std::vector<double> LoopController::update(const RigidBodyState& state,
       self.observe(state, dt, memory);
       const Vector3d a = self.position_loop(state, c, memory);
       std::vector<double> speeds = accelerate(a, c.jerk_world, c.yaw, c.yaw_rate);
-      memory.expected = {state.v_world, self.expected_acceleration(state, a, speeds)};
+      memory.expected = {state.v_world, self.expected_acceleration(state, a, speeds, memory)};
       return speeds;
     }
   };
@@ -93,6 +100,7 @@ std::vector<double> LoopController::update(const RigidBodyState& state,
     memory.level = setpoint.index();
   }
   memory.limits = {};
+  memory.spins = rotors_fail(memory) && !mixer_.holds_heading(memory.rotor_shares);
   return std::visit(Visitor{*this, state, dt, memory}, setpoint);
 }
 
@@ -113,11 +121,67 @@ std::vector<double> LoopController::speeds(const RigidBodyState& state,
   const double lag = slope > 0.0 ? rotor.inertia / slope : 0.0;
   memory.yaw_torque += dt / (lag + dt) * (torque.z() - memory.yaw_torque);
   const AirMotion motion = motion_of(state);
+  const Wrench wanted{thrust, {torque.x(), torque.y(), memory.yaw_torque}};
   std::vector<double> speeds =
-      mixer_.speeds({thrust, {torque.x(), torque.y(), memory.yaw_torque}}, motion);
-  const double weight = settings_.mass * kGravity;
-  memory.limits.rotors = std::abs(mixer_.wrench(speeds, motion).thrust - thrust) > 1e-3 * weight;
+      rotors_fail(memory) ? mixer_.speeds_of_what_is_left(wanted, motion, memory.rotor_shares)
+                          : mixer_.speeds(wanted, motion);
+  memory.limits.rotors =
+      std::abs(thrust_of(speeds, state, memory) - thrust) > 1e-3 * settings_.mass * kGravity;
   return speeds;
+}
+
+bool LoopController::rotors_fail(const ControllerMemory& memory) const {
+  return settings_.controller.reallocate && std::any_of(memory.rotor_shares.begin(),
+                                                        memory.rotor_shares.end(),
+                                                        [](double share) { return share < 1.0; });
+}
+
+double LoopController::thrust_of(const std::vector<double>& commands,
+                                 const RigidBodyState& state,
+                                 const ControllerMemory& memory) const {
+  if (!rotors_fail(memory)) return mixer_.wrench(commands, motion_of(state)).thrust;
+  std::vector<double> turning = commands;
+  for (std::size_t i = 0; i < turning.size(); ++i) turning[i] *= memory.rotor_shares[i];
+  return mixer_.wrench(turning, motion_of(state)).thrust;
+}
+
+/// The axis follows a rate that falls with its angle to b3, w_d = k e, by J c (w_d - w), and a body
+/// that spins at r has to be made to precess: J_z r (w_d x z). Both errors die out, with rates k
+/// and c, however fast it spins. To the rotors what stands still in the world turns at -r: the
+/// torque is turned ahead by their phase at that. Damping has to suit nutation, which turns at
+/// (J_z / J - 1) r in the body, and wobbles that do not. (Primary-axis control as in Sun, Sijbers,
+/// Wang, de Visser, High-speed flight of quadrotor despite loss of single rotor, RA-L 2018, here
+/// for a body that is about round.)
+Vector3d LoopController::spinning_torque(const RigidBodyState& state,
+                                         const Vector3d& b3_world) const {
+  const Vector3d b3 = state.q_world_body.conjugate() * b3_world;
+  const double sine = std::hypot(b3.x(), b3.y());
+  const Vector3d axis =
+      sine > 1e-9 ? Vector3d(-b3.y() / sine, b3.x() / sine, 0.0) : Vector3d::UnitX();
+  const double wn = attitude_frequency().x();
+  const double c = 2.0 * attitude_damping().x() * wn;
+  const Vector3d wanted = kSpinningAxisRate * wn * math::atan2(sine, b3.z()) * axis;
+  const Vector3d& inertia = settings_.inertia_diagonal;
+  const double r = state.omega_body.z();
+  const double round = 0.5 * (inertia.x() + inertia.y());
+  const Vector3d moving =
+      c * inertia.cwiseProduct(wanted) + inertia.z() * r * wanted.cross(Vector3d::UnitZ());
+  const Vector3d damping = -c * inertia.cwiseProduct(state.omega_body);
+  const Vector3d torque =
+      ahead(moving, -r) + ahead(damping, kDampingLead * (inertia.z() / round - 1.0) * r);
+  return {torque.x(), torque.y(), 0.0};
+}
+
+/// What turns at `rate` (rad/s) about z, turned on by as much as the rotors fall behind it.
+Vector3d LoopController::ahead(const Vector3d& torque, double rate) const {
+  const RotorModel& rotor = settings_.rotor;
+  const double f = rotor.natural_frequency;
+  if (f <= 0.0) return torque;
+  const double lag = math::atan2(2.0 * rotor.damping * f * rate, f * f - rate * rate);
+  const auto turn = math::sincos(lag);
+  return {turn.cos * torque.x() - turn.sin * torque.y(),
+          turn.sin * torque.x() + turn.cos * torque.y(),
+          torque.z()};
 }
 
 Vector3d LoopController::allowed(const Vector3d& a, ControllerMemory& memory) const {
@@ -134,11 +198,12 @@ Vector3d LoopController::allowed(const Vector3d& a, ControllerMemory& memory) co
 /// and the vehicle's own motion has drag, which is no disturbance.
 Vector3d LoopController::expected_acceleration(const RigidBodyState& state,
                                                const Vector3d& a_world,
-                                               const std::vector<double>& speeds) const {
+                                               const std::vector<double>& speeds,
+                                               const ControllerMemory& memory) const {
   const Vector3d gravity(0, 0, kGravity);
   const Vector3d f = tilt_limited(a_world + gravity);
   const double wanted = settings_.mass * f.dot(state.q_world_body * Vector3d::UnitZ());
-  const double share = wanted > 0.0 ? mixer_.wrench(speeds, motion_of(state)).thrust / wanted : 1.0;
+  const double share = wanted > 0.0 ? thrust_of(speeds, state, memory) / wanted : 1.0;
   return std::min(share, 1.0) * f - gravity + drag_of(state, state.v_world);
 }
 
@@ -168,7 +233,7 @@ void LoopController::observe(const RigidBodyState& state,
 
 /// a = a_ff + 2 z wn (v_ref - v) - d with v_ref = v_ff + wn / (2 z) e_p, no faster than the limit:
 /// the second-order loop a = a_ff + wn^2 e_p + 2 z wn e_v - d as long as it is not cut. d is the
-/// disturbance and the drag at the speed v_ff that is asked for.
+/// disturbance and the drag of its own motion, which would damp the loop beyond its design.
 Vector3d LoopController::position_loop(const RigidBodyState& state,
                                        const PositionCommand& command,
                                        ControllerMemory& memory) const {
@@ -179,7 +244,9 @@ Vector3d LoopController::position_loop(const RigidBodyState& state,
   const Vector3d v_wanted = command.v_world + 0.5 * wn.cwiseProduct(e_p).cwiseQuotient(z);
   const Vector3d v_ref = limited(v_wanted, c.speed_max);
   memory.limits.speed = differ(v_wanted, v_ref);
-  const Vector3d d = memory.disturbance + drag_of(state, limited(command.v_world, c.speed_max));
+  const Vector3d drag =
+      drag_of(state, c.legacy ? limited(command.v_world, c.speed_max) : state.v_world);
+  const Vector3d d = memory.disturbance + drag;
   const Vector3d a = 2.0 * z.cwiseProduct(wn).cwiseProduct(v_ref - state.v_world);
   return allowed(command.a_world + a - d, memory);
 }

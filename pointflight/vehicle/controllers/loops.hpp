@@ -29,6 +29,11 @@ class LoopController : public Controller {
                                                  double dt,
                                                  ControllerMemory& memory) const = 0;
 
+  /// Torque (N m, body) that turns the thrust's axis to `b3_world` while the body spins about it,
+  /// as one that has lost a rotor does.
+  [[nodiscard]] Vector3d spinning_torque(const RigidBodyState& state,
+                                         const Vector3d& b3_world) const;
+
   [[nodiscard]] const VehicleSettings& settings() const { return settings_; }
 
   /// Natural frequency (rad/s) of the attitude loop about each body axis, and its damping.
@@ -49,6 +54,7 @@ class LoopController : public Controller {
                                   double specific_thrust,
                                   const Vector3d& jerk_world,
                                   double yaw_rate) const;
+  [[nodiscard]] Vector3d ahead(const Vector3d& torque, double rate) const;
   [[nodiscard]] Vector3d position_loop(const RigidBodyState& state,
                                        const PositionCommand& command,
                                        ControllerMemory& memory) const;
@@ -56,7 +62,14 @@ class LoopController : public Controller {
   void observe(const RigidBodyState& state, double dt, ControllerMemory& memory) const;
   [[nodiscard]] Vector3d expected_acceleration(const RigidBodyState& state,
                                                const Vector3d& a_world,
-                                               const std::vector<double>& speeds) const;
+                                               const std::vector<double>& speeds,
+                                               const ControllerMemory& memory) const;
+  /// True where some turn slower than they are told, and that is allowed for.
+  [[nodiscard]] bool rotors_fail(const ControllerMemory& memory) const;
+  /// That comes of commanded speeds, N.
+  [[nodiscard]] double thrust_of(const std::vector<double>& commands,
+                                 const RigidBodyState& state,
+                                 const ControllerMemory& memory) const;
   [[nodiscard]] Vector3d drag_of(const RigidBodyState& state, const Vector3d& v_world) const;
   [[nodiscard]] Vector3d velocity_loop(const RigidBodyState& state,
                                        const Vector3d& v_world,
