@@ -17,21 +17,21 @@
 
 using namespace pointflight;
 
-/// What a scenario may say of a barometer.
-struct BarometerSettings {
+/// What a scenario may say of a pressure probe.
+struct PressureProbeSettings {
   double rate = 50.0;  ///< Hz
   double noise = 2.0;  ///< Pa
 };
 
-void describe(SettingsVisitor& visitor, BarometerSettings& settings) {
+void describe(SettingsVisitor& visitor, PressureProbeSettings& settings) {
   visitor.value({"rate", "Hz", "measurements per second", 0.1, 1000}, settings.rate);
   visitor.value({"noise", "Pa", "standard deviation", 0, 1000}, settings.noise);
 }
 
 /// Pressure at its height above the map's zero (ISO 2533).
-class Barometer : public InstantSensor {
+class PressureProbe : public InstantSensor {
  public:
-  Barometer(const SensorSite& site, const BarometerSettings& settings)
+  PressureProbe(const SensorSite& site, const PressureProbeSettings& settings)
       : InstantSensor(settings.rate),
         site_(site),
         noise_(settings.noise),
@@ -106,7 +106,7 @@ FluidPressure pressure_message(const OutputStream& stream, const Measurement& me
   return {stream.header(measurement.time), measurement.values.front(), 0.0};
 }
 
-/// Prints where vehicles are, twice a second, and what the barometer says.
+/// Prints where vehicles are, twice a second, and what the probe says.
 class PosePrinter : public Link {
  public:
   void on_sample(const Sample& sample) override {
@@ -129,8 +129,8 @@ class PosePrinter : public Link {
 };
 
 int main() try {
-  sensor_kinds().add(sensor_kind<Barometer, BarometerSettings>(
-      "barometer", "pressure at its height", {{"pressure", "Pa"}}));
+  sensor_kinds().add(sensor_kind<PressureProbe, PressureProbeSettings>(
+      "pressure_probe", "pressure at its height", {{"pressure", "Pa"}}));
   ControllerKind::table().add(
       {.name = "careful",
        .help = "the cascade, slowly",
@@ -142,15 +142,15 @@ int main() try {
          return std::make_unique<Fog>(scene);
        }});
   output_types().add({.name = "pressure",
-                      .help = "what the barometer says",
+                      .help = "what the probe says",
                       .make = per_sample<pressure_message>(),
                       .frame = OutputType::Frame::kBody,
-                      .sensor = "barometer"});
+                      .sensor = "pressure_probe"});
   const Scenario scenario = parse_scenario(R"(
 map: room.pfmap
 vehicle: {start: [2, 3, 1.5], controller: careful}
 lidars: [{model: mid360, renderer: fog}]
-sensors: [{kind: barometer, rate: 20}]
+sensors: [{kind: pressure_probe, rate: 20}]
 mission: {speed: 1, waypoints: [[3.5, 3, 1.5], [3.5, 1.5, 2.5]]}
 ros: {outputs: [{kind: pressure, topic: "/{vehicle}/pressure"}]}
 )",

@@ -71,6 +71,17 @@ msg::Odometry odometry_of(const RigidBodyState& state,
   return odometry;
 }
 
+void add_variance(msg::Odometry& odometry, const EstimateVariance& variance) {
+  const auto set = [](auto& covariance, std::size_t row, double value) {
+    covariance[7 * row] = value;
+  };
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    set(odometry.pose.covariance, axis, variance.position);
+    set(odometry.pose.covariance, 3 + axis, axis == 2 ? variance.yaw : variance.tilt);
+    set(odometry.twist.covariance, axis, variance.velocity);
+  }
+}
+
 msg::Imu imu_of(const ImuSample& sample,
                 const ImuSettings& settings,
                 const msg::Header& header,

@@ -39,6 +39,9 @@ msg::Odometry odometry_of(const RigidBodyState& state,
                           const std::string& child_frame,
                           bool twist_in_world);
 
+/// Fills in the covariances of pose and twist: diagonal; rates are the gyroscope's, without one.
+void add_variance(msg::Odometry& odometry, const EstimateVariance& variance);
+
 /// How accelerations leave.
 struct ImuCustoms {
   bool in_g = false;          ///< Units of 9.80665 m/s^2, as Livox' drivers send them.

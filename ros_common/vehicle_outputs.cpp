@@ -23,7 +23,16 @@ msg::Imu imu_message(const OutputStream& stream, const ImuSample& sample) {
 }
 
 msg::Odometry odometry_message(const OutputStream& stream, const OdometrySample& sample) {
-  return odometry_of(sample.state,
+  msg::Odometry message = odometry_of(sample.state,
+                                      stream.header(sample.time),
+                                      stream.settings.child_frame,
+                                      stream.ros.profile.twist == TwistFrame::kWorld);
+  add_variance(message, sample.variance);
+  return message;
+}
+
+msg::Odometry ground_truth_message(const OutputStream& stream, const OdometrySample& sample) {
+  return odometry_of(sample.truth,
                      stream.header(sample.time),
                      stream.settings.child_frame,
                      stream.ros.profile.twist == TwistFrame::kWorld);
@@ -67,7 +76,7 @@ class Transform : public Output {
  private:
   void send(const OdometrySample& sample) {
     stream_.note_served();
-    stream_.send(msg::TFMessage{{transform_of(sample.state.T_world_body(),
+    stream_.send(msg::TFMessage{{transform_of(sample.truth.T_world_body(),
                                               stream_.header(sample.time),
                                               stream_.settings.child_frame)}},
                  sample.delivered);
@@ -147,7 +156,7 @@ msg::Path path_message(const OutputStream& stream,
 /// The hull.
 msg::Marker model_marker(const OutputStream& stream, const OdometrySample& sample) {
   return marker_of(stream.of_vehicle().hull,
-                   sample.state.T_world_body(),
+                   sample.truth.T_world_body(),
                    stream.header(sample.time),
                    stream.type.name,
                    static_cast<std::int32_t>(sample.vehicle),
@@ -170,8 +179,8 @@ msg::Marker velocity_marker(const OutputStream& stream, const OdometrySample& sa
   marker.type = msg::Marker::kArrow;
   marker.pose = {};
   marker.scale = {0.05, 0.1, 0.1};  // shaft, head, head's length
-  marker.points = {point_of(sample.state.p_world),
-                   point_of(Vector3d(sample.state.p_world + 0.5 * sample.state.v_world))};
+  marker.points = {point_of(sample.truth.p_world),
+                   point_of(Vector3d(sample.truth.p_world + 0.5 * sample.truth.v_world))};
   return marker;
 }
 
@@ -187,7 +196,7 @@ msg::Marker sensor_marker(const OutputStream& stream, const OdometrySample& samp
   msg::Marker marker = model_marker(stream, sample);
   const auto& lidars = stream.of_vehicle().lidars;
   marker.type = msg::Marker::kCylinder;
-  if (!lidars.empty()) marker.pose = pose_of(sample.state.T_world_body() * lidars[0].T_body_sensor);
+  if (!lidars.empty()) marker.pose = pose_of(sample.truth.T_world_body() * lidars[0].T_body_sensor);
   marker.scale = {0.08, 0.08, 0.06};
   return marker;
 }
@@ -218,17 +227,23 @@ std::vector<OutputType> vehicle_outputs() {
        .is_transform = true,
        .depth = 100},
       {.name = "odometry",
-       .help = "true pose and velocities",
+       .help = "pose and velocities as the vehicle's odometry has them",
        .make = per_sample<odometry_message>(),
        .sets_odometry_rate = true,
        .has_child = true,
        .depth = 100},
+      {.name = "ground_truth",
+       .help = "true pose and velocities",
+       .make = per_sample<ground_truth_message>(),
+       .sets_odometry_rate = true,
+       .has_child = true,
+       .depth = 100},
       {.name = "pose",
-       .help = "true pose",
+       .help = "pose as the vehicle's odometry has it",
        .make = per_sample<pose_message>(),
        .sets_odometry_rate = true},
       {.name = "camera_pose",
-       .help = "true pose with optical axes",
+       .help = "the same with optical axes",
        .make = per_sample<camera_pose_message>()},
       {.name = "path",
        .help = "where it flew",

@@ -34,6 +34,8 @@ enum class StreamId : std::uint32_t {
   kPatternPhase = 24,     ///< which scan of a pattern that does not repeat a run starts with
   kLidarWeather = 25,     ///< drops and fog; entity and index as of kLidarDetection
   kLidarEcho = 26,        ///< entity: echo << 28 | vehicle << 8 | lidar, index as above
+  kOdometry = 27,         ///< entity: vehicle, index: report * 9 + draw
+  kNavigation = 28,       ///< entity: vehicle << 8 | sensor, index: measurement * 12 + draw
   kTest = 1000,           ///< inputs of tests and benchmarks
 };
 

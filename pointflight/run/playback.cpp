@@ -154,6 +154,7 @@ struct RecordedRun::Files {
       sample.time = time_at(table, row, 0);
       sample.delivered = time_at(table, row, 1);
       sample.state = body_at(table, row, 2);
+      sample.truth = table.columns() > 15 ? body_at(table, row, 15) : sample.state;
       return sample;
     });
   }

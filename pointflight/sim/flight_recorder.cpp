@@ -56,6 +56,9 @@ std::string row_of(const RigidBodyState& b) {
 }
 
 constexpr const char* kStateColumns = "px,py,pz,qw,qx,qy,qz,vx,vy,vz,wx,wy,wz";
+constexpr const char* kTrueStateColumns =
+    "true_px,true_py,true_pz,true_qw,true_qx,true_qy,true_qz,"
+    "true_vx,true_vy,true_vz,true_wx,true_wy,true_wz";
 
 nlohmann::ordered_json json_of(const Simulation& simulation, std::size_t number) {
   const VehicleAgent& agent = simulation.vehicle(number);
@@ -94,6 +97,7 @@ nlohmann::ordered_json json_of(const Simulation& simulation, std::size_t number)
     json["battery_low_at"] = time_or_null(s.battery_low);
     json["battery_empty_at"] = time_or_null(s.battery_empty);
   }
+  if (s.rotor_lost) json["rotor_lost_at"] = time_or_null(s.rotor_lost);
   json["trajectories_beyond_limits"] = s.beyond_limits;
   json["limited_time"] = {{"speed", to_seconds(s.speed_limited)},
                           {"acceleration", to_seconds(s.acceleration_limited)},
@@ -132,6 +136,7 @@ struct FlightRecorder::VehicleFiles {
   std::optional<OutputFile> imu;
   bool stamps_imu = false;  ///< Its IMU's clock errs: a column says what it says.
   std::optional<OutputFile> odometry;
+  bool odometry_errs = false;                   ///< Columns with the truth come beside.
   std::map<std::uint32_t, OutputFile> sensors;  ///< By `Measurement::sensor`.
 };
 
@@ -198,7 +203,10 @@ FlightRecorder::FlightRecorder(const std::string& folder,
       files->imu->write(files->stamps_imu ? ",stamp\n" : "\n");
     }
     if (files->odometry) {
-      files->odometry->write(fmt::format("time,delivered,{}\n", kStateColumns));
+      files->odometry_errs = !simulation.vehicle(v).setup().odometry.is_true();
+      files->odometry->write(fmt::format("time,delivered,{}", kStateColumns));
+      files->odometry->write(files->odometry_errs ? fmt::format(",{}\n", kTrueStateColumns)
+                                                  : std::string("\n"));
     }
     add_sensor_files(simulation.vehicle(v), *files);
     vehicles_.push_back(std::move(files));
@@ -241,7 +249,8 @@ void FlightRecorder::write(const OdometrySample& sample) {
   VehicleFiles& files = *vehicles_[sample.vehicle];
   if (!files.odometry) return;
   files.odometry->write(fmt::format(
-      "{},{},{}\n", seconds(sample.time), seconds(sample.delivered), row_of(sample.state)));
+      "{},{},{}", seconds(sample.time), seconds(sample.delivered), row_of(sample.state)));
+  files.odometry->write(files.odometry_errs ? "," + row_of(sample.truth) + "\n" : "\n");
 }
 
 void FlightRecorder::write(const ImuSample& sample) {

@@ -8,12 +8,20 @@
 #include "pointflight/sim/vehicle_agent.hpp"
 
 namespace pointflight {
-Sample OdometrySource::measure(const InstantInput& input, std::any& /*memory*/) const {
+
+Sample OdometrySource::measure(const InstantInput& input, std::any& memory) const {
   OdometrySample sample;
   sample.vehicle = input.vehicle.number();
   sample.time = input.time;
-  sample.delivered = input.time + faults_.odometry_delay(input.time);
-  sample.state = input.state.body;
+  const EstimateSettings& settings = estimator_.settings();
+  sample.delivered =
+      input.time + from_seconds(settings.latency) + faults_.odometry_delay(input.time);
+  sample.state = sample.truth = input.state.body;
+  if (settings.is_true()) return sample;
+  auto& remembered = *std::any_cast<Estimator::Memory>(&memory);
+  sample.error = estimator_.error(input.index, remembered);
+  sample.variance = estimator_.variance(remembered);
+  sample.state = sample.error.on(sample.truth);
   return sample;
 }
 

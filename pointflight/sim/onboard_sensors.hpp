@@ -11,15 +11,23 @@
 
 namespace pointflight {
 
-/// Reports the truth, late where a fault delays it.
+/// Reports where a vehicle is and how it moves, as `EstimateSettings` say, later still where a
+/// fault delays it.
 class OdometrySource : public InstantSensor {
  public:
   /// The faults must outlive it.
-  OdometrySource(double rate, const Faults& faults) : InstantSensor(rate), faults_(faults) {}
+  OdometrySource(double rate,
+                 const EstimateSettings& settings,
+                 const SensorSite& site,
+                 const Faults& faults)
+      : InstantSensor(rate), estimator_(settings, rate, site.seed, site.vehicle), faults_(faults) {}
+  [[nodiscard]] std::any memory_at_start() const override { return Estimator::Memory{}; }
+  [[nodiscard]] bool loses(std::int64_t index) const override { return estimator_.loses(index); }
   [[nodiscard]] Sample measure(const InstantInput& input, std::any& memory) const override;
   void arrive(Sample& sample, const VehicleStatus& status) const override;
 
  private:
+  Estimator estimator_;
   const Faults& faults_;
 };
 

@@ -11,6 +11,7 @@
 
 #include "pointflight/lidar/lidar.hpp"
 #include "pointflight/vehicle/command.hpp"
+#include "pointflight/vehicle/estimate.hpp"
 #include "pointflight/vehicle/imu.hpp"
 #include "pointflight/vehicle/state.hpp"
 #include "pointflight/world/contact.hpp"
@@ -26,12 +27,16 @@ struct StateSample {
   std::optional<Contact> nearest;  ///< Nothing within `Simulation::kClearanceReach`.
 };
 
-/// What an odometry source on board reports at output.odometry_rate: the truth, possibly late.
+/// What an odometry source on board reports at output.odometry_rate: the truth, or what it takes
+/// for it (`EstimateSettings`), possibly late.
 struct OdometrySample {
-  std::uint32_t vehicle = 0;  ///< Number in the fleet, from 0.
-  SimTime time;               ///< Of the state.
-  SimTime delivered;          ///< When it arrives; later than `time` where a fault delays it.
-  RigidBodyState state;       ///< The true one at `time`.
+  std::uint32_t vehicle = 0;           ///< Number in the fleet, from 0.
+  SimTime time;                        ///< Of the state.
+  SimTime delivered;                   ///< When it arrives; `time` or later.
+  RigidBodyState state;                ///< At `time`, as it is reported.
+  RigidBodyState truth;                ///< At `time`.
+  EstimateError error;                 ///< That parts them.
+  EstimateVariance variance;           ///< That the source states, true to its errors.
   std::vector<double> rotor_commands;  ///< When it is delivered, rad/s.
 };
 
@@ -65,7 +70,7 @@ struct CollisionEvent {
 struct VehicleEvent {
   std::uint32_t vehicle = 0;  ///< Number in the fleet, from 0.
   SimTime time;               ///< Of the step that it was noticed in.
-  std::string kind;           ///< "battery_low", "battery_empty" or "beyond_limits".
+  std::string kind;           ///< "battery_low", "battery_empty", "rotor_lost" or "beyond_limits".
   std::string words;          ///< One line for users.
   Vector3d vehicle_world = Vector3d::Zero();  ///< The body's origin, m.
 };

@@ -14,6 +14,8 @@ namespace {
 constexpr Named<CollisionReaction> kReactions[] = {{CollisionReaction::kReport, "report"},
                                                    {CollisionReaction::kStop, "stop"},
                                                    {CollisionReaction::kCrash, "crash"}};
+constexpr Named<ControllerInput> kControllerInputs[] = {{ControllerInput::kTruth, "truth"},
+                                                        {ControllerInput::kOdometry, "odometry"}};
 constexpr Named<LowBatteryReaction> kLowBattery[] = {{LowBatteryReaction::kLand, "land"},
                                                      {LowBatteryReaction::kFall, "fall"},
                                                      {LowBatteryReaction::kReport, "report"}};
@@ -93,6 +95,15 @@ void describe_airframe(SettingsVisitor& v, VehicleSetup& s) {
             "until it is empty, when the rotors stop in any case"},
            s.on_low_battery,
            kLowBattery);
+  v.section({"odometry", "", "how it errs; all 0: it reports the truth"},
+            [&](SettingsVisitor& w) { describe(w, s.odometry); });
+  v.choice(
+      {"controller_input",
+       "",
+       "what its controllers take for its state: the truth, or the truth as far off as the last "
+       "odometry was"},
+      s.controller_input,
+      kControllerInputs);
   v.section({"limits", "", "instead of the vehicle file's; 0: its own"},
             [&](SettingsVisitor& w) { describe_limits(w, s.limits); });
 }
@@ -101,12 +112,9 @@ void describe_equipment(SettingsVisitor& v, VehicleSetup& s) {
   v.list({"lidars", "", "what it carries"}, s.lidars, [](SettingsVisitor& w, LidarMount& mount) {
     describe_lidar(w, mount);
   });
-  v.only_if(
-      !sensor_kinds().rows().empty(), "kinds that a program has added", [&](SettingsVisitor& w) {
-        w.list({"sensors", "", "what else it measures with: kinds that a program has added"},
-               s.sensors,
-               [](SettingsVisitor& x, SensorSetup& sensor) { describe(x, sensor); });
-      });
+  v.list({"sensors", "", "what else it measures with"},
+         s.sensors,
+         [](SettingsVisitor& w, SensorSetup& sensor) { describe(w, sensor); });
   v.section({"mission", "", "where it flies; without waypoints it hovers"},
             [&](SettingsVisitor& w) { describe_mission(w, s.mission); });
   v.list({"commands", "", "what it is told, in the order of time"},

@@ -16,6 +16,7 @@
 #include "pointflight/sim/faults.hpp"
 #include "pointflight/sim/scenario_section.hpp"
 #include "pointflight/sim/sensor.hpp"
+#include "pointflight/vehicle/estimate.hpp"
 #include "pointflight/vehicle/mission.hpp"
 #include "pointflight/world/obstacles.hpp"
 #include "pointflight/world/wind.hpp"
@@ -57,6 +58,12 @@ enum class LowBatteryReaction {
   kReport,  ///< Flies on until it is empty.
 };
 
+/// What a vehicle's autopilot and controllers take for its state.
+enum class ControllerInput {
+  kTruth,     ///< What it is.
+  kOdometry,  ///< The truth as far off as the odometry that came last was.
+};
+
 /// One vehicle, or several alike.
 struct VehicleSetup {
   std::string name;                   ///< Of its files and topics; empty: "drone<number>".
@@ -73,6 +80,8 @@ struct VehicleSetup {
   double command_timeout = 0.5;                                   ///< s; 0: commands hold for ever.
   bool battery = false;                                           ///< Fly on the vehicle's battery.
   LowBatteryReaction on_low_battery = LowBatteryReaction::kLand;  ///< At its reserve.
+  EstimateSettings odometry;                                      ///< How its odometry errs.
+  ControllerInput controller_input = ControllerInput::kTruth;     ///< Where it takes itself to be.
   LimitSetup limits;                                ///< Tightened or widened for this vehicle.
   std::vector<LidarMount> lidars = {LidarMount{}};  ///< One is mounted where the file says nothing.
   std::vector<SensorSetup> sensors;                 ///< Besides LiDARs, odometry and IMU.

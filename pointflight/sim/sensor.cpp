@@ -1,5 +1,7 @@
 #include "pointflight/sim/sensor.hpp"
 
+#include "pointflight/sim/navigation_sensors.hpp"
+
 namespace pointflight {
 
 SimTime arrival_of(const Sample& sample) {
@@ -17,7 +19,11 @@ SimTime arrival_of(const Sample& sample) {
 }
 
 Registry<SensorKind>& sensor_kinds() {
-  static Registry<SensorKind> kinds;
+  static Registry<SensorKind> kinds = [] {
+    Registry<SensorKind> own;
+    add_navigation_sensors(own);
+    return own;
+  }();
   return kinds;
 }
 

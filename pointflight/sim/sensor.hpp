@@ -55,7 +55,11 @@ class InstantSensor : public Sensor {
   /// a whole.
   [[nodiscard]] virtual std::any memory_at_start() const { return {}; }
 
-  /// One measurement; asked for each number once and in order. It may arrive later than it was made
+  /// True where a measurement comes to nothing: it is not made.
+  [[nodiscard]] virtual bool loses(std::int64_t /*index*/) const { return false; }
+
+  /// One measurement; asked for each number once and in order, but for those that are lost. It may
+  /// arrive later than it was made
   /// (`arrival_of`). Called from any thread, for one vehicle from one at a time.
   [[nodiscard]] virtual Sample measure(const InstantInput& input, std::any& memory) const = 0;
 
@@ -132,7 +136,9 @@ SensorKind sensor_kind(std::string name, std::string help, std::vector<SensorCol
   return kind;
 }
 
-/// The kinds that scenarios can mount besides LiDARs, odometry and IMU, which every vehicle has.
+/// The kinds that scenarios can mount besides LiDARs, odometry and IMU, which every vehicle has:
+/// barometer, magnetometer, gnss, range_finder (`sim/navigation_sensors`), and those that programs
+/// add.
 Registry<SensorKind>& sensor_kinds();
 
 /// One entry of a scenario's `sensors`.

@@ -17,6 +17,7 @@ namespace {
 
 constexpr double kTouchdown = 0.01;          // m above what carries a vehicle that lands
 constexpr double kTouchdownSpeed = 3.0;      // m/s
+constexpr double kSpinningDescent = 1.0;     // m/s
 constexpr double kGroundEffectReach = 10.0;  // propeller radii
 
 }  // namespace
@@ -71,11 +72,15 @@ void VehicleAgent::control(VehicleStatus& status,
   if (status.scripted && status.autopilot.command.index() < std::variant_size_v<Setpoint>) {
     status.autopilot.since = now;
   }
-  status.rotor_commands = autopilot_.rotor_speeds(status.autopilot, body, status.landed, now, dt);
-  status.conditions.rotor_shares.clear();
+  std::vector<double>& shares = status.conditions.rotor_shares;
+  shares.clear();
   for (std::size_t i = 0; i < status.rotor_commands.size() && faults_.any(); ++i) {
-    status.conditions.rotor_shares.push_back(faults_.rotor_share(i, now));
+    shares.push_back(faults_.rotor_share(i, now));
   }
+  if (settings().controller.reallocate) status.autopilot.memory.rotor_shares = shares;
+  status.rotor_commands =
+      autopilot_.rotor_speeds(status.autopilot, believed(status), status.landed, now, dt);
+  if (status.autopilot.memory.spins) come_down_spinning(status, now);
 
   const double error = (body.p_world - status.autopilot.reference.p_world).norm();
   status.squared_error_sum += error * error;
@@ -100,6 +105,11 @@ void VehicleAgent::control(VehicleStatus& status,
   }
 }
 
+RigidBodyState VehicleAgent::believed(const VehicleStatus& status) const {
+  if (setup_.controller_input == ControllerInput::kTruth) return status.state.body;
+  return status.estimate.on(status.state.body);
+}
+
 void VehicleAgent::note(VehicleStatus& status,
                         SimTime now,
                         const char* kind,
@@ -114,17 +124,35 @@ std::optional<std::string> VehicleAgent::command(VehicleStatus& status,
   if (status.summary.battery_low && setup_.on_low_battery == LowBatteryReaction::kLand) {
     return pilot.reject("the battery is low: it lands");
   }
+  if (status.summary.rotor_lost) return pilot.reject("a rotor is lost: it lands");
   const auto before = pilot.trajectory;
-  if (auto reason = autopilot_.give(pilot, command, now, status.state.body)) return reason;
+  const RigidBodyState body = believed(status);
+  if (auto reason = autopilot_.give(pilot, command, now, body)) return reason;
   const bool given = std::holds_alternative<TrajectoryCommand>(command);
   const bool made = std::holds_alternative<WaypointCommand>(command);
   if ((!given && !made) || pilot.trajectory == before) return std::nullopt;
-  const RigidBodyState* from = given ? &status.state.body : nullptr;
+  const RigidBodyState* from = given ? &body : nullptr;
   if (const auto words = beyond_limits(*pilot.trajectory, settings(), from)) {
     ++status.summary.beyond_limits;
     note(status, now, "beyond_limits", *words);
   }
   return std::nullopt;
+}
+
+void VehicleAgent::come_down_spinning(VehicleStatus& status, SimTime now) const {
+  if (status.summary.rotor_lost) return;
+  status.summary.rotor_lost = now;
+  const auto& shares = status.conditions.rotor_shares;
+  const auto weakest = std::min_element(shares.begin(), shares.end());
+  note(status,
+       now,
+       "rotor_lost",
+       fmt::format("rotor {} turns at {:.0f} % of its speed: the others cannot hold a heading; it "
+                   "lands, spinning",
+                   weakest - shares.begin(),
+                   100.0 * *weakest));
+  autopilot_.give(status.autopilot, LandCommand{kSpinningDescent}, now, believed(status));
+  status.scripted = false;
 }
 
 void VehicleAgent::watch_limits(VehicleStatus& status, Duration step) const {
@@ -152,7 +180,7 @@ void VehicleAgent::watch_battery(VehicleStatus& status, SimTime now) const {
                      : action == LowBatteryReaction::kFall ? "its rotors stop"
                                                            : "it flies on"));
     if (action == LowBatteryReaction::kLand) {
-      autopilot_.give(status.autopilot, LandCommand{}, now, status.state.body);
+      autopilot_.give(status.autopilot, LandCommand{}, now, believed(status));
       status.scripted = false;
     }
   }
@@ -219,6 +247,9 @@ void VehicleAgent::sample(VehicleStatus& status,
   status.events.clear();
   const auto arrive = [&](LateSample& late) {
     sensors_[late.sensor].instant->arrive(late.sample, status);
+    if (const auto* odometry = std::get_if<OdometrySample>(&late.sample)) {
+      status.estimate = odometry->error;
+    }
     samples.items.push_back(
         {arrival_of(late.sample), kSensorRank + late.sensor, std::move(late.sample)});
   };
@@ -243,6 +274,10 @@ void VehicleAgent::sample(VehicleStatus& status,
       const InstantSensor* instant = sensors_[i].instant;
       SensorStatus& sensor = status.sensors[i];
       if (instant == nullptr || instant->schedule().at(sensor.next) != next) continue;
+      if (instant->loses(sensor.next)) {
+        ++sensor.next;
+        continue;
+      }
       const InstantInput input{sensor.next++, next, state, status, *this};
       LateSample made{i, instant->measure(input, sensor.memory)};
       if (std::holds_alternative<ImuSample>(made.sample)) ++status.summary.imu_samples;

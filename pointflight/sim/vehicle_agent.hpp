@@ -39,6 +39,7 @@ struct VehicleSummary {
   std::uint64_t beyond_limits = 0;         ///< Trajectories that asked for more than it has.
   std::optional<SimTime> battery_low;      ///< When it came to its reserve.
   std::optional<SimTime> battery_empty;    ///< When its rotors stopped.
+  std::optional<SimTime> rotor_lost;       ///< When it began to come down without one.
   std::optional<double> closest_approach;  ///< Of the hull to anything, m; negative inside.
   /// Of the other thing, m; as below, at the closest approach.
   Vector3d closest_place_world = Vector3d::Zero();
@@ -76,6 +77,7 @@ struct VehicleStatus {
   std::int64_t next_state = 0;         ///< Index in the schedule of output.trajectory_rate.
   std::vector<SensorStatus> sensors;   ///< As `VehicleAgent::sensors`.
   std::vector<LateSample> late;        ///< Measured, not yet arrived.
+  EstimateError estimate;              ///< Of the odometry that came last.
   double squared_error_sum = 0.0;      ///< Of the tracking error, m^2.
   std::uint64_t steps = 0;             ///< That it was summed over.
   VehicleSummary summary;              ///< What happened so far.
@@ -183,13 +185,19 @@ class VehicleAgent {
   /// How long its mission and commands take, s; 0: nothing to do.
   [[nodiscard]] double busy_time() const { return busy_time_; }
 
+  /// What a ray meets on the map; obstacles and vehicles are not looked for.
+  [[nodiscard]] Hit look(const Ray& ray) const { return view_->trace(ray); }
+
  private:
   struct TimedCommand {
     SimTime time;
     Command command;
   };
   void read_commands(const Scenario& scenario);
+  /// What its controllers take for its state.
+  [[nodiscard]] RigidBodyState believed(const VehicleStatus& status) const;
   void note(VehicleStatus& status, SimTime now, const char* kind, const std::string& words) const;
+  void come_down_spinning(VehicleStatus& status, SimTime now) const;
   void watch_limits(VehicleStatus& status, Duration step) const;
   void watch_battery(VehicleStatus& status, SimTime now) const;
   [[nodiscard]] bool touches_down(const VehicleStatus& status) const;
@@ -213,6 +221,7 @@ class VehicleAgent {
   std::vector<TimedCommand> commands_;
   std::vector<MountedSensor> sensors_;
   std::vector<const MountedLidar*> lidars_;
+  std::shared_ptr<const Renderer> view_;           ///< Of the map, one ray at a time.
   std::shared_ptr<const Renderer> ground_sensor_;  ///< Looks down for ground effect, or none.
   Schedule state_schedule_;
   double busy_time_ = 0.0;

@@ -74,9 +74,8 @@ VehicleAgent::VehicleAgent(const Scenario& scenario,
           std::make_shared<Mission>(setup.start, setup.start_yaw_deg * kDegree, setup.mission)),
       state_schedule_(scenario.output.trajectory_rate) {
   mount_sensors(scenario, shared);
-  if (scenario.air.ground_effect && settings().rotor.radius > 0.0) {
-    ground_sensor_ = shared.renderer("beam");
-  }
+  view_ = shared.renderer("beam");
+  if (scenario.air.ground_effect && settings().rotor.radius > 0.0) ground_sensor_ = view_;
   check_faults(scenario);
   read_commands(scenario);
 }
@@ -97,7 +96,9 @@ void VehicleAgent::mount_sensors(const Scenario& scenario, SharedParts& shared) 
   const auto site = [&](std::size_t sensor) {
     return SensorSite{number_, static_cast<std::uint32_t>(sensor), seed_};
   };
-  mount(nullptr, std::make_unique<OdometrySource>(scenario.output.odometry_rate, faults_));
+  mount(nullptr,
+        std::make_unique<OdometrySource>(
+            scenario.output.odometry_rate, setup_.odometry, site(0), faults_));
   mount(nullptr, std::make_unique<OnboardImu>(settings(), site(sensors_.size()), faults_));
   for (std::size_t i = 0; i < setup_.sensors.size(); ++i) {
     const SensorSetup& sensor = setup_.sensors[i];

@@ -9,20 +9,29 @@
 
 namespace pointflight {
 
+/// The most of something on a trajectory, and where that is.
+struct Peak {
+  double value = 0.0;                       ///< In its own unit.
+  double time = 0.0;                        ///< Since the trajectory's start, s.
+  Vector3d place_world = Vector3d::Zero();  ///< m
+};
+
 /// The most that a trajectory asks of a vehicle in still air.
 struct MotionDemand {
-  double speed = 0.0;               ///< m/s
-  double acceleration = 0.0;        ///< Horizontal, drag included, m/s^2.
-  double climb_acceleration = 0.0;  ///< Up, m/s^2.
-  double tilt = 0.0;                ///< rad
-  double thrust = 0.0;              ///< N
+  Peak speed;               ///< m/s
+  Peak acceleration;        ///< Horizontal, drag included, m/s^2.
+  Peak climb_acceleration;  ///< Up, m/s^2.
+  Peak tilt;                ///< rad
+  Peak tilt_rate;           ///< Of roll and pitch together, by jerk (Mellinger, Kumar 2011), rad/s.
+  Peak yaw_rate;            ///< rad/s
+  Peak thrust;              ///< N
 };
 
 /// Looks at 20,000 instants at most, a hundredth of a second apart where the trajectory is short.
 MotionDemand demand_of(const Trajectory& trajectory, const VehicleSettings& vehicle);
 
-/// In words, what of a trajectory is beyond a vehicle: limits of its controller, thrust, and a
-/// start that is not where and as fast as it is (`from`; null: anywhere). Nothing where it can be
+/// In words, what of a trajectory is beyond a vehicle, and where: limits of its controller, thrust,
+/// a start that is not where and as fast as it is (`from`; null: anywhere). Nothing where it can be
 /// flown.
 std::optional<std::string> beyond_limits(const Trajectory& trajectory,
                                          const VehicleSettings& vehicle,

@@ -99,6 +99,34 @@ TEST(Battery, StopsTheRotorsWhenEmptyWhateverTheScenarioSays) {
   }
 }
 
+TEST(RotorLoss, AQuadrotorLandsSpinningAndTakesNoMoreCommands) {
+  Scenario scenario = hovering();
+  scenario.duration = 20.0;
+  FaultSettings lost;
+  lost.kind = FaultKind::kRotor;
+  lost.from = 2.0;
+  lost.index = 1;
+  scenario.vehicles[0].faults = {lost};
+  EventSink sink;
+  const Executor executor(1);
+  Simulation simulation(scenario, hall(), executor);
+  std::optional<std::string> refused;
+  while (simulation.step(sink)) {
+    if (!sink.on_board.empty() && !refused) refused = simulation.command(0, HoverCommand{});
+  }
+  ASSERT_EQ(sink.on_board.size(), 1u);
+  EXPECT_EQ(sink.on_board[0].kind, "rotor_lost");
+  EXPECT_EQ(sink.on_board[0].time, SimTime{} + std::chrono::seconds(2));
+  expect_contains(sink.on_board[0].words, "rotor 1 turns at 0 %");
+  EXPECT_EQ(refused, "a rotor is lost: it lands");
+  const VehicleStatus& status = simulation.status(0);
+  EXPECT_TRUE(status.landed);
+  EXPECT_EQ(simulation.summary(0).collisions, 0u);
+  const Vector3d& start = scenario.vehicles[0].start;
+  EXPECT_LT((status.state.body.p_world - start).head<2>().norm(), 3.0);
+  expect_contains(summary_json(simulation), "\"rotor_lost_at\": 2.0");
+}
+
 /// A circle at constant speed: the analytic demand is v^2 / r.
 class Circle : public Trajectory {
  public:
@@ -127,16 +155,20 @@ TEST(Feasibility, DemandsOfACircleAreThoseOnPaper) {
   vehicle.drag_area.setZero();
   vehicle.rotor.drag_coefficient = 0.0;
   const MotionDemand most = demand_of(Circle({0, 0, 0}, 3.0, 6.0), vehicle);
-  EXPECT_NEAR(most.speed, 6.0, 1e-9);
-  EXPECT_NEAR(most.acceleration, 12.0, 1e-9);
-  EXPECT_NEAR(most.climb_acceleration, 0.0, 1e-9);
-  EXPECT_NEAR(most.tilt, std::atan2(12.0, kGravity), 1e-9);
-  EXPECT_NEAR(most.thrust, vehicle.mass * std::hypot(12.0, kGravity), 1e-9);
+  EXPECT_NEAR(most.speed.value, 6.0, 1e-9);
+  EXPECT_NEAR(most.acceleration.value, 12.0, 1e-9);
+  EXPECT_NEAR(most.climb_acceleration.value, 0.0, 1e-9);
+  EXPECT_NEAR(most.tilt.value, std::atan2(12.0, kGravity), 1e-9);
+  // the force keeps its length and turns once around: f' = m |jerk| across it
+  EXPECT_NEAR(most.tilt_rate.value, 24.0 / std::hypot(12.0, kGravity), 1e-9);
+  EXPECT_EQ(most.yaw_rate.value, 0.0);
+  EXPECT_NEAR(most.thrust.value, vehicle.mass * std::hypot(12.0, kGravity), 1e-9);
   // with drag along the way the force is the hypotenuse of both
   vehicle.rotor.drag_coefficient = 2e-5;
   const double drag = 4 * 2e-5 * vehicle.hover_speed() * 6.0 / vehicle.mass;
-  EXPECT_NEAR(
-      demand_of(Circle({0, 0, 0}, 3.0, 6.0), vehicle).acceleration, std::hypot(12.0, drag), 1e-6);
+  EXPECT_NEAR(demand_of(Circle({0, 0, 0}, 3.0, 6.0), vehicle).acceleration.value,
+              std::hypot(12.0, drag),
+              1e-6);
 }
 
 TEST(Feasibility, SaysWhatIsBeyondWithBothNumbers) {
@@ -145,7 +177,7 @@ TEST(Feasibility, SaysWhatIsBeyondWithBothNumbers) {
   vehicle.rotor.drag_coefficient = 0.0;
   const auto words = beyond_limits(Circle({0, 0, 0}, 3.0, 6.0), vehicle, nullptr);
   ASSERT_TRUE(words);
-  expect_contains(*words, "a tilt of 50.7 degrees (limit 35)");
+  expect_contains(*words, "a tilt of 50.7 degrees (limit 35) after ");
   expect_contains(*words, "a horizontal acceleration of 12 m/s^2 (limit 7)");
   EXPECT_FALSE(beyond_limits(Circle({0, 0, 0}, 3.0, 3.0), vehicle, nullptr));
   RigidBodyState body;

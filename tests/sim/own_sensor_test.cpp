@@ -160,7 +160,7 @@ TEST(OwnSensors, MistakesSayWhere) {
     });
   };
   expect_contains(error("[{kind: sextant}]"), "s.yaml:2");
-  expect_contains(error("[{kind: sextant}]"), "'sextant' is unknown; one of: altimeter");
+  expect_contains(error("[{kind: sextant}]"), "'sextant' is unknown; one of: barometer");
   expect_contains(error("[{kind: altimeter, colour: 1}]"), "colour");
   expect_contains(error("[{kind: altimeter, rate: -1}]"), "rate");
   const auto again = sensor_kind<Altimeter, AltimeterSettings>("altimeter", "", {});

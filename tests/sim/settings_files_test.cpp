@@ -204,6 +204,16 @@ TEST(Pages, ExamplesOfSensorFilesLoadAndHoldEveryKey) {
   EXPECT_TRUE(missing.empty()) << "not shown: " << *missing.begin();
 }
 
+TEST(Pages, TheExampleOfAScenarioLoads) {
+  const auto blocks = blocks_of(read_file(POINTFLIGHT_SOURCE "/docs/scenario.md"), "yaml");
+  ASSERT_EQ(blocks.size(), 1u);
+  const Scenario scenario = parse_scenario(blocks[0], "docs/scenario.md");
+  const VehicleSetup& vehicle = scenario.vehicles[0];
+  EXPECT_EQ(vehicle.controller_input, ControllerInput::kOdometry);
+  EXPECT_FALSE(vehicle.odometry.is_true());
+  EXPECT_EQ(vehicle.sensors.size(), 4u);
+}
+
 TEST(Pages, TheExampleOfAVehicleFileLoadsAndHoldsEveryKey) {
   const auto blocks = blocks_of(read_file(POINTFLIGHT_SOURCE "/docs/vehicles.md"), "yaml");
   ASSERT_EQ(blocks.size(), 1u);
