@@ -64,9 +64,11 @@ struct GnssSettings {
 /// Its keys.
 void describe(SettingsVisitor& visitor, GnssSettings& settings);
 
-/// Degrees, degrees and metres above the ellipsoid (WGS 84).
+/// A place on the earth (WGS 84).
 struct GeodeticPlace {
-  double latitude, longitude, altitude;
+  double latitude = 0.0;   ///< deg
+  double longitude = 0.0;  ///< deg
+  double altitude = 0.0;   ///< Above the ellipsoid, m.
 };
 /// Of a place in a world whose x is east, y north at an origin; by the radii of curvature there:
 /// within 1 cm up to some 2 km from it.

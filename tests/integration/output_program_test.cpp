@@ -309,8 +309,7 @@ TEST_F(Output, ScenariosThatCannotBeAreRefusedOrWarnedOf) {
   }
   EXPECT_EQ(check("[12, 10, 4]").err, "");
   // beside the map there is nothing to fall on
-  const std::string falls =
-      scenario(60, "lidars: []\nfaults: [{kind: rotor, index: 1, from: 0.5}]\n");
+  const std::string falls = scenario(60, "lidars: []\ncommands: [{kind: disarm, time: 0.5}]\n");
   std::string text = read_file(falls);
   text.replace(text.find("[12, 10, 4]"), 11, "[-9, -9, 4]");
   write_file(falls, text);
