@@ -33,9 +33,9 @@ void describe(SettingsVisitor& visitor, EstimateSettings& settings);
 
 /// What an estimate is off by: (estimate) = (error) + (truth).
 struct EstimateError {
-  Vector3d p_world = Vector3d::Zero();        ///< m
-  Vector3d v_world = Vector3d::Zero();        ///< White part, m/s; the heading's error comes on top.
-  double yaw = 0.0;                           ///< About world z, rad.
+  Vector3d p_world = Vector3d::Zero();  ///< m
+  Vector3d v_world = Vector3d::Zero();  ///< White part, m/s; the heading's error comes on top.
+  double yaw = 0.0;                     ///< About world z, rad.
   Vector3d rotation_body = Vector3d::Zero();  ///< Roll and pitch, rad.
 
   /// What is believed of a true state: a frame that has moved and turned about the vehicle. Rates
@@ -64,11 +64,11 @@ class Estimator {
 
   /// From one report to the next.
   struct Memory {
-    std::int64_t index = -1;             ///< Of the last; none is off by anything before the first.
+    std::int64_t index = -1;  ///< Of the last; none is off by anything before the first.
     Vector3d position = Vector3d::Zero();  ///< Drift, m.
-    double yaw = 0.0;                    ///< Drift, rad.
-    double position_variance = 0.0;      ///< Of the drift, m^2.
-    double yaw_variance = 0.0;           ///< The same, rad^2.
+    double yaw = 0.0;                      ///< Drift, rad.
+    double position_variance = 0.0;        ///< Of the drift, m^2.
+    double yaw_variance = 0.0;             ///< The same, rad^2.
   };
 
   /// Of report number `index`; ascending, some may be left out.
