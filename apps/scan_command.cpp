@@ -32,6 +32,7 @@ struct ScanFlags {
   bool legacy = false;
   Surroundings surroundings;
   bool mark_unknown = false;
+  bool truth = false;
   std::string output;
   std::string png;
   bool json = false;
@@ -106,6 +107,7 @@ void take_scan(const ScanFlags& flags) {
   request.index = flags.index;
   request.noise = !flags.no_noise;
   request.seed = flags.seed;
+  request.truth = flags.truth;
   if (flags.mark_unknown) request.known = &known_space_of(*map);
   const Scan scan = lidar.take(request, PoseTrack(pose), *renderer, executor);
   if (scan.points.empty()) {
@@ -167,11 +169,16 @@ void add_scan_command(CLI::App& parent, int& /*exit_code*/) {
                   "(strongest and last), or triple")
       ->check(CLI::IsMember(modes))
       ->excludes(legacy);
-  app->add_option(
+  auto* output = app->add_option(
       "-o,--output",
       flags->output,
       "PCD of the points in the sensor frame: x y z intensity range time ring label; echo, "
       "where beams may have several");
+  app->add_flag("--truth",
+                flags->truth,
+                "The PCD also says what the simulator knows of each point: true_range incidence "
+                "depth deskewed_x deskewed_y deskewed_z surfel sub_ray sub_rays")
+      ->needs(output);
   app->add_flag("--mark-unknown",
                 flags->mark_unknown,
                 "Points say whether they came through space that no survey saw (field unknown, 0 "

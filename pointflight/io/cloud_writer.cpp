@@ -90,6 +90,7 @@ class RowWriter : public CloudWriter {
     put_vector(bytes, row.spread);
     put(bytes, row.axes.w());
     put_vector(bytes, row.axes.vec());
+    put(bytes, row.surfel);
   }
 
  private:
@@ -114,6 +115,7 @@ class RowWriter : public CloudWriter {
     if (columns_.ellipsoid) {
       add({{"s0", "s0", 'F', 4}, {"s1", "s1", 'F', 4}, {"s2", "s2", 'F', 4}});
       add({{"qw", "qw", 'F', 4}, {"qx", "qx", 'F', 4}, {"qy", "qy", 'F', 4}, {"qz", "qz", 'F', 4}});
+      add({{"surfel", "surfel", 'U', 4}});
     }
     return all;
   }
@@ -157,7 +159,8 @@ class RowWriter : public CloudWriter {
   [[nodiscard]] std::string ply_header(const std::string& points, const std::string& filler) const {
     std::string properties;
     for (const Column& column : columns()) {
-      const char* type = column.type == 'U' ? "uchar" : (column.size == 8 ? "double" : "float");
+      const char* whole = column.size == 4 ? "uint" : "uchar";
+      const char* type = column.type == 'U' ? whole : (column.size == 8 ? "double" : "float");
       properties += fmt::format("property {} {}\n", type, column.ply);
     }
     return fmt::format(

@@ -17,7 +17,7 @@ struct CloudColumns {
   bool intensity = false;  ///< float32; 16 bits in LAS.
   bool color = false;      ///< Red, green, blue.
   bool normal = false;     ///< Not in LAS.
-  bool ellipsoid = false;  ///< Deviations and axes of a surfel; not in LAS.
+  bool ellipsoid = false;  ///< Deviations, axes and number of a surfel; not in LAS.
 };
 
 /// One row of a written cloud; what its columns lack is not looked at.
@@ -26,6 +26,7 @@ struct CloudRow {
   Vector3f normal = Vector3f::Zero();                        ///< Unit length.
   Vector3f spread = Vector3f::Zero();                        ///< Standard deviations, m.
   Eigen::Quaternionf axes = Eigen::Quaternionf::Identity();  ///< World <- surfel.
+  std::uint32_t surfel = 0;  ///< Its number, as scans' truth has it.
 };
 
 /// Writes a cloud row by row, never held; it appears under its name with `commit`.

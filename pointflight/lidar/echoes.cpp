@@ -41,6 +41,7 @@ Echo merged(std::span<const BeamPart> parts) {
     if (e <= most) continue;
     most = e;
     echo.label = part.label;
+    echo.origin = part.origin;
     echo.range = part.range;
     echo.intensity = part.intensity;
   }
@@ -55,8 +56,8 @@ Echo merged(std::span<const BeamPart> parts) {
 Echoes echoes_of(std::span<BeamPart> parts, float merge) {
   // ties in an order of their own: the sums below are the same bits everywhere
   std::sort(parts.begin(), parts.end(), [](const BeamPart& a, const BeamPart& b) {
-    return std::tie(a.range, a.share, a.reflectivity, a.label) <
-           std::tie(b.range, b.share, b.reflectivity, b.label);
+    return std::tie(a.range, a.share, a.reflectivity, a.label, a.origin.sub_ray) <
+           std::tie(b.range, b.share, b.reflectivity, b.label, b.origin.sub_ray);
   });
   Echoes echoes;
   std::size_t begin = 0;

@@ -8,8 +8,16 @@
 #include <span>
 
 #include "pointflight/map/body.hpp"
+#include "pointflight/render/renderer.hpp"
 
 namespace pointflight {
+
+/// Which sub-ray gave the most light of a return, and what it met: no sensor knows.
+struct Origin {
+  float cos_incidence = 0.0f;        ///< `Hit::cos_incidence`
+  std::uint32_t surfel = kNoSurfel;  ///< `Hit::surfel`
+  std::uint16_t sub_ray = 0;         ///< Its number; the spread of numbers is `Footprint`'s.
+};
 
 /// What part of a beam met.
 struct BeamPart {
@@ -18,6 +26,7 @@ struct BeamPart {
   float reflectivity = 0.0f;  ///< Of the surface, times the cosine of the incidence.
   float intensity = 0.0f;     ///< The map's.
   Label label = kMapLabel;    ///< What it is of.
+  Origin origin;              ///< Of itself.
   /// It met something.
   [[nodiscard]] bool is_return() const { return range >= 0.0f; }
 };
@@ -30,6 +39,7 @@ struct Echo {
   Label label = kMapLabel;    ///< Of the part that gave most.
   std::uint16_t parts = 0;    ///< How many.
   float depth = 0.0f;         ///< From the nearest to the farthest part, m.
+  Origin origin;              ///< The part that gave most.
   /// It comes from somewhere.
   [[nodiscard]] bool is_return() const { return range >= 0.0f; }
 };

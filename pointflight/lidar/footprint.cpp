@@ -35,13 +35,14 @@ float nearest_of(std::span<const BeamPart> parts) {
 }
 
 /// What one sub-ray gives back.
-BeamPart part_of(const Hit& hit, float share, const ReturnModel& returns) {
+BeamPart part_of(const Hit& hit, float share, std::size_t sub_ray, const ReturnModel& returns) {
   if (!hit.is_return()) return {.share = share};
   return {.range = hit.range,
           .share = share,
           .reflectivity = static_cast<float>(returns.reflectivity(hit)),
           .intensity = hit.intensity,
-          .label = hit.label};
+          .label = hit.label,
+          .origin = {hit.cos_incidence, hit.surfel, static_cast<std::uint16_t>(sub_ray)}};
 }
 
 /// Parts that met one plane: there the inverse of the range is linear across the beam.
@@ -292,7 +293,7 @@ std::vector<std::uint32_t> Footprint::trace_with(const Task& task,
       std::vector<BeamPart> parts(n);
       for (std::size_t b = begin; b < end; ++b) {
         for (std::size_t i = 0; i < n; ++i) {
-          parts[i] = part_of(hits[b * n + i], sub_rays[i].share, task.returns);
+          parts[i] = part_of(hits[b * n + i], sub_rays[i].share, i, task.returns);
         }
         const float known = *std::min_element(&nearest[b * groups], &nearest[b * groups] + groups);
         const float range_max = middles.rays[now[b]].range_max;

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "pointflight/core/constants.hpp"
+#include "pointflight/core/math.hpp"
 #include "pointflight/core/random.hpp"
 
 namespace pointflight {
@@ -73,6 +74,33 @@ void mark_unknown(const KnownSpace& known,
                                                 static_cast<double>(true_ranges[i]));
     }
   });
+}
+
+/// `Scan::truth` of its points. `returns`: those of all beams, `most` places each.
+void tell_truth(std::span<const Return> returns, const PoseTrack& T_world_sensor, Scan& scan) {
+  scan.marks.truth = true;
+  scan.truth.reserve(scan.points.size());
+  const Pose T_start_world = T_world_sensor.at(scan.start).inverse();
+  std::size_t next = 0;
+  SimTime time = scan.start;
+  Pose T_start_seen;
+  for (const Return& made : returns) {
+    if (!made.is_return()) continue;
+    const ScanPoint& point = scan.points[next++];
+    if (scan.seen_at(point) != time) {
+      time = scan.seen_at(point);
+      T_start_seen = T_start_world * T_world_sensor.at(time);
+    }
+    const double cosine = std::clamp(static_cast<double>(made.origin.cos_incidence), 0.0, 1.0);
+    const bool is_false = made.parts == 0;
+    scan.truth.push_back({made.true_range,
+                          is_false ? 0.0f : static_cast<float>(math::acos(cosine)),
+                          made.depth,
+                          (T_start_seen * point.position_sensor.cast<double>()).cast<float>(),
+                          made.origin.surfel,
+                          made.origin.sub_ray,
+                          made.parts});
+  }
 }
 
 /// The horizontal of the sensor across a beam; straight up or down, its y axis.
@@ -260,7 +288,12 @@ std::vector<Return> Lidar::noisy_ranges(const ScanRequest& request,
       if (request.noise) range = with_noise(range * share, settings_.noise, normals, i) / share;
       // noise neither makes nor ends a return at the far limit; it may at the near one
       if (range * share < range_min) continue;
-      returns[i] = {range, hits[i].intensity, hits[i].label, hits[i].range};
+      returns[i] = {.range = range,
+                    .intensity = hits[i].intensity,
+                    .label = hits[i].label,
+                    .true_range = hits[i].range,
+                    .origin = {hits[i].cos_incidence, hits[i].surfel},
+                    .parts = 1};
     }
   });
   return returns;
@@ -340,6 +373,7 @@ Scan Lidar::take(const ScanRequest& request,
     scan.points.back().echo = static_cast<std::uint8_t>(i % most);
     if (request.known != nullptr) true_ranges.push_back(made.true_range);
   }
+  if (request.truth) tell_truth(returns, T_world_sensor, scan);
   if (request.known != nullptr) {
     mark_unknown(*request.known, world.rays, true_ranges, scan, executor);
   }

@@ -25,6 +25,7 @@ struct ScanRequest {
   std::uint64_t seed = 0;   ///< Of all noise and of which beams come back.
   /// Points get `is_unknown` by it; null: they do not.
   const KnownSpace* known = nullptr;
+  bool truth = false;            ///< `Scan::truth` is wanted.
   std::span<const Body> bodies;  ///< What moves in the map, without what carries the sensor.
 };
 

@@ -100,7 +100,12 @@ double ReturnModel::reflectivity(const Hit& hit) const {
 
 Echo ReturnModel::echo_of(const Hit& hit) const {
   if (!hit.is_return()) return {};
-  return {hit.range, static_cast<float>(reflectivity(hit)), hit.intensity, hit.label, 1};
+  return {.range = hit.range,
+          .reflectivity = static_cast<float>(reflectivity(hit)),
+          .intensity = hit.intensity,
+          .label = hit.label,
+          .parts = 1,
+          .origin = {hit.cos_incidence, hit.surfel}};
 }
 
 bool ReturnModel::may_go_either_way(const Echo& echo, double less, double more) const {
@@ -142,6 +147,9 @@ Return ReturnModel::from_surface(const Echo& echo, const BeamChance& chance) con
   made.label = echo.label;
   made.true_range = echo.range;
   made.strength = reflectivity / (near * near);
+  made.origin = echo.origin;
+  made.parts = echo.parts;
+  made.depth = echo.depth;
   return made;
 }
 

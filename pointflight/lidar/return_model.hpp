@@ -55,6 +55,9 @@ struct Return {
   Label label = kMapLabel;   ///< Of a false one, `kFalseReturn`: nothing, fog, dust or a drop.
   float true_range = -1.0f;  ///< m, without noise and rounding.
   double strength = 0.0;     ///< Of the signal, in the unit of `Weather::target`.
+  Origin origin;             ///< Of what gave most of it.
+  std::uint16_t parts = 0;   ///< `Echo::parts`; 0 of a false one.
+  float depth = 0.0f;        ///< `Echo::depth`
   /// It is one.
   [[nodiscard]] bool is_return() const { return range >= 0.0f; }
 };

@@ -14,10 +14,61 @@ namespace {
 
 constexpr std::size_t kFloats = 6;
 
+/// A point's truth as files have it.
+struct TruthRow {
+  float true_range, incidence, depth, deskewed[3];
+  std::uint32_t surfel;
+  std::uint16_t sub_ray, sub_rays;
+};
+static_assert(sizeof(TruthRow) == 32);
+
 /// Bytes per point.
 constexpr std::size_t row_size(const ScanMarks& marks) {
   return kFloats * sizeof(float) + 2 * sizeof(std::uint16_t) + (marks.unknown ? 1 : 0) +
-         (marks.echoes ? 1 : 0);
+         (marks.echoes ? 1 : 0) + (marks.truth ? sizeof(TruthRow) : 0);
+}
+
+/// What a file of such a scan has.
+std::vector<PcdField> fields_of(const ScanMarks& marks) {
+  std::vector<PcdField> fields = {{"x", 'F', 4},
+                                  {"y", 'F', 4},
+                                  {"z", 'F', 4},
+                                  {"intensity", 'F', 4},
+                                  {"range", 'F', 4},
+                                  {"time", 'F', 4},
+                                  {"ring", 'U', 2},
+                                  {"label", 'U', 2}};
+  if (marks.unknown) fields.push_back({"unknown", 'U', 1});
+  if (marks.echoes) fields.push_back({"echo", 'U', 1});
+  if (!marks.truth) return fields;
+  for (const char* name :
+       {"true_range", "incidence", "depth", "deskewed_x", "deskewed_y", "deskewed_z"}) {
+    fields.push_back({name, 'F', 4});
+  }
+  fields.push_back({"surfel", 'U', 4});
+  fields.push_back({"sub_ray", 'U', 2});
+  fields.push_back({"sub_rays", 'U', 2});
+  return fields;
+}
+
+TruthRow row_of(const PointTruth& truth) {
+  return {truth.range,
+          truth.incidence,
+          truth.depth,
+          {truth.deskewed.x(), truth.deskewed.y(), truth.deskewed.z()},
+          truth.surfel,
+          truth.sub_ray,
+          truth.sub_rays};
+}
+
+PointTruth truth_of(const TruthRow& row) {
+  return {row.true_range,
+          row.incidence,
+          row.depth,
+          Vector3f(row.deskewed),
+          row.surfel,
+          row.sub_ray,
+          row.sub_rays};
 }
 
 }  // namespace
@@ -26,7 +77,8 @@ void write_scan_pcd(const std::string& path, const Scan& scan) {
   const std::size_t row = row_size(scan.marks);
   std::vector<std::byte> rows(scan.points.size() * row);
   std::byte* at = rows.data();
-  for (const ScanPoint& point : scan.points) {
+  for (std::size_t i = 0; i < scan.points.size(); ++i) {
+    const ScanPoint& point = scan.points[i];
     const float values[kFloats] = {point.position_sensor.x(),
                                    point.position_sensor.y(),
                                    point.position_sensor.z(),
@@ -38,29 +90,22 @@ void write_scan_pcd(const std::string& path, const Scan& scan) {
     std::memcpy(at + sizeof values, integers, sizeof integers);
     std::byte* mark = at + sizeof values + sizeof integers;
     if (scan.marks.unknown) *mark++ = std::byte{point.is_unknown};
-    if (scan.marks.echoes) *mark = std::byte{point.echo};
+    if (scan.marks.echoes) *mark++ = std::byte{point.echo};
+    if (scan.marks.truth) {
+      const TruthRow truth = row_of(scan.truth[i]);
+      std::memcpy(mark, &truth, sizeof truth);
+    }
     at += row;
   }
-  std::vector<PcdField> columns = {{"x", 'F', 4},
-                                   {"y", 'F', 4},
-                                   {"z", 'F', 4},
-                                   {"intensity", 'F', 4},
-                                   {"range", 'F', 4},
-                                   {"time", 'F', 4},
-                                   {"ring", 'U', 2},
-                                   {"label", 'U', 2}};
-  if (scan.marks.unknown) columns.push_back({"unknown", 'U', 1});
-  if (scan.marks.echoes) columns.push_back({"echo", 'U', 1});
-  write_pcd(OutputFile(path), columns, scan.points.size(), rows);
+  write_pcd(OutputFile(path), fields_of(scan.marks), scan.points.size(), rows);
 }
 
-std::vector<ScanPoint> read_scan_points(const std::string& path,
-                                        std::span<const Beam> beams,
-                                        const ScanMarks& marks) {
+void read_scan_points(const std::string& path, std::span<const Beam> beams, Scan& scan) {
+  const ScanMarks& marks = scan.marks;
   const std::size_t row = row_size(marks);
-  const std::string fields = fmt::format("FIELDS x y z intensity range time ring label{}{}\n",
-                                         marks.unknown ? " unknown" : "",
-                                         marks.echoes ? " echo" : "");
+  std::string fields = "FIELDS";
+  for (const PcdField& field : fields_of(marks)) fields += " " + field.name;
+  fields += "\n";
   constexpr std::string_view kBody = "DATA binary\n";
   const MappedFile file(path);
   const std::string_view text(reinterpret_cast<const char*>(file.bytes().data()),
@@ -71,17 +116,24 @@ std::vector<ScanPoint> read_scan_points(const std::string& path,
   if (!own || size % row != 0) {
     throw InputError(fmt::format("{}: is no scan of a run, or cut off", path));
   }
-  std::vector<ScanPoint> points(size / row);
+  scan.points.assign(size / row, {});
+  scan.truth.assign(marks.truth ? size / row : 0, {});
   const char* at = text.data() + body + kBody.size();
   std::size_t beam = 0;
-  for (ScanPoint& point : points) {
+  for (std::size_t i = 0; i < scan.points.size(); ++i) {
+    ScanPoint& point = scan.points[i];
     float values[kFloats];
     std::uint16_t integers[2];
     std::memcpy(values, at, sizeof values);
     std::memcpy(integers, at + sizeof values, sizeof integers);
     const char* mark = at + sizeof values + sizeof integers;
     if (marks.unknown) point.is_unknown = *mark++ != 0;
-    if (marks.echoes) point.echo = static_cast<std::uint8_t>(*mark);
+    if (marks.echoes) point.echo = static_cast<std::uint8_t>(*mark++);
+    if (marks.truth) {
+      TruthRow truth;
+      std::memcpy(&truth, mark, sizeof truth);
+      scan.truth[i] = truth_of(truth);
+    }
     at += row;
     point.position_sensor = {values[0], values[1], values[2]};
     point.intensity = values[3];
@@ -104,7 +156,6 @@ std::vector<ScanPoint> read_scan_points(const std::string& path,
     // without echoes each beam has one point
     if (!marks.echoes) ++beam;
   }
-  return points;
 }
 
 }  // namespace pointflight

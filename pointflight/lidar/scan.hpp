@@ -9,6 +9,7 @@
 #include "pointflight/geometry/types.hpp"
 #include "pointflight/lidar/beam_pattern.hpp"
 #include "pointflight/map/body.hpp"
+#include "pointflight/render/renderer.hpp"
 
 namespace pointflight {
 
@@ -28,10 +29,28 @@ struct ScanPoint {
   std::uint8_t echo = 0;
 };
 
+/// What the simulator knows of a point and no sensor does. Of a false return (`kFalseReturn`) only
+/// `range` and `deskewed` mean anything.
+struct PointTruth {
+  /// Without noise and rounding, m: the mean, by energy, of what came back in one pulse, along the
+  /// beam as it really went (the point lies where the sensor believes it went).
+  float range = 0.0f;
+  /// Between the beam and the normal of what gave most of the light, rad, 0 to pi / 2.
+  float incidence = 0.0f;
+  /// From the nearest to the farthest thing in the pulse, m: a mixed pixel has some.
+  float depth = 0.0f;
+  /// The point in the sensor's frame at the scan's start, m: what exact deskewing makes of it.
+  Vector3f deskewed = Vector3f::Zero();
+  std::uint32_t surfel = kNoSurfel;  ///< What gave most of the light: `Hit::surfel`.
+  std::uint16_t sub_ray = 0;         ///< Which sub-ray of the beam met it.
+  std::uint16_t sub_rays = 0;        ///< How many sub-rays are in the pulse; 0: a false return.
+};
+
 /// What the points of a scan say beyond what all do.
 struct ScanMarks {
   bool unknown = false;  ///< `ScanPoint::is_unknown`
   bool echoes = false;   ///< `ScanPoint::echo`: a beam may have several points.
+  bool truth = false;    ///< `Scan::truth`
 };
 
 /// What a LiDAR delivers for one scan: the returns in firing order.
@@ -46,6 +65,7 @@ struct Scan {
   SimTime middle;                 ///< Between first and last beam (a camera's: its start).
   ScanMarks marks;                ///< What points say besides.
   std::vector<ScanPoint> points;  ///< In firing order; beams without a return have none.
+  std::vector<PointTruth> truth;  ///< Of each point, where `marks.truth`; else empty.
 
   /// When the sensor was where it saw a point from.
   [[nodiscard]] SimTime seen_at(const ScanPoint& point) const {
@@ -54,15 +74,14 @@ struct Scan {
 };
 
 /// Writes x y z intensity range time (float32; time in seconds after the scan's start), ring
-/// (uint16), label (uint16) and, where the scan marks them, unknown (uint8: 0, 1) and echo (uint8:
-/// 0 to 2) as binary PCD. Throws InputError.
+/// (uint16), label (uint16) and, where the scan marks them, unknown (uint8: 0, 1), echo (uint8:
+/// 0 to 2) and `PointTruth` (true_range incidence depth deskewed_x deskewed_y deskewed_z, float32;
+/// surfel, uint32; sub_ray and sub_rays, uint16) as binary PCD. Throws InputError.
 void write_scan_pcd(const std::string& path, const Scan& scan);
 
-/// The points of such a file, taken with `beams`; their times and numbers are those of the beams,
-/// to the nanosecond. The file has what `marks` says. Throws InputError, also where the points are
-/// not those of the beams.
-std::vector<ScanPoint> read_scan_points(const std::string& path,
-                                        std::span<const Beam> beams,
-                                        const ScanMarks& marks = {});
+/// Fills in the points of such a file, and their truth, of a scan taken with `beams` whose `marks`
+/// are set: the file has what they say. Times and numbers of the points are those of the beams, to
+/// the nanosecond. Throws InputError, also where the points are not those of the beams.
+void read_scan_points(const std::string& path, std::span<const Beam> beams, Scan& scan);
 
 }  // namespace pointflight

@@ -22,6 +22,7 @@ CloudRow row_of(const SurfelMap& map, const LeafHeader& leaf, std::size_t word) 
   row.normal = surfel.axes.col(0);
   row.spread = surfel.s * static_cast<float>(map.resolution());
   row.axes = Eigen::Quaternionf(surfel.axes).normalized();
+  row.surfel = static_cast<std::uint32_t>(word);
   return row;
 }
 

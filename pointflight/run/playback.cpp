@@ -239,7 +239,7 @@ struct RecordedRun::Files {
     scan.snapshot = mounted.takes_snapshots();
     scan.marks = mounted.marks();
     scan.middle = mounted.lidar().middle_of(scan.start, beams, scan.snapshot);
-    scan.points = read_scan_points(path, beams, scan.marks);
+    read_scan_points(path, beams, scan);
     return ScanSample{std::make_shared<const Scan>(std::move(scan)), track};
   }
 

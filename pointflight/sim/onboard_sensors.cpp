@@ -58,6 +58,7 @@ MountedLidar::MountedLidar(const LidarMount& mount,
       renderer_(std::move(renderer)),
       snapshot_(mount.snapshot),
       noise_(mount.noise),
+      truth_(mount.truth),
       known_(mount.mark_unknown ? &known_space_of(map) : nullptr),
       faults_(faults) {
   const Vector3d rpy = mount.rotation_rpy_deg * kDegree;
@@ -83,6 +84,7 @@ Sample MountedLidar::measure(const IntervalInput& input) const {
   request.snapshot = snapshot_;
   request.noise = noise_;
   request.known = known_;
+  request.truth = truth_;
   request.seed = site_.seed;
   request.bodies = input.bodies;
   const PoseTrack track = input.T_world_body.with_mount(T_body_sensor_);

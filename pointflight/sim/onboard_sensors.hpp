@@ -78,7 +78,9 @@ class MountedLidar : public IntervalSensor {
   [[nodiscard]] bool takes_snapshots() const { return snapshot_ || renderer_->is_snapshot(); }
 
   /// What its points say besides.
-  [[nodiscard]] ScanMarks marks() const { return {known_ != nullptr, lidar_.reports_echoes()}; }
+  [[nodiscard]] ScanMarks marks() const {
+    return {known_ != nullptr, lidar_.reports_echoes(), truth_};
+  }
 
   [[nodiscard]] double reach() const override;
   [[nodiscard]] bool loses(std::int64_t index) const override;
@@ -91,6 +93,7 @@ class MountedLidar : public IntervalSensor {
   Pose T_body_sensor_;
   bool snapshot_;
   bool noise_;
+  bool truth_;
   const KnownSpace* known_ = nullptr;  ///< Null: points are not marked.
   const Faults& faults_;
 };

@@ -51,6 +51,11 @@ void describe_lidar(SettingsVisitor& v, LidarMount& s) {
            "points say whether their beams crossed space that no survey saw (a map made or fitted "
            "with `--scans`)"},
           s.mark_unknown);
+  v.value({"truth",
+           "",
+           "its files also say what the simulator knows of each point: true range, incidence, "
+           "surfel, sub-ray, deskewed place"},
+          s.truth);
 }
 
 void describe_mission(SettingsVisitor& v, MissionSettings& s) {

@@ -202,7 +202,8 @@ TEST_F(MapEdit, MergesExportsAndCompares) {
     EXPECT_LT(json["only_in_second"]["share"].get<double>(), 0.005) << name;
   }
   expect_done(fmt::format("map export {} -o {} --what surfels", map(), folder / "s.ply"));
-  expect_contains(read_file(folder / "s.ply").substr(0, 600), "property float qw");
+  expect_contains(read_file(folder / "s.ply").substr(0, 700),
+                  "property float qz\nproperty uint surfel\n");
   expect_user_error(run(fmt::format("map export {} -o {} --what normals", map(), folder / "n.las")),
                     "LAS");
   expect_user_error(run(fmt::format("map export {} -o {}", map(), folder / "n.xyz")),

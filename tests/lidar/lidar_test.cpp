@@ -215,13 +215,131 @@ TEST(Lidar, MarksWhatCameThroughSpaceThatNoSurveySaw) {
   write_scan_pcd(folder / "s.pcd", marked);
   testing::expect_contains(testing::read_file(folder / "s.pcd"), "ring label unknown\n");
   const auto beams = lidar.beams(0, Executor(1));
-  const auto back = read_scan_points(folder / "s.pcd", beams, {.unknown = true});
+  Scan read;
+  read.marks.unknown = true;
+  read_scan_points(folder / "s.pcd", beams, read);
+  const std::vector<ScanPoint>& back = read.points;
   ASSERT_EQ(back.size(), marked.points.size());
   for (std::size_t i = 0; i < back.size(); ++i) {
     EXPECT_EQ(back[i].is_unknown, marked.points[i].is_unknown);
   }
-  testing::expect_contains(testing::error_of([&] { read_scan_points(folder / "s.pcd", beams); }),
-                           "no scan");
+  Scan unmarked;
+  testing::expect_contains(
+      testing::error_of([&] { read_scan_points(folder / "s.pcd", beams, unmarked); }), "no scan");
+}
+
+/// A box of 12 x 12 x 6 m around the origin.
+ShapeScene room() {
+  ShapeScene scene;
+  scene.add_box({-6, -6, -2}, {6, 6, 4});
+  return scene;
+}
+
+TEST(Lidar, TruthIsWhatIsThereAndWhereExactDeskewingPutsThePoint) {
+  const ShapeScene scene = room();
+  const auto map = map_of(scene, 0.05);
+  const auto renderer = make_renderer("beam", Scene{map});
+  std::vector<TimedPose> poses;
+  for (int ms = 0; ms <= 200; ++ms) {
+    const double s = 1e-3 * ms;
+    poses.push_back({SimTime(std::chrono::milliseconds(ms)),
+                     {quaternion_from_rpy(0.3 * s, 0, kPi * s), {3.0 * s, 0.5, 0}}});
+  }
+  const PoseTrack moving(poses);
+  for (const bool legacy : {false, true}) {
+    const Lidar lidar(load_lidar("mid360"),
+                      0,
+                      nullptr,
+                      legacy ? std::nullopt : std::optional<Surroundings>(Surroundings{}));
+    ScanRequest request;
+    request.start = SimTime(std::chrono::milliseconds(50));
+    const Scan plain = lidar.take(request, moving, *renderer, Executor(2));
+    request.truth = true;
+    const Scan scan = lidar.take(request, moving, *renderer, Executor(2));
+    EXPECT_TRUE(plain.truth.empty());
+    ASSERT_EQ(scan.truth.size(), scan.points.size());
+    ASSERT_EQ(plain.points.size(), scan.points.size());
+    const Pose T_world_start = moving.at(scan.start);
+    double squares = 0.0;
+    std::size_t looked_at = 0;
+    for (std::size_t i = 0; i < scan.points.size(); ++i) {
+      const ScanPoint& point = scan.points[i];
+      const PointTruth& truth = scan.truth[i];
+      EXPECT_EQ(point.range, plain.points[i].range);
+      const Vector3d p = point.position_sensor.cast<double>();
+      const Pose T_world_sensor = moving.at(scan.seen_at(point));
+      // float32 of some metres
+      EXPECT_LT((T_world_start * truth.deskewed.cast<double>() - T_world_sensor * p).norm(), 5e-6);
+      if (point.label == kFalseReturn) {
+        EXPECT_EQ(truth.sub_rays, 0);
+        continue;
+      }
+      EXPECT_EQ(truth.sub_rays, 1);
+      const Vector3d direction = T_world_sensor.rotation * p.normalized();
+      const auto range = scene.intersect(T_world_sensor.translation, direction);
+      ASSERT_TRUE(range);
+      const Vector3d place = T_world_sensor.translation + *range * direction;
+      // the map rounds corners, and its beams go 0.1 degrees off where returns are modelled
+      const Vector3d q = (place - Vector3d(0, 0, 1)).cwiseAbs().cwiseQuotient(Vector3d(6, 6, 3));
+      const Vector3d apart = (Vector3d::Ones() - q).cwiseProduct(Vector3d(6, 6, 3));
+      int axis = 0;  // of the face
+      const double nearest = apart.minCoeff(&axis);
+      if (apart.sum() - apart.maxCoeff() - nearest < 0.25) continue;
+      ++looked_at;
+      const double cosine = std::abs(direction[axis]);
+      const double blur = legacy ? 0.0 : 5.0 * 0.075 * kDegree * *range * std::sqrt(2.0);
+      EXPECT_NEAR(truth.range, *range, 0.01 / cosine + blur / cosine) << i;
+      EXPECT_NEAR(truth.incidence, std::acos(cosine), 0.06) << i;
+      EXPECT_EQ(truth.depth, 0.0f);
+      const double error = static_cast<double>(point.range) - static_cast<double>(truth.range);
+      squares += error * error;
+      ASSERT_LT(truth.surfel, map->words().size());
+    }
+    EXPECT_GT(looked_at, 9 * scan.points.size() / 10);
+    EXPECT_NEAR(std::sqrt(squares / static_cast<double>(looked_at)), 0.02, 0.001);
+    // what its file has, with each other mark
+    const testing::TemporaryFolder folder;
+    write_scan_pcd(folder / "s.pcd", scan);
+    Scan read;
+    read.marks = scan.marks;
+    read.start = scan.start;
+    read_scan_points(folder / "s.pcd", lidar.beams(lidar.pattern_scan(0, 0), Executor(1)), read);
+    ASSERT_EQ(read.truth.size(), scan.truth.size());
+    for (std::size_t i = 0; i < read.truth.size(); ++i) {
+      EXPECT_EQ(read.truth[i].range, scan.truth[i].range);
+      EXPECT_EQ(read.truth[i].incidence, scan.truth[i].incidence);
+      EXPECT_EQ(read.truth[i].deskewed, scan.truth[i].deskewed);
+      EXPECT_EQ(read.truth[i].surfel, scan.truth[i].surfel);
+    }
+  }
+}
+
+TEST(Lidar, TruthOfWideBeamsSaysWhatIsMixed) {
+  // a pillar before a wall 3 m behind it: an OS1's beams that graze its edges see both
+  ShapeScene scene;
+  scene.add_box({-12, -12, -3}, {12, 12, 5});
+  scene.add_box({8, -0.5, -3}, {8.3, 0.5, 5});
+  const auto renderer = make_renderer("beam", Scene{map_of(scene, 0.05)});
+  LidarSettings os1 = load_lidar("os1_64");
+  os1.optics.pulse_ns = 30.0;  // 4.5 m: one pulse
+  const Lidar lidar(os1, 0, nullptr, Surroundings{});
+  ScanRequest request;
+  request.truth = true;
+  const Scan scan = lidar.take(request, PoseTrack(Pose{}), *renderer, Executor(2));
+  std::size_t mixed = 0;
+  std::size_t other_sub_rays = 0;
+  for (std::size_t i = 0; i < scan.points.size(); ++i) {
+    const PointTruth& truth = scan.truth[i];
+    other_sub_rays += truth.sub_ray > 0 ? 1 : 0;
+    if (truth.depth < 2.0f) continue;
+    ++mixed;
+    EXPECT_GT(truth.sub_rays, 1);
+    EXPECT_LT(truth.sub_ray, 288);
+    // the mean of both lies between them
+    EXPECT_GT(truth.range, 7.9f);
+  }
+  EXPECT_GT(mixed, 64u);
+  EXPECT_GT(other_sub_rays, mixed / 4);
 }
 
 TEST(Scan, PcdHasAllFields) {
