@@ -4,6 +4,7 @@
 #include <memory>
 #include <variant>
 
+#include "pointflight/geometry/assembly.hpp"
 #include "pointflight/geometry/motion.hpp"
 #include "pointflight/geometry/solid.hpp"
 #include "pointflight/map/surfel_map.hpp"
@@ -23,8 +24,10 @@ using BodyShape = std::variant<Solid, std::shared_ptr<const SurfelMap>>;
 
 /// Something that moves through the map, from one instant to another.
 struct Body {
-  Label label = kMapLabel;         ///< What scans call it.
-  BodyShape shape;                 ///< In the body's own frame.
+  Label label = kMapLabel;  ///< What scans call it.
+  BodyShape shape;          ///< In the body's own frame.
+  /// What LiDARs see instead of `shape`, in the body's own frame; null: `shape`.
+  std::shared_ptr<const Assembly> look;
   float intensity = 0.0f;          ///< Of a solid's returns; surfels have their own.
   Motion motion;                   ///< Known at least from `from` until `until`.
   double speed_max = 0.0;          ///< Of its origin in that time, m/s.
@@ -43,6 +46,11 @@ inline double bounding_radius(const BodyShape& shape) {
   if (box.empty()) return 0.0;
   // bounds are of surfel centres; a surfel reaches 3 deviations of at most 1.8 r beyond
   return box.min.cwiseAbs().cwiseMax(box.max.cwiseAbs()).norm() + 6.7 * map.resolution();
+}
+
+/// The farthest point that LiDARs see of a body from its own origin, m.
+inline double visible_radius(const Body& body) {
+  return body.look ? bounding_radius(*body.look) : bounding_radius(body.shape);
 }
 
 }  // namespace pointflight

@@ -61,7 +61,7 @@ std::vector<Cone> cones_of(const RayBatch& batch) {
     if (first > last) continue;
     const SimTime middle = first + (last - first) / 2;
     const double moved = body.speed_max * to_seconds(last - middle);
-    const double radius = bounding_radius(body.shape) + moved + start.spread;
+    const double radius = visible_radius(body) + moved + start.spread;
     const Vector3d way = body.T_world_body(middle).translation - start.middle;
     const double distance = way.norm();
     if (distance - radius > static_cast<double>(batch.range_max)) continue;
@@ -178,18 +178,27 @@ bool is_nearer(float range, const Ray& ray, const Hit& hit) {
   return range <= ray.range_max && (!hit.is_return() || range < hit.range);
 }
 
+/// Where a ray meets what is exact of a body, in the body's frame.
+std::optional<SolidHit> meet_exact(const Body& body,
+                                   const Vector3d& origin,
+                                   const Vector3d& direction,
+                                   SimTime time) {
+  if (body.look) return intersect(*body.look, origin, direction, time);
+  return intersect(std::get<Solid>(body.shape), origin, direction);
+}
+
 void meet_solid(const RayBatch& batch,
                 const Body& body,
                 std::span<const std::uint32_t> rays,
                 std::span<Hit> hits) {
-  const Solid& solid = std::get<Solid>(body.shape);
   for (const std::uint32_t i : rays) {
     const SimTime time = batch.time_of(i);
     if (time < body.from || time >= body.until) continue;
     const Ray& ray = batch.rays[i];
     const Pose T_body_world = body.T_world_body(time).inverse();
     const Vector3d direction = T_body_world.rotation * ray.direction_world.cast<double>();
-    const auto met = intersect(solid, T_body_world * ray.origin_world, direction.normalized());
+    const auto met =
+        meet_exact(body, T_body_world * ray.origin_world, direction.normalized(), time);
     if (!met || !is_nearer(static_cast<float>(met->range), ray, hits[i])) continue;
     hits[i].range = static_cast<float>(met->range);
     hits[i].cos_incidence = static_cast<float>(std::abs(met->normal.dot(direction)));
@@ -241,7 +250,7 @@ void render_bodies(const RayBatch& batch, std::span<Hit> hits, const Executor& e
       candidates.clear();
       directions.within(cone, candidates);
       if (candidates.empty()) continue;
-      if (std::holds_alternative<Solid>(cone.body->shape)) {
+      if (cone.body->look || std::holds_alternative<Solid>(cone.body->shape)) {
         meet_solid(batch, *cone.body, candidates, hits);
       } else {
         meet_points(batch, *cone.body, candidates, hits);

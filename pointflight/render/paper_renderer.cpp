@@ -116,11 +116,11 @@ double radius_of(double cell_width) {
   return std::sqrt(3.0) / 2.0 * cell_width;
 }
 
-/// Points on the surface of a solid, about `spacing` apart (its frame). Their normals are not used.
-PaperPoints points_of(const Solid& solid, double spacing) {
+/// Points of a surface, `spacing` apart (the body's frame). Their normals are not used.
+PaperPoints surface_as_points(const std::vector<Vector3d>& surface, double spacing) {
   PaperPoints points;
   const auto radius = static_cast<float>(radius_of(spacing));
-  for (const Vector3d& p : surface_points(solid, spacing)) {
+  for (const Vector3d& p : surface) {
     points.add({p.cast<float>(), Vector3f::UnitZ(), false, 0.0f, radius});
   }
   return points;
@@ -188,7 +188,7 @@ class CellWidths {
   std::vector<std::uint64_t> voxels_;  // of the surfels, sorted
 };
 
-PaperPoints points_of(const SurfelMap& map, double gamma_threshold) {
+PaperPoints map_as_points(const SurfelMap& map, double gamma_threshold) {
   PaperPoints points;
   CellWidths(map).for_each_point(gamma_threshold,
                                  [&](const Vector3d& center, PaperPoints::Point point) {
@@ -276,6 +276,16 @@ void PaperRenderer::draw(const std::vector<std::size_t>& seen,
   }
 }
 
+PaperPoints PaperRenderer::points_of(const Body& body, SimTime time) const {
+  const double spacing = map_->resolution();
+  if (body.look) return surface_as_points(surface_points(*body.look, spacing, time), spacing);
+  if (const auto* solid = std::get_if<Solid>(&body.shape)) {
+    return surface_as_points(surface_points(*solid, spacing), spacing);
+  }
+  return map_as_points(*std::get<std::shared_ptr<const SurfelMap>>(body.shape),
+                       options_.gamma_threshold);
+}
+
 void PaperRenderer::draw_bodies(const RayBatch& batch,
                                 const Pose& T_sensor_world,
                                 PaperImage& image) const {
@@ -284,12 +294,8 @@ void PaperRenderer::draw_bodies(const RayBatch& batch,
     const Body& body = batch.bodies[number];
     if (batch.snapshot_time < body.from || batch.snapshot_time >= body.until) continue;
     const Pose T_sensor_body = T_sensor_world * body.T_world_body(batch.snapshot_time);
-    if (!may_see(image, T_sensor_body.translation, bounding_radius(body.shape))) continue;
-    const auto* solid = std::get_if<Solid>(&body.shape);
-    PaperPoints points = solid != nullptr
-                             ? points_of(*solid, map_->resolution())
-                             : points_of(*std::get<std::shared_ptr<const SurfelMap>>(body.shape),
-                                         options_.gamma_threshold);
+    if (!may_see(image, T_sensor_body.translation, visible_radius(body))) continue;
+    PaperPoints points = points_of(body, batch.snapshot_time);
     std::fill(points.intensity.begin(), points.intensity.end(), static_cast<float>(number));
     points.finish();
     std::vector<PaperSplat> splats;

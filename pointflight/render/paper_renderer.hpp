@@ -42,6 +42,8 @@ class PaperRenderer : public Renderer {
             PaperImage& image,
             const Executor& executor) const;
 
+  /// What is drawn of a body at an instant, in its own frame.
+  [[nodiscard]] PaperPoints points_of(const Body& body, SimTime time) const;
   /// The batch's bodies in an image of their own, whose intensities are their numbers.
   void draw_bodies(const RayBatch& batch, const Pose& T_sensor_world, PaperImage& image) const;
 

@@ -59,6 +59,7 @@ MountedLidar::MountedLidar(const LidarMount& mount,
       snapshot_(mount.snapshot),
       noise_(mount.noise),
       truth_(mount.truth),
+      own_airframe_(mount.own_airframe),
       known_(mount.mark_unknown ? &known_space_of(map) : nullptr),
       faults_(faults) {
   const Vector3d rpy = mount.rotation_rpy_deg * kDegree;

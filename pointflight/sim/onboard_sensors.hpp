@@ -83,6 +83,7 @@ class MountedLidar : public IntervalSensor {
   }
 
   [[nodiscard]] double reach() const override;
+  [[nodiscard]] bool sees_own_vehicle() const override { return own_airframe_; }
   [[nodiscard]] bool loses(std::int64_t index) const override;
   [[nodiscard]] Sample measure(const IntervalInput& input) const override;
 
@@ -94,6 +95,7 @@ class MountedLidar : public IntervalSensor {
   bool snapshot_;
   bool noise_;
   bool truth_;
+  bool own_airframe_;
   const KnownSpace* known_ = nullptr;  ///< Null: points are not marked.
   const Faults& faults_;
 };

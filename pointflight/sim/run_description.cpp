@@ -14,6 +14,7 @@ RunDescription describe_run(const Simulation& simulation) {
     vehicle.settings = agent.settings();
     vehicle.hull = agent.hull();
     vehicle.shape = agent.shape();
+    vehicle.look = agent.look();
     for (const MountedLidar* mounted : agent.lidars()) {
       vehicle.lidars.push_back({mounted->lidar().settings(), mounted->T_body_sensor()});
     }

@@ -22,7 +22,8 @@ struct VehicleDescription {
   VehicleSetup setup;                    ///< As the scenario has it, with a name.
   VehicleSettings settings;              ///< The vehicle file's, with the scenario's limits.
   Solid hull;                            ///< What must not touch anything, body frame.
-  BodyShape shape;                       ///< As LiDARs of others see it.
+  BodyShape shape;                       ///< The hull.
+  std::shared_ptr<const Assembly> look;  ///< What LiDARs see of it; null: the hull.
   std::vector<LidarDescription> lidars;  ///< In the order of the scenario.
   /// Kinds by `Measurement::sensor`; empty for odometry, IMU and LiDARs.
   std::vector<std::string> sensors;

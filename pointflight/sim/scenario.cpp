@@ -51,6 +51,10 @@ void describe_lidar(SettingsVisitor& v, LidarMount& s) {
            "points say whether their beams crossed space that no survey saw (a map made or fitted "
            "with `--scans`)"},
           s.mark_unknown);
+  v.value({"own_airframe",
+           "",
+           "it sees the vehicle that carries it: arms and propellers, and what they hide"},
+          s.own_airframe);
   v.value({"truth",
            "",
            "its files also say what the simulator knows of each point: true range, incidence, "

@@ -33,6 +33,7 @@ struct LidarMount {
   bool noise = true;                             ///< Of ranges and directions.
   std::int64_t sub_rays = -1;                    ///< `OpticsSettings::sub_rays`; -1: the file's.
   bool mark_unknown = false;  ///< Points say whether they came through space no survey saw.
+  bool own_airframe = false;  ///< It sees the vehicle that carries it.
   bool truth = false;         ///< Its files say `PointTruth` of each point.
 };
 

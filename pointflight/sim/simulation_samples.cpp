@@ -84,10 +84,11 @@ std::vector<Body> Simulation::bodies_for(std::size_t number,
   std::vector<Body> bodies = setup_->obstacles.near(
       own.at(middle).translation, sensor.reach() + moved + kBeamOrigin, from, until);
   for (std::size_t i = 0; i < vehicle_count(); ++i) {
-    if (i == number) continue;
+    if (i == number && !sensor.sees_own_vehicle()) continue;
     Body body;
     body.label = vehicle(i).label();
     body.shape = vehicle(i).shape();
+    body.look = vehicle(i).look();
     body.intensity = static_cast<float>(vehicle(i).settings().intensity);
     body.speed_max = tracks[i].speed_max(from, until);
     body.motion = tracks[i];

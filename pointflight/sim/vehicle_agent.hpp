@@ -165,7 +165,9 @@ class VehicleAgent {
   [[nodiscard]] const Mission& mission() const { return *mission_; }
   /// What must not touch anything; around the body's origin, m.
   [[nodiscard]] const Solid& hull() const { return hull_; }
-  /// The hull, as LiDARs of others see it.
+  /// What LiDARs see of it; null: its hull.
+  [[nodiscard]] const std::shared_ptr<const Assembly>& look() const { return look_; }
+  /// The hull.
   [[nodiscard]] const BodyShape& shape() const { return shape_; }
   /// In the order of the scenario.
   [[nodiscard]] const std::vector<const MountedLidar*>& lidars() const { return lidars_; }
@@ -217,6 +219,7 @@ class VehicleAgent {
   Faults faults_;
   Solid hull_;
   BodyShape shape_;
+  std::shared_ptr<const Assembly> look_;
   std::shared_ptr<const Mission> mission_;
   std::vector<TimedCommand> commands_;
   std::vector<MountedSensor> sensors_;

@@ -8,6 +8,7 @@
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/sim/vehicle_agent.hpp"
 #include "pointflight/vehicle/feasibility.hpp"
+#include "pointflight/vehicle/vehicle_shape.hpp"
 
 namespace pointflight {
 namespace {
@@ -70,6 +71,9 @@ VehicleAgent::VehicleAgent(const Scenario& scenario,
       faults_(setup.faults),
       hull_(dynamics_.settings().hull()),
       shape_(hull_),
+      look_(settings().airframe.seen_as_hull
+                ? nullptr
+                : std::make_shared<const Assembly>(assembly_of(settings()))),
       mission_(
           std::make_shared<Mission>(setup.start, setup.start_yaw_deg * kDegree, setup.mission)),
       state_schedule_(scenario.output.trajectory_rate) {

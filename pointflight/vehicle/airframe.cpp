@@ -128,6 +128,20 @@ void describe_vibration(SettingsVisitor& v, VibrationSettings& s) {
   v.value({"blades", "", "of each propeller", 1, 16}, s.blades);
 }
 
+void describe_looks(SettingsVisitor& v, AirframeSettings& s) {
+  v.value({"seen_as_hull", "", "LiDARs see the hull, as a solid"}, s.seen_as_hull);
+  v.only_if(!s.seen_as_hull, "seen_as_hull: false", [&](SettingsVisitor& w) {
+    w.value({"body_size", "m", "of the box in the middle", 0, 10}, s.body_size);
+    w.value({"body_center", "m", "of the box, in the body frame", -10, 10}, s.body_center);
+    w.value({"arm_radius", "m", "of the arms, one for each rotor", 0, 1}, s.arm_radius);
+    w.value({"propeller_radius", "m", "0: rotor.radius; without that no propellers", 0, 10},
+            s.propeller_radius);
+    w.value({"blade_chord", "m", "width of the propellers' blades (vibration.blades)", 0, 1},
+            s.blade_chord);
+    w.value({"blade_pitch_deg", "deg", "of the blades against the disc", 0, 80}, s.blade_pitch_deg);
+  });
+}
+
 void describe_battery(SettingsVisitor& v, BatterySettings& b) {
   v.value({"cells", "", "in series; 0: full power for ever", 0, 24}, b.cells);
   v.only_if(b.cells > 0.0, "cells above 0", [&](SettingsVisitor& w) {
@@ -260,6 +274,8 @@ void describe(SettingsVisitor& v, VehicleSettings& s) {
             [&](SettingsVisitor& w) { describe_vibration(w, s.vibration); });
   v.section({"battery", "", "LiPo; flown with where the scenario says so"},
             [&](SettingsVisitor& w) { describe_battery(w, s.battery); });
+  v.section({"airframe", "", "what LiDARs see of it; what is 0 follows from where the rotors sit"},
+            [&](SettingsVisitor& w) { describe_looks(w, s.airframe); });
 }
 
 void make_legacy(VehicleSettings& settings) {
@@ -276,6 +292,7 @@ void make_legacy(VehicleSettings& settings) {
   settings.imu.part.clear();
   settings.imu.part_errors.reset();
   settings.vibration = {};
+  settings.airframe.seen_as_hull = true;
   settings.rotor.advance_ratios.clear();
   settings.rotor.thrust_shares.clear();
   settings.rotor.torque_shares.clear();

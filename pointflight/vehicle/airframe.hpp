@@ -127,6 +127,17 @@ enum class CommandLevel {
   kPosition,      ///< m
 };
 
+/// What it looks like to LiDARs (`assembly_of`); what is 0 follows from where the rotors sit.
+struct AirframeSettings {
+  bool seen_as_hull = false;                ///< LiDARs see its hull, as a solid, instead.
+  Vector3d body_size = Vector3d::Zero();    ///< Of the box in the middle, m.
+  Vector3d body_center = Vector3d::Zero();  ///< Of the box, body frame, m.
+  double arm_radius = 0.0;                  ///< m
+  double propeller_radius = 0.0;            ///< m; 0: `rotor.radius`.
+  double blade_chord = 0.0;                 ///< Their width, m.
+  double blade_pitch_deg = 14.0;            ///< Against the disc.
+};
+
 /// A vehicle file, `data/vehicles/<name>.yaml`.
 struct VehicleSettings {
   std::string path;                              ///< Of the file, for messages.
@@ -149,8 +160,9 @@ struct VehicleSettings {
   ImuSettings imu;                ///< One on each vehicle.
   VibrationSettings vibration;    ///< At hover speed; grows with the square of the rotors'.
   BatterySettings battery;        ///< Without cells: none.
+  AirframeSettings airframe;      ///< What LiDARs see.
 
-  /// What must stay free of everything, and what others see of it; around the body's origin.
+  /// What must stay free of everything; around the body's origin.
   [[nodiscard]] Solid hull() const;
 
   [[nodiscard]] double hover_speed() const;  ///< rad/s of each rotor.
