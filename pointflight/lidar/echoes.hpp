@@ -26,7 +26,7 @@ struct BeamPart {
   float reflectivity = 0.0f;  ///< Of the surface, times the cosine of the incidence.
   float intensity = 0.0f;     ///< The map's.
   Label label = kMapLabel;    ///< What it is of.
-  Origin origin;              ///< Of itself.
+  Origin origin{};            ///< Of itself.
   /// It met something.
   [[nodiscard]] bool is_return() const { return range >= 0.0f; }
 };
@@ -39,7 +39,7 @@ struct Echo {
   Label label = kMapLabel;    ///< Of the part that gave most.
   std::uint16_t parts = 0;    ///< How many.
   float depth = 0.0f;         ///< From the nearest to the farthest part, m.
-  Origin origin;              ///< The part that gave most.
+  Origin origin{};            ///< The part that gave most.
   /// It comes from somewhere.
   [[nodiscard]] bool is_return() const { return range >= 0.0f; }
 };

@@ -55,7 +55,7 @@ struct Return {
   Label label = kMapLabel;   ///< Of a false one, `kFalseReturn`: nothing, fog, dust or a drop.
   float true_range = -1.0f;  ///< m, without noise and rounding.
   double strength = 0.0;     ///< Of the signal, in the unit of `Weather::target`.
-  Origin origin;             ///< Of what gave most of it.
+  Origin origin{};           ///< Of what gave most of it.
   std::uint16_t parts = 0;   ///< `Echo::parts`; 0 of a false one.
   float depth = 0.0f;        ///< `Echo::depth`
   /// It is one.
