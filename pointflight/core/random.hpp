@@ -36,6 +36,7 @@ enum class StreamId : std::uint32_t {
   kLidarEcho = 26,        ///< entity: echo << 28 | vehicle << 8 | lidar, index as above
   kOdometry = 27,         ///< entity: vehicle, index: report * 9 + draw
   kNavigation = 28,       ///< entity: vehicle << 8 | sensor, index: measurement * 12 + draw
+  kStereo = 29,           ///< of windows; entity: vehicle << 8 | lidar, index: scan << 32 | node
   kTest = 1000,           ///< inputs of tests and benchmarks
 };
 

@@ -122,7 +122,9 @@ Lidar::Lidar(const LidarSettings& settings,
       footprint_(settings.optics),
       measures_depth_(settings.pattern == ScanPattern::kGrid &&
                       settings.grid.projection == GridProjection::kPinhole) {
-  if (surroundings) returns_.emplace(settings, *surroundings);
+  if (!surroundings) return;
+  returns_.emplace(settings, *surroundings);
+  if (measures_depth_ && settings.grid.stereo.baseline > 0.0) stereo_.emplace(settings);
 }
 
 /// What a beam's range times this is what the sensor measures and its limits are of: depth along
@@ -299,6 +301,24 @@ std::vector<Return> Lidar::noisy_ranges(const ScanRequest& request,
   return returns;
 }
 
+/// The same of a stereo camera.
+std::vector<Return> Lidar::depths_of(const ScanRequest& request,
+                                     std::span<const Beam> beams,
+                                     std::span<const Hit> hits,
+                                     const Executor& executor) const {
+  std::vector<float> shares(beams.size());
+  for (std::size_t i = 0; i < beams.size(); ++i) shares[i] = depth_share(beams[i]);
+  const RandomStream pixels(request.seed, StreamId::kLidarRangeNoise, sensor_);
+  const RandomStream windows(request.seed, StreamId::kStereo, sensor_);
+  std::vector<Return> returns =
+      stereo_->measure(hits, shares, {pixels, windows, request.index, request.noise}, executor);
+  for (std::size_t i = 0; i < returns.size(); ++i) {
+    returns[i].range /= shares[i];
+    returns[i].true_range /= shares[i];
+  }
+  return returns;
+}
+
 /// Renders the beams and measures what comes back: as many places per beam as it may have returns.
 std::vector<Return> Lidar::measured(const ScanRequest& request,
                                     std::span<const Beam> beams,
@@ -315,6 +335,7 @@ std::vector<Return> Lidar::measured(const ScanRequest& request,
   std::vector<Hit> hits(beams.size());
   renderer.render(batch, hits, executor);
   if (!returns_) return noisy_ranges(request, beams, hits, executor);
+  if (stereo_) return depths_of(request, beams, hits, executor);
   for (std::size_t i = 0; i < hits.size(); ++i) {
     if (!hits[i].is_return()) continue;
     echoes[i].all[0] = returns_->echo_of(hits[i]);

@@ -11,6 +11,7 @@
 #include "pointflight/lidar/return_model.hpp"
 #include "pointflight/lidar/scan.hpp"
 #include "pointflight/lidar/scan_beams.hpp"
+#include "pointflight/lidar/stereo.hpp"
 #include "pointflight/map/known_space.hpp"
 #include "pointflight/render/renderer.hpp"
 
@@ -90,6 +91,10 @@ class Lidar {
                                                  std::span<const Beam> beams,
                                                  std::span<const Hit> hits,
                                                  const Executor& executor) const;
+  [[nodiscard]] std::vector<Return> depths_of(const ScanRequest& request,
+                                              std::span<const Beam> beams,
+                                              std::span<const Hit> hits,
+                                              const Executor& executor) const;
   [[nodiscard]] std::vector<Return> measured(const ScanRequest& request,
                                              std::span<const Beam> beams,
                                              const WorldBeams& world,
@@ -104,6 +109,7 @@ class Lidar {
   std::shared_ptr<const ScanBeams> beams_;
   std::optional<ReturnModel> returns_;
   Footprint footprint_;
+  std::optional<StereoCamera> stereo_;
   bool measures_depth_ = false;  ///< Limits and noise are of the depth along the axis.
 };
 

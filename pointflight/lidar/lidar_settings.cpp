@@ -97,6 +97,22 @@ void describe_rings(SettingsVisitor& v, RingsSettings& s) {
   });
 }
 
+void describe_stereo(SettingsVisitor& v, StereoSettings& s) {
+  v.value({"baseline", "m", "distance of the right imager; 0: depths are measured as such", 0, 10},
+          s.baseline);
+  v.only_if(s.baseline > 0.0, "with a baseline", [&](SettingsVisitor& w) {
+    w.value({"disparity_sigma", "px", "of the disparity's noise", 0, 100}, s.disparity_sigma);
+    w.value({"white_share", "", "of the noise that each pixel has of its own", 0, 1},
+            s.white_share);
+    w.value({"window", "px", "the rest is common to so many, across and down", 1, 1000}, s.window);
+    w.value({"disparities", "px", "the largest that is looked for", 1, 16384}, s.disparities);
+    w.value({"disparity_steps", "1/px", "disparities are whole multiples; 0: not rounded", 0, 1024},
+            s.disparity_steps);
+    w.value({"incidence_max_deg", "deg", "surfaces seen at more have no depth", 0, 90},
+            s.incidence_max_deg);
+  });
+}
+
 void describe_grid(SettingsVisitor& v, GridSettings& s) {
   v.choice({"projection", "", "how rows and columns lie"}, s.projection, kProjections);
   v.value({"columns", "", "beams in a row", 1, 16384}, s.columns);
@@ -112,6 +128,8 @@ void describe_grid(SettingsVisitor& v, GridSettings& s) {
         w.value({"fy", "px", "focal length", 0, 1e6}, s.fy);
         w.value({"cx", "px", "principal point", -1e5, 1e5}, s.cx);
         w.value({"cy", "px", "principal point", -1e5, 1e5}, s.cy);
+        w.section({"stereo", "", "of two imagers, this grid the left one; not in legacy runs"},
+                  [&](SettingsVisitor& u) { describe_stereo(u, s.stereo); });
       });
 }
 

@@ -85,6 +85,17 @@ struct RingsSettings {
   double origin_z = 0.0;            ///< ouster: height of the beams' origin in the sensor frame, m.
 };
 
+/// A stereo pair of which a pinhole grid is the left imager (`StereoCamera`).
+struct StereoSettings {
+  double baseline = 0.0;  ///< The right imager's distance, m; 0: depths are measured as such.
+  double disparity_sigma = 0.08;  ///< Of the disparity's noise, px.
+  double white_share = 0.3;  ///< Of that, what each pixel has of its own; the rest is common...
+  std::int64_t window = 7;   ///< ... to so many pixels across and down.
+  std::int64_t disparities = 126;     ///< The matcher's largest, px.
+  std::int64_t disparity_steps = 32;  ///< Of each pixel that it tells apart; 0: it does not round.
+  double incidence_max_deg = 75.0;    ///< Surfaces seen at more have no depth.
+};
+
 /// Depth cameras and dense angular grids: all beams at the scan's start.
 struct GridSettings {
   GridProjection projection = GridProjection::kAngular;  ///< Between beams.
@@ -96,6 +107,7 @@ struct GridSettings {
   double fy = 0.0;                   ///< pinhole: focal length along the rows' axis, pixels.
   double cx = 0.0;                   ///< pinhole: principal point, pixels.
   double cy = 0.0;                   ///< pinhole: principal point, pixels.
+  StereoSettings stereo{};           ///< pinhole: what measures the depth.
 };
 
 /// A user's own table of directions, replayed in a loop.

@@ -55,8 +55,6 @@ class InstantSensor : public Sensor {
   /// a whole.
   [[nodiscard]] virtual std::any memory_at_start() const { return {}; }
 
-  /// True where the bodies of its input include the vehicle that carries it.
-  [[nodiscard]] virtual bool sees_own_vehicle() const { return false; }
   /// True where a measurement comes to nothing: it is not made.
   [[nodiscard]] virtual bool loses(std::int64_t /*index*/) const { return false; }
 
@@ -85,6 +83,8 @@ class IntervalSensor : public Sensor {
   using Sensor::Sensor;
   /// How far from the body's origin it can see anything, m.
   [[nodiscard]] virtual double reach() const = 0;
+  /// True where the bodies of its input include the vehicle that carries it.
+  [[nodiscard]] virtual bool sees_own_vehicle() const { return false; }
   /// True where a measurement comes to nothing: it is not made.
   [[nodiscard]] virtual bool loses(std::int64_t /*index*/) const { return false; }
   /// One measurement. Called from any thread.
