@@ -11,6 +11,7 @@ void add_scan_command(CLI::App& app, int& exit_code);
 void add_fly_command(CLI::App& app, int& exit_code);
 void add_scenario_command(CLI::App& app, int& exit_code);
 void add_lidar_command(CLI::App& app, int& exit_code);
+void add_lidar_fit_command(CLI::App& lidar);
 void add_vehicle_command(CLI::App& app, int& exit_code);
 void add_picture_command(CLI::App& app, int& exit_code);
 void add_compare_command(CLI::App& app, int& exit_code);

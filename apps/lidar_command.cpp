@@ -124,6 +124,7 @@ void show_lidar(const LidarFlags& flags) {
 void add_lidar_command(CLI::App& parent, int& /*exit_code*/) {
   auto* app = parent.add_subcommand("lidar", "Sensors: a YAML file each");
   app->require_subcommand(1);
+  app->alias("sensor");
   auto flags = std::make_shared<LidarFlags>();
   auto* list = app->add_subcommand("list", "Names of the shipped sensors");
   list->add_flag("--json", flags->json, "JSON on stdout");
@@ -141,6 +142,7 @@ void add_lidar_command(CLI::App& parent, int& /*exit_code*/) {
   show->add_flag("--json", flags->json, "JSON on stdout");
   show->add_flag("--path", flags->path, "Say where its file lies, to copy it");
   show->callback([flags] { show_lidar(*flags); });
+  add_lidar_fit_command(*app);
   auto* keys = app->add_subcommand(
       "keys", "All keys of a sensor file as a Markdown table (docs/sensors.md)");
   keys->callback([] { print_reference(lidar_reference()); });

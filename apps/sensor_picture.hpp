@@ -3,6 +3,7 @@
 #include <string>
 
 #include "pointflight/fidelity/sensor_comparison.hpp"
+#include "pointflight/fit/sensor_fit.hpp"
 
 namespace pointflight::apps {
 
@@ -11,5 +12,9 @@ namespace pointflight::apps {
 void draw_sensor_comparison(const SensorComparison& comparison,
                             const std::string& title,
                             const std::string& path);
+
+/// Noise by range and incidence, and what the fitted figures give. Throws InputError if it cannot
+/// be written.
+void draw_sensor_fit(const SensorFit& fit, const std::string& title, const std::string& path);
 
 }  // namespace pointflight::apps

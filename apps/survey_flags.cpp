@@ -41,30 +41,34 @@ std::vector<std::string> recordings_in(const std::string& folder) {
   return paths;
 }
 
-RecordingOpener recording_opener(const std::string& path, const std::vector<std::string>& paths) {
+}  // namespace
+
+std::optional<RecordingOpener> recording_of(const std::string& path) {
+  std::error_code ignored;
+  std::vector<std::string> paths = {path};
+  if (fs::is_directory(path, ignored)) {
+    paths = recordings_in(path);
+    if (paths.empty()) return std::nullopt;
+  }
   if (path.ends_with(".bag")) {
     require_regular_file(path);
     return [path](const std::vector<std::string>& topics) {
       return ros1_module().bag_messages(path, topics);
     };
   }
+  if (!paths.front().ends_with(".mcap")) {
+    throw InputError(
+        fmt::format("{}: is no folder of clouds and no recording (.bag, .mcap)", path));
+  }
   return [paths](const std::vector<std::string>&) { return open_mcap(paths); };
 }
-
-}  // namespace
 
 std::unique_ptr<SurveySource> open_survey(const FitFlags& flags, const Progress& progress) {
   SurveyFiles files = flags.files;
   std::optional<Pose> T_pose_sensor;
   if (!flags.sensor_pose.empty()) T_pose_sensor = parse_pose(flags.sensor_pose, "--sensor-pose");
-  std::vector<std::string> recordings;
-  std::error_code ignored;
-  if (fs::is_directory(files.scans, ignored)) {
-    recordings = recordings_in(files.scans);
-  } else {
-    recordings = {files.scans};
-  }
-  if (recordings.empty()) {
+  const auto recording = recording_of(files.scans);
+  if (!recording) {
     if (files.poses.empty()) throw InputError("--scans: a folder of clouds wants --poses");
     if (!flags.scan_topic.empty() || !flags.pose_topic.empty()) {
       throw InputError("--scan-topic and --pose-topic are for bags and MCAP files");
@@ -72,13 +76,8 @@ std::unique_ptr<SurveySource> open_survey(const FitFlags& flags, const Progress&
     files.T_pose_sensor = T_pose_sensor.value_or(Pose{});
     return std::make_unique<SurveyFolder>(std::move(files));
   }
-  const bool is_recording = files.scans.ends_with(".bag") || recordings.front().ends_with(".mcap");
-  if (!is_recording) {
-    throw InputError(
-        fmt::format("{}: is no folder of clouds and no recording (.bag, .mcap)", files.scans));
-  }
   if (!files.free.empty()) throw InputError("--free: is for folders of scans");
-  auto survey = std::make_unique<RecordedSurvey>(recording_opener(files.scans, recordings),
+  auto survey = std::make_unique<RecordedSurvey>(*recording,
                                                  RecordedSurveyOptions{files.scans,
                                                                        flags.scan_topic,
                                                                        flags.pose_topic,

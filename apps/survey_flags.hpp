@@ -9,6 +9,7 @@
 #include "pointflight/fit/map_fit.hpp"
 #include "pointflight/fit/survey_files.hpp"
 #include "pointflight/fit/survey_map.hpp"
+#include "recording/recorded_survey.hpp"
 
 namespace pointflight::apps {
 
@@ -27,6 +28,10 @@ struct FitFlags {
 /// --scans, --poses, --scan-topic, --pose-topic, --sensor-pose, --free, --deskewed, --leak-weight,
 /// --export-ghosts, --signal-of, --signal-limit.
 void add_fit_flags(CLI::App& app, FitFlags& flags, bool required);
+
+/// How to open a recording: a .bag, a .mcap, a folder of .mcap; nothing where `path` is a folder
+/// without any. Throws InputError where it is neither a folder nor a recording.
+std::optional<RecordingOpener> recording_of(const std::string& path);
 
 /// The survey of --scans: a folder of clouds, a recording or a folder of MCAP files. Throws
 /// InputError.

@@ -286,6 +286,42 @@ std::string chosen_topic(const Topics& topics,
 
 }  // namespace
 
+std::vector<RecordedScan> read_recorded_scans(const RecordingOpener& opener,
+                                              const std::string& name,
+                                              const std::string& cloud_topic,
+                                              std::size_t most,
+                                              const Progress& progress) {
+  std::map<std::string, std::vector<RecordedScan>> scans;  // by topic
+  const auto messages =
+      opener(cloud_topic.empty() ? std::vector<std::string>() : std::vector{cloud_topic});
+  Recorded message;
+  for (std::uint64_t i = 0; messages->next(message); ++i) {
+    if (i % 64 == 0) report(progress, "reading scans", messages->share_read());
+    if (!is_cloud(message.type)) continue;
+    if (!cloud_topic.empty() && message.topic != cloud_topic) continue;
+    std::vector<RecordedScan>& of_topic = scans[excerpt(message.topic, kLongest)];
+    if (of_topic.size() == most) {
+      if (!cloud_topic.empty()) break;  // enough; else another topic may follow
+      continue;
+    }
+    const StampedCloud cloud = cloud_in(messages->wire(), message, name);
+    RecordedScan& scan = of_topic.emplace_back();
+    scan.time = to_seconds(cloud.time);
+    double first = std::numeric_limits<double>::infinity();
+    for (const CloudMessagePoint& p : cloud.content.points) {
+      if (std::isfinite(p.time)) first = std::min(first, p.time);
+    }
+    for (const CloudMessagePoint& p : cloud.content.points) {
+      if (p.position.isZero(0.0)) continue;  // drivers say so: no return
+      // from the first point on: times since 1970 would lose their last digits further on
+      scan.points.push_back({p.position.cast<float>(), p.ring, p.time - first});
+    }
+  }
+  const std::string topic =
+      chosen_topic(scans, cloud_topic, name, "clouds (PointCloud2, CustomMsg)", "--scan-topic");
+  return std::move(scans.at(topic));
+}
+
 RecordedSurvey::RecordedSurvey(RecordingOpener opener,
                                RecordedSurveyOptions options,
                                const Progress& progress)

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "pointflight/core/progress.hpp"
+#include "pointflight/fit/recorded_scans.hpp"
 #include "pointflight/fit/survey_poses.hpp"
 #include "pointflight/fit/survey_rays.hpp"
 #include "ros_common/wire.hpp"
@@ -31,6 +32,14 @@ struct RecordedSurveyOptions {
   std::optional<Pose> T_pose_sensor;
   bool is_deskewed = false;  ///< Times of points are left aside.
 };
+
+/// The first `most` clouds of a recording on a topic (empty: the only one), whatever their frame.
+/// `name`: of the recording, for messages. Throws InputError.
+std::vector<RecordedScan> read_recorded_scans(const RecordingOpener& opener,
+                                              const std::string& name,
+                                              const std::string& cloud_topic,
+                                              std::size_t most,
+                                              const Progress& progress = {});
 
 /// The scans of a recording whose times the poses reach. Points of clouds in the poses' own fixed
 /// frame (FAST-LIO's `cloud_registered`) stay where they are, and the poses say where their rays

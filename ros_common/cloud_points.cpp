@@ -107,6 +107,7 @@ CloudMessagePoints points_of(const msg::PointCloud2& cloud) {
   }
   const auto* intensity = field_of(cloud, {"intensity", "reflectivity", "i"});
   const auto* time = field_of(cloud, {"t", "time", "timestamp", "time_stamp", "offset_time"});
+  const auto* ring = field_of(cloud, {"ring", "line", "channel"});
   const bool is_whole =
       time != nullptr && time->datatype != Type::kFloat32 && time->datatype != Type::kFloat64;
   found.has_intensity = intensity != nullptr;
@@ -118,6 +119,10 @@ CloudMessagePoints points_of(const msg::PointCloud2& cloud) {
       CloudMessagePoint& point = found.points.emplace_back();
       for (int axis = 0; axis < 3; ++axis) point.position[axis] = number_of(at, *xyz[axis]);
       if (intensity != nullptr) point.intensity = static_cast<float>(number_of(at, *intensity));
+      if (ring != nullptr) {
+        const double number = number_of(at, *ring);
+        point.ring = number >= 0.0 && number < 65536.0 ? static_cast<std::int32_t>(number) : -1;
+      }
       if (time != nullptr) point.time = seconds_of(number_of(at, *time), is_whole);
     }
   }
@@ -132,7 +137,8 @@ CloudMessagePoints points_of(const msg::CustomMsg& cloud) {
   for (const msg::CustomPoint& p : cloud.points) {
     const Vector3d position(
         static_cast<double>(p.x), static_cast<double>(p.y), static_cast<double>(p.z));
-    found.points.push_back({position, static_cast<float>(p.reflectivity), 1e-9 * p.offset_time});
+    found.points.push_back(
+        {position, static_cast<float>(p.reflectivity), 1e-9 * p.offset_time, p.line});
   }
   return found;
 }

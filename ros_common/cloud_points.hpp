@@ -1,6 +1,7 @@
 // Points of clouds that others send: PointCloud2 of any layout, Livox' own message.
 #pragma once
 
+#include <cstdint>
 #include <limits>
 #include <vector>
 
@@ -15,6 +16,7 @@ struct CloudMessagePoint {
   float intensity = 0.0f;                ///< In its own scale; 0 without.
   /// After the cloud's stamp or since 1970, s; NaN where it has none.
   double time = std::numeric_limits<double>::quiet_NaN();
+  std::int32_t ring = -1;  ///< ring, line, channel; -1 where it has none.
 };
 
 /// The points of a cloud, all of them, and what they carry.

@@ -41,7 +41,19 @@ void sort_names(std::vector<std::string>& names) {
   });
 }
 
-std::vector<std::string> clouds_of(const std::string& folder, const std::string& poses) {
+/// Throws where no scan has a cloud of shots without a return.
+void check_free(const SurveyFiles& files, const std::vector<std::string>& scans) {
+  if (files.free.empty()) return;
+  for (const std::string& scan : scans) {
+    std::error_code ignored;
+    if (fs::is_regular_file(fs::path(files.free) / scan, ignored)) return;
+  }
+  throw InputError(fmt::format("{}: no cloud under a scan's name", files.free));
+}
+
+}  // namespace
+
+std::vector<std::string> scan_files_in(const std::string& folder, const std::string& except) {
   constexpr std::array kExtensions = {".pcd", ".ply", ".las", ".xyz", ".csv", ".asc", ".pts"};
   std::vector<std::string> names;
   std::error_code error;
@@ -55,7 +67,7 @@ std::vector<std::string> clouds_of(const std::string& folder, const std::string&
     const bool is_cloud =
         std::find(kExtensions.begin(), kExtensions.end(), extension) != kExtensions.end();
     if (!is_cloud || !at->is_regular_file(ignored)) continue;
-    if (fs::equivalent(at->path(), poses, ignored)) continue;
+    if (fs::equivalent(at->path(), except, ignored)) continue;
     names.push_back(at->path().filename().string());
   }
   if (error) throw InputError(fmt::format("{}: {}", folder, error.message()));
@@ -63,18 +75,6 @@ std::vector<std::string> clouds_of(const std::string& folder, const std::string&
   sort_names(names);
   return names;
 }
-
-/// Throws where no scan has a cloud of shots without a return.
-void check_free(const SurveyFiles& files, const std::vector<std::string>& scans) {
-  if (files.free.empty()) return;
-  for (const std::string& scan : scans) {
-    std::error_code ignored;
-    if (fs::is_regular_file(fs::path(files.free) / scan, ignored)) return;
-  }
-  throw InputError(fmt::format("{}: no cloud under a scan's name", files.free));
-}
-
-}  // namespace
 
 /// One scan after the other, its returns and then its shots without one.
 class SurveyFolderReader : public SurveyReader {
@@ -171,7 +171,7 @@ SurveyFolder::SurveyFolder(SurveyFiles files)
 void SurveyFolder::match_scans() {
   const std::vector<TimedPose>& poses = trajectory_.poses;
   const std::vector<std::string> names =
-      trajectory_.files.empty() ? clouds_of(files_.scans, files_.poses) : trajectory_.files;
+      trajectory_.files.empty() ? scan_files_in(files_.scans, files_.poses) : trajectory_.files;
   check_free(files_, names);
   if (names.size() == poses.size()) {
     for (std::size_t i = 0; i < names.size(); ++i) scans_.push_back({names[i], poses[i].time});

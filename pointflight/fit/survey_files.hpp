@@ -25,6 +25,10 @@ struct SurveyFiles {
   Pose T_pose_sensor = {};  ///< Where the sensor is in the frame that the poses are of.
 };
 
+/// Names of the clouds of a folder, by the numbers that they are, where all are, else as text;
+/// without the file `except`. Throws InputError, also where there are none.
+std::vector<std::string> scan_files_in(const std::string& folder, const std::string& except = {});
+
 /// A survey in a folder. Which pose is which scan's: by the file's ninth column; else as many poses
 /// as there are clouds in the folder, in the order of their names (numbers by size); else the names
 /// of the clouds are their times (s or ns) and the poses a trajectory. Points with times of their

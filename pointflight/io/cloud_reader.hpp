@@ -54,6 +54,10 @@ class CloudReader {
   /// not say. By the field's own zero: the scan's start, or the epoch.
   [[nodiscard]] virtual std::span<const double> times() const { return {}; }
 
+  /// Numbers of the channels that measured the points of the last batch; empty where the file does
+  /// not say.
+  [[nodiscard]] virtual std::span<const std::int32_t> rings() const { return {}; }
+
   /// The unit that the file's header or its first comments name; nothing where they name none.
   [[nodiscard]] virtual std::optional<FileUnit> unit() const { return std::nullopt; }
 

@@ -53,6 +53,10 @@ class PcdReader : public CloudReader {
       const PcdColumn* field = find(name);
       if (field != nullptr && !time_) time_ = *field;
     }
+    for (const char* name : {"ring", "line", "channel"}) {
+      const PcdColumn* field = find(name);
+      if (field != nullptr && !ring_) ring_ = *field;
+    }
     if (header_.encoding == PcdEncoding::kAscii) {
       lines_.emplace(as_text(file_.bytes()).substr(header_.data_offset));
     } else if (header_.encoding == PcdEncoding::kBinary) {
@@ -66,6 +70,7 @@ class PcdReader : public CloudReader {
   bool read(std::vector<CloudPoint>& batch) override {
     batch.clear();
     times_.clear();
+    rings_.clear();
     const std::uint64_t count = std::min<std::uint64_t>(kBatch, header_.points - next_);
     if (header_.encoding == PcdEncoding::kAscii) {
       read_ascii(count, batch);
@@ -79,6 +84,7 @@ class PcdReader : public CloudReader {
   [[nodiscard]] bool has_intensity() const override { return intensity_.has_value(); }
   [[nodiscard]] bool has_color() const override { return color_.has_value(); }
   [[nodiscard]] std::span<const double> times() const override { return times_; }
+  [[nodiscard]] std::span<const std::int32_t> rings() const override { return rings_; }
   [[nodiscard]] std::optional<FileUnit> unit() const override { return header_.unit; }
   [[nodiscard]] double share_read() const override {
     return header_.points == 0 ? 1.0
@@ -140,6 +146,7 @@ class PcdReader : public CloudReader {
     if (intensity_) to_columns(*intensity_);
     if (color_) to_columns(*color_);
     if (time_) to_columns(*time_);
+    if (ring_) to_columns(*ring_);
   }
 
   /// In unpacked data `offset` is where the field's column starts.
@@ -173,6 +180,11 @@ class PcdReader : public CloudReader {
     return time_->type != 'F' || std::abs(value) > kSecondsEnd ? 1e-9 * value : value;
   }
 
+  /// -1 where it is none.
+  static std::int32_t ring_of(double value) {
+    return value >= 0.0 && value < 65536.0 ? static_cast<std::int32_t>(value) : -1;
+  }
+
   void read_binary(std::uint64_t count, std::vector<CloudPoint>& batch) {
     batch.resize(count);
     for (std::uint64_t i = 0; i < count; ++i) {
@@ -185,6 +197,7 @@ class PcdReader : public CloudReader {
         batch[i].color = unpack_color(load<std::uint32_t>(place_of(next_ + i, *color_)));
       }
       if (time_) times_.push_back(seconds_of(binary_number(next_ + i, *time_)));
+      if (ring_) rings_.push_back(ring_of(binary_number(next_ + i, *ring_)));
     }
     if (header_.encoding == PcdEncoding::kBinary) {
       file_.release_before(header_.data_offset + (next_ + count) * header_.point_size);
@@ -219,6 +232,7 @@ class PcdReader : public CloudReader {
       if (intensity_) point.intensity = static_cast<float>(words_[intensity_->offset]);
       if (color_) point.color = unpack_color(color_bits(words_[color_->offset]));
       if (time_) times_.push_back(seconds_of(words_[time_->offset]));
+      if (ring_) rings_.push_back(ring_of(words_[ring_->offset]));
     }
   }
 
@@ -233,10 +247,12 @@ class PcdReader : public CloudReader {
   std::optional<PcdColumn> intensity_;
   std::optional<PcdColumn> color_;
   std::optional<PcdColumn> time_;
+  std::optional<PcdColumn> ring_;
   std::optional<LineCursor> lines_;
   std::vector<std::byte> unpacked_;
   std::vector<double> words_;
   std::vector<double> times_;
+  std::vector<std::int32_t> rings_;
   std::uint64_t next_ = 0;
 };
 
