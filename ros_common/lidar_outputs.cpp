@@ -50,6 +50,21 @@ msg::Image depth_image(const OutputStream& stream, const ScanSample& sample) {
   return image;
 }
 
+/// Where a scan has one.
+class Infrared : public Output {
+ public:
+  using Output::Output;
+  void on_sample(const Sample& sample) override {
+    const auto* scanned = std::get_if<ScanSample>(&sample);
+    if (scanned == nullptr || !stream_.is_about(*scanned)) return;
+    const Scan& scan = *scanned->scan;
+    if (scan.infrared.empty() || !stream_.is_due(scan.end)) return;
+    msg::Image image = infrared_image_of(scan, stream_.of_lidar().settings);
+    image.header = stream_.header(cloud_time(scan, false));
+    stream_.send(image, scan.end);
+  }
+};
+
 msg::CameraInfo camera_info(const OutputStream& stream, const ScanSample& sample) {
   msg::CameraInfo info = camera_info_of(stream.of_lidar().settings);
   info.header = stream.header(cloud_time(*sample.scan, false));
@@ -106,6 +121,14 @@ std::vector<OutputType> lidar_outputs() {
        .per = kLidar,
        .frame = Frame::kOptical,
        .cameras = Cameras::kRather,
+       .large = true,
+       .depth = 5},
+      {.name = "infrared",
+       .help = "infrared picture of a depth camera, mono8; not in legacy runs",
+       .make = made_by<Infrared, msg::Image>(),
+       .per = kLidar,
+       .frame = Frame::kOptical,
+       .cameras = Cameras::kOnly,
        .large = true,
        .depth = 5},
       {.name = "camera_info",

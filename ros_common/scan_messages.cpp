@@ -110,6 +110,16 @@ msg::Image depth_image_of(const Scan& scan, const LidarSettings& lidar) {
   return image;
 }
 
+msg::Image infrared_image_of(const Scan& scan, const LidarSettings& lidar) {
+  msg::Image image;
+  image.width = static_cast<std::uint32_t>(lidar.grid.columns);
+  image.height = static_cast<std::uint32_t>(lidar.grid.rows);
+  image.encoding = "mono8";
+  image.step = image.width;
+  image.data = scan.infrared;
+  return image;
+}
+
 msg::CameraInfo camera_info_of(const LidarSettings& lidar) {
   msg::CameraInfo info;
   if (!is_camera(lidar)) return info;

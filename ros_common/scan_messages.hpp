@@ -23,6 +23,9 @@ msg::Image depth_image_of(const Scan& scan, const LidarSettings& lidar);
 /// True for sensors whose picture has a camera matrix.
 bool is_camera(const LidarSettings& lidar);
 
+/// `Scan::infrared` of a depth camera as mono8.
+msg::Image infrared_image_of(const Scan& scan, const LidarSettings& lidar);
+
 /// Camera matrix of a pinhole camera; a picture of zero size for other sensors.
 msg::CameraInfo camera_info_of(const LidarSettings& lidar);
 

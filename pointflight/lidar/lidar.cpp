@@ -319,29 +319,59 @@ std::vector<Return> Lidar::depths_of(const ScanRequest& request,
   return returns;
 }
 
-/// Renders the beams and measures what comes back: as many places per beam as it may have returns.
-std::vector<Return> Lidar::measured(const ScanRequest& request,
-                                    std::span<const Beam> beams,
-                                    const WorldBeams& world,
-                                    const RayBatch& batch,
-                                    const Renderer& renderer,
-                                    const Executor& executor) const {
+/// What a camera's imager sees by the sun and by its own light, which falls off with the square of
+/// the depth; exposed so that the mean of what it meets is a third of the brightest.
+std::vector<std::uint8_t> Lidar::infrared_of(std::span<const Beam> beams,
+                                             std::span<const Hit> hits) const {
+  constexpr double kMean = 85.0;
+  std::vector<double> light(hits.size(), 0.0);
+  double sum = 0.0;
+  double lit = 0.0;
+  for (std::size_t i = 0; i < hits.size(); ++i) {
+    if (!hits[i].is_return()) continue;
+    const auto depth = static_cast<double>(std::max(hits[i].range * depth_share(beams[i]), 0.1f));
+    light[i] = returns_->reflectivity(hits[i]) *
+               (returns_->sun_klx() + settings_.grid.projector_klx / (depth * depth));
+    sum += light[i];
+    lit += 1.0;
+  }
+  std::vector<std::uint8_t> infrared(hits.size(), 0);
+  if (!(sum > 0.0)) return infrared;
+  for (std::size_t i = 0; i < hits.size(); ++i) {
+    infrared[i] = static_cast<std::uint8_t>(std::min(255.0, kMean * light[i] * lit / sum + 0.5));
+  }
+  return infrared;
+}
+
+/// Renders the beams and measures what comes back.
+Lidar::Measured Lidar::measured(const ScanRequest& request,
+                                std::span<const Beam> beams,
+                                const WorldBeams& world,
+                                const RayBatch& batch,
+                                const Renderer& renderer,
+                                const Executor& executor) const {
   std::vector<Echoes> echoes(returns_ ? beams.size() : 0);
   // what a renderer of images sees has no parts
   if (returns_ && !footprint_.is_line() && !renderer.is_snapshot()) {
     footprint_.trace({batch, world.across}, renderer, *returns_, echoes, executor);
-    return returns_of(request, beams, echoes, executor);
+    return {returns_of(request, beams, echoes, executor), {}};
   }
   std::vector<Hit> hits(beams.size());
   renderer.render(batch, hits, executor);
-  if (!returns_) return noisy_ranges(request, beams, hits, executor);
-  if (stereo_) return depths_of(request, beams, hits, executor);
+  if (!returns_) return {noisy_ranges(request, beams, hits, executor), {}};
+  Measured made;
+  if (measures_depth_) made.infrared = infrared_of(beams, hits);
+  if (stereo_) {
+    made.returns = depths_of(request, beams, hits, executor);
+    return made;
+  }
   for (std::size_t i = 0; i < hits.size(); ++i) {
     if (!hits[i].is_return()) continue;
     echoes[i].all[0] = returns_->echo_of(hits[i]);
     echoes[i].count = 1;
   }
-  return returns_of(request, beams, echoes, executor);
+  made.returns = returns_of(request, beams, echoes, executor);
+  return made;
 }
 
 Scan Lidar::take(const ScanRequest& request,
@@ -374,7 +404,9 @@ Scan Lidar::take(const ScanRequest& request,
   batch.time = snapshot ? batch.snapshot_time : request.start;
   batch.time_offsets = world.offsets;
   batch.image_resolution = settings_.image_resolution_deg * kDegree;
-  const std::vector<Return> returns = measured(request, beams, world, batch, renderer, executor);
+  Measured made_of_beams = measured(request, beams, world, batch, renderer, executor);
+  const std::vector<Return>& returns = made_of_beams.returns;
+  scan.infrared = std::move(made_of_beams.infrared);
 
   scan.marks.echoes = reports_echoes();
   scan.points.reserve(beams.size());

@@ -95,12 +95,19 @@ class Lidar {
                                               std::span<const Beam> beams,
                                               std::span<const Hit> hits,
                                               const Executor& executor) const;
-  [[nodiscard]] std::vector<Return> measured(const ScanRequest& request,
-                                             std::span<const Beam> beams,
-                                             const WorldBeams& world,
-                                             const RayBatch& batch,
-                                             const Renderer& renderer,
-                                             const Executor& executor) const;
+  [[nodiscard]] std::vector<std::uint8_t> infrared_of(std::span<const Beam> beams,
+                                                      std::span<const Hit> hits) const;
+  /// What comes of a scan's beams.
+  struct Measured {
+    std::vector<Return> returns;         ///< As many places for each as it may have returns.
+    std::vector<std::uint8_t> infrared;  ///< `Scan::infrared`
+  };
+  [[nodiscard]] Measured measured(const ScanRequest& request,
+                                  std::span<const Beam> beams,
+                                  const WorldBeams& world,
+                                  const RayBatch& batch,
+                                  const Renderer& renderer,
+                                  const Executor& executor) const;
   [[nodiscard]] float depth_share(const Beam& beam) const;
   [[nodiscard]] double range_limit() const;
 

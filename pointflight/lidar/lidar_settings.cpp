@@ -128,6 +128,12 @@ void describe_grid(SettingsVisitor& v, GridSettings& s) {
         w.value({"fy", "px", "focal length", 0, 1e6}, s.fy);
         w.value({"cx", "px", "principal point", -1e5, 1e5}, s.cx);
         w.value({"cy", "px", "principal point", -1e5, 1e5}, s.cy);
+        w.value({"projector_klx",
+                 "klx",
+                 "its own light at 1 m, as sunlight: of infrared pictures",
+                 0,
+                 1000},
+                s.projector_klx);
         w.section({"stereo", "", "of two imagers, this grid the left one; not in legacy runs"},
                   [&](SettingsVisitor& u) { describe_stereo(u, s.stereo); });
       });

@@ -108,6 +108,8 @@ struct GridSettings {
   double cx = 0.0;                   ///< pinhole: principal point, pixels.
   double cy = 0.0;                   ///< pinhole: principal point, pixels.
   StereoSettings stereo{};           ///< pinhole: what measures the depth.
+  /// pinhole: what its own light gives at 1 m, as sunlight, klx: of infrared pictures.
+  double projector_klx = 5.0;
 };
 
 /// A user's own table of directions, replayed in a loop.

@@ -72,6 +72,8 @@ class ReturnModel {
   [[nodiscard]] bool has_weather() const { return !weather_.is_clear(); }
   /// How far beams have to be followed, m (a depth camera's: depth).
   [[nodiscard]] double reach() const { return reach_; }
+  /// Background light, kilolux.
+  [[nodiscard]] double sun_klx() const { return surroundings_.sun_klx; }
   /// Which echoes are reported.
   [[nodiscard]] ReturnMode mode() const { return mode_; }
   /// Standard deviation of the range at a range (m) and a margin (`DetectionModel`; infinity where

@@ -65,6 +65,9 @@ struct Scan {
   SimTime middle;                 ///< Between first and last beam (a camera's: its start).
   ScanMarks marks;                ///< What points say besides.
   std::vector<ScanPoint> points;  ///< In firing order; beams without a return have none.
+  /// Of a depth camera where returns are modelled: the brightness of each beam's pixel, 0 where it
+  /// meets nothing; else empty.
+  std::vector<std::uint8_t> infrared;
   std::vector<PointTruth> truth;  ///< Of each point, where `marks.truth`; else empty.
 
   /// When the sensor was where it saw a point from.

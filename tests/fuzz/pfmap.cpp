@@ -11,6 +11,7 @@
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/geometry/shape_scene.hpp"
 #include "pointflight/map/map_builder.hpp"
+#include "pointflight/map/map_edit.hpp"
 #include "pointflight/render/renderer.hpp"
 #include "pointflight/world/contact.hpp"
 
@@ -49,6 +50,7 @@ std::vector<std::byte> good_map() {
   KnownSpaceBuilder known(map.description.bounds_world, map.description.resolution, 20000);
   known.cross({-1.5, -1.5, 0.5}, Vector3d(1, 1, -0.2).normalized(), 3.0);
   map.description.extra = {{KnownSpace::kSection, known.section()}};
+  set_reflectivity(map.description, 0.01);
   return map_bytes(map.tree, map.description);
 }
 
@@ -80,7 +82,7 @@ void ask_everything(const SurfelMap& map, const std::shared_ptr<const SurfelMap>
   batch.range_max = 30.0f;
   std::vector<Hit> hits(rays.size());
   make_renderer("beam", Scene{shared})->render(batch, hits, Executor(1));
-  std::size_t surfels = 0;
+  std::size_t surfels = map.reflectivity_per_intensity() > 0.0 ? 1 : 0;
   for (const Ray& ray : rays) surfels += map.nearest(ray.origin_world, 3.0) ? 1 : 0;
   const Solid box = Cuboid{{0.3, 0.2, 0.1}};
   const Pose turned{Quaterniond(0.8, 0.1, 0.5, 0.3).normalized(), {0.2, 0.1, 0.3}};

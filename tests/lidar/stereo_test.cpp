@@ -169,6 +169,36 @@ TEST(StereoCamera, GrazedSurfacesHaveNoDepth) {
   }
 }
 
+TEST(StereoCamera, ItsInfraredPictureIsLitByProjectorAndSun) {
+  // a wall at 2 m on the left and one at 4 m on the right
+  ShapeScene scene;
+  scene.add_box({2.0, 0.0, -12}, {2.4, 12, 12});
+  scene.add_box({4.0, -12, -12}, {4.4, 0.3, 12});
+  const auto renderer = make_renderer("beam", Scene{testing::map_of(scene, 0.05)});
+  const auto left_by_right = [&](double sun) {
+    Surroundings surroundings;
+    surroundings.sun_klx = sun;
+    surroundings.reflectivity = 0.4;
+    const Lidar camera(load_lidar("d455"), 0, nullptr, surroundings);
+    const Scan scan = camera.take({}, PoseTrack(Pose{}), *renderer, Executor(2));
+    EXPECT_EQ(scan.infrared.size(), 640u * 480u);
+    const auto brightness = [&](double azimuth) {
+      const auto column = static_cast<std::size_t>(326.69 - 392.57 * std::tan(azimuth));
+      double sum = 0.0;
+      for (std::size_t row = 236; row < 246; ++row) sum += scan.infrared[row * 640 + column];
+      return sum / 10.0;
+    };
+    return brightness(0.2) / brightness(-0.2);
+  };
+  EXPECT_NEAR(left_by_right(0.0), 4.0, 0.1);  // by the square of the depth
+  EXPECT_NEAR(left_by_right(100.0), (100 + 5 / 4.0) / (100 + 5 / 16.0), 0.03);
+  // not where returns are not modelled, and not of LiDARs
+  const Lidar legacy(load_lidar("d455"), 0);
+  EXPECT_TRUE(legacy.take({}, PoseTrack(Pose{}), *renderer, Executor(2)).infrared.empty());
+  const Lidar mid360(load_lidar("mid360"), 0, nullptr, Surroundings{});
+  EXPECT_TRUE(mid360.take({}, PoseTrack(Pose{}), *renderer, Executor(2)).infrared.empty());
+}
+
 TEST(StereoCamera, AD455MeasuresByItWhereReturnsAreModelled) {
   ShapeScene scene;
   scene.add_box({3.0, -12, -12}, {3.4, 12, 12});
