@@ -34,7 +34,7 @@ Assembly two_parts_and_a_propeller() {
 
 TEST(Assembly, RaysMeetTheNearestOfItsSurfaces) {
   const Assembly a = two_parts_and_a_propeller();
-  const SimTime time = from_seconds(12.3456789);
+  const SimTime time{from_seconds(12.3456789)};
   const std::vector<Vector3d> surface = surface_points(a, 0.004, time);
   const RandomStream random(1, StreamId::kTest, 5);
   const auto distance_to_parts = [&](const Vector3d& p) {
@@ -85,12 +85,12 @@ TEST(Assembly, APropellerLetsThroughWhatItsBladesDoNotCover) {
     const Vector3d at(p.radius * (2 * u - 1), p.radius * (2 * v - 1), 0.0);
     if (at.norm() > p.radius) continue;
     ++inside;
-    const SimTime time = from_seconds(1e-3 * static_cast<double>(i));
+    const SimTime time{from_seconds(1e-3 * static_cast<double>(i))};
     met += intersect(a, p.center + at + Vector3d(0, 0, 1), {0, 0, -1}, time) ? 1 : 0;
   }
   EXPECT_NEAR(static_cast<double>(met) / static_cast<double>(inside), covered, 0.003);
   // from the side blades are as high as their pitch makes them
-  const SimTime broadside = from_seconds(0.0);  // the first blade along x
+  const SimTime broadside{from_seconds(0.0)};  // the first blade along x
   EXPECT_TRUE(intersect(a, p.center + Vector3d(0.05, -1, 0.0015), {0, 1, 0}, broadside));
   EXPECT_FALSE(intersect(a, p.center + Vector3d(0.05, -1, 0.0025), {0, 1, 0}, broadside));
 }
@@ -106,7 +106,7 @@ TEST(Assembly, BladesTurnAsFastAndTheWayTheyAreSaidTo) {
       const double angle = 0.3 + speed * t;
       const Vector3d above = a.propellers[0].center + Vector3d(0, 0, 1);
       const Vector3d tip(0.08 * std::cos(angle), 0.08 * std::sin(angle), 0);
-      const SimTime time = from_seconds(t);
+      const SimTime time{from_seconds(t)};
       EXPECT_TRUE(intersect(a, above + tip, {0, 0, -1}, time)) << t;
       EXPECT_FALSE(intersect(a, above - tip, {0, 0, -1}, time)) << t;
       // the leading edge is the upper one

@@ -16,7 +16,7 @@ TEST(VehicleShape, WhatIsSeenOfAShippedVehicleLiesWithinItsHull) {
     EXPECT_EQ(assembly.parts.size(), 1 + 2 * rotors) << name;
     EXPECT_EQ(assembly.propellers.size(), rotors) << name;
     for (int ms = 0; ms < 10; ++ms) {
-      const SimTime time = from_seconds(1e-3 * ms);
+      const SimTime time{from_seconds(1e-3 * ms)};
       for (const Vector3d& p : surface_points(assembly, 0.02, time)) {
         ASSERT_LE(signed_distance(settings.hull(), p), 1e-3) << name << " " << p.transpose();
       }
