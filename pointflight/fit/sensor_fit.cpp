@@ -22,9 +22,11 @@ constexpr std::size_t kLeastPoints = 40;  // of a patch
 constexpr std::size_t kLeastPatches = 30;
 constexpr double kOnPlane = 0.9;        // of a patch's points, at least
 constexpr double kOutlier = 4.0;        // deviations
+constexpr double kNoisiest = 0.05;      // of its range: what scatters more is no surface
 constexpr double kNotFlat = 2.5;        // times the variance that the noise explains
 constexpr double kSteepest = 1.4;       // rad of incidence: beyond, planes tell ranges no more
 constexpr double kLongestApart = 0.02;  // s between points of a ring that tell its pace
+constexpr double kRingsWidth = 10.0;    // deg, of patches that tell rings' offsets
 constexpr double kMadPerSigma = 0.67449;
 constexpr std::array<double, 13> kRanges = {0, 1, 2, 4, 6, 8, 10, 15, 20, 30, 50, 80, 1000};
 constexpr std::array<double, 7> kIncidences = {0, 20, 40, 55, 65, 75, 90};  // deg
@@ -144,6 +146,7 @@ std::optional<Patch> patch_of(std::span<const Sight> sights,
     patch.residuals.emplace_back(members[k], residuals[k]);
   }
   patch.variance = squares / static_cast<double>(kept - 3);
+  if (patch.variance > kNoisiest * kNoisiest * patch.range * patch.range) return std::nullopt;
   return patch;
 }
 
@@ -456,6 +459,39 @@ void add_samples(const RingPoints& rings,
   }
 }
 
+/// Mean of times that are known but for whole cycles, 0 to before `cycle`.
+double within_cycle(const std::vector<double>& times, double cycle) {
+  double s = 0.0;
+  double c = 0.0;
+  for (const double time : times) {
+    const auto angle = math::sincos(2.0 * kPi * time / cycle);
+    s += angle.sin;
+    c += angle.cos;
+  }
+  const double share = math::atan2(s, c) / (2.0 * kPi);
+  return cycle * (share < -1e-9 ? share + 1.0 : std::max(share, 0.0));
+}
+
+/// A cycle begins after its longest pause: nothing else tells which ring is the first.
+void start_after_the_pause(TurnFit& turn) {
+  std::vector<double> times;
+  for (const RingFit& ring : turn.rings) times.push_back(ring.fire_time_us);
+  std::sort(times.begin(), times.end());
+  double first = times.front();
+  double longest = times.front() + turn.cycle_us - times.back();
+  for (std::size_t i = 1; i < times.size(); ++i) {
+    if (times[i] - times[i - 1] <= longest) continue;
+    longest = times[i] - times[i - 1];
+    first = times[i];
+  }
+  for (RingFit& ring : turn.rings) {
+    ring.fire_time_us -= first;
+    // times that are one but for rounding stay one
+    if (ring.fire_time_us < -1e-3) ring.fire_time_us += turn.cycle_us;
+    ring.fire_time_us = std::max(ring.fire_time_us, 0.0);
+  }
+}
+
 std::optional<TurnFit> turn_of(std::span<const RecordedScan> scans) {
   std::vector<RingPoints> rings;
   for (const RecordedScan& scan : scans) rings.push_back(rings_of(scan));
@@ -473,18 +509,16 @@ std::optional<TurnFit> turn_of(std::span<const RecordedScan> scans) {
   turn.rate = std::abs(pace->slope) / (2.0 * kPi);
   turn.is_clockwise = pace->slope < 0.0;
   turn.cycle_us = 1e6 * pace->cycle;
-  double first = 0.0;
   for (auto& [number, of_ring] : samples) {
     RingFit ring;
     ring.ring = number;
     ring.points = of_ring.points;
     ring.elevation_deg = median(of_ring.elevations) / kDegree;
     ring.azimuth_offset_deg = median(of_ring.azimuths) / kDegree;
-    ring.fire_time_us = 1e6 * median(of_ring.times);
-    first = std::min(first, ring.fire_time_us);
+    ring.fire_time_us = 1e6 * within_cycle(of_ring.times, pace->cycle);
     turn.rings.push_back(ring);
   }
-  for (RingFit& ring : turn.rings) ring.fire_time_us -= first;
+  start_after_the_pause(turn);
   return turn;
 }
 
@@ -556,7 +590,15 @@ SensorFit fit_sensor(std::span<const RecordedScan> scans,
   fit.rate = rate_of(scans);
   report(progress, "looking at rings", 0.8);
   fit.turn = turn_of(scans);
-  if (fit.turn) fill_range_offsets(patches, sights, *fit.turn);
+  if (fit.turn) {
+    // over two or three rings a plane takes any offset of one as its slope
+    std::vector<Patch> wide = patches_of(sights, kRingsWidth * kDegree, executor);
+    std::erase_if(wide, [&](const Patch& p) {
+      const double of_angle = fit.angle_sigma * lever_of(p);
+      return p.variance > kNotFlat * (fit.range_sigma * fit.range_sigma + of_angle * of_angle);
+    });
+    fill_range_offsets(wide, sights, *fit.turn);
+  }
   return fit;
 }
 
