@@ -27,6 +27,7 @@ constexpr double kNotFlat = 2.5;        // times the variance that the noise exp
 constexpr double kSteepest = 1.4;       // rad of incidence: beyond, planes tell ranges no more
 constexpr double kLongestApart = 0.02;  // s between points of a ring that tell its pace
 constexpr double kRingsWidth = 10.0;    // deg, of patches that tell rings' offsets
+constexpr double kLevelRing = 0.5 * kDegree;  // median distance of its points from its elevation
 constexpr double kMadPerSigma = 0.67449;
 constexpr std::array<double, 13> kRanges = {0, 1, 2, 4, 6, 8, 10, 15, 20, 30, 50, 80, 1000};
 constexpr std::array<double, 7> kIncidences = {0, 20, 40, 55, 65, 75, 90};  // deg
@@ -514,6 +515,11 @@ std::optional<TurnFit> turn_of(std::span<const RecordedScan> scans) {
     ring.ring = number;
     ring.points = of_ring.points;
     ring.elevation_deg = median(of_ring.elevations) / kDegree;
+    std::vector<double> off;
+    for (const double e : of_ring.elevations)
+      off.push_back(std::abs(e - ring.elevation_deg * kDegree));
+    // a Mid-360's azimuths go round evenly as well, but up and down meanwhile
+    if (median(off) > kLevelRing) return std::nullopt;
     ring.azimuth_offset_deg = median(of_ring.azimuths) / kDegree;
     ring.fire_time_us = 1e6 * within_cycle(of_ring.times, pace->cycle);
     turn.rings.push_back(ring);

@@ -64,6 +64,7 @@ TEST(SensorFit, FindsTheNoiseThatASensorWasGiven) {
     // an Ouster's ranges are whole steps from where its beams begin, beside the origin
     EXPECT_EQ(fit.range_step, c.model[0] == 'o' ? 0.0 : 0.002) << c.model;
     EXPECT_GT(2 * fit.on_patches, fit.points) << c.model;
+    EXPECT_EQ(fit.turn.has_value(), c.model[0] == 'o') << c.model;
     ASSERT_TRUE(fit.rate);
     EXPECT_NEAR(*fit.rate, settings.rate, 1e-3 * settings.rate);
     EXPECT_NEAR(fit.unrest, 1.0, 0.1) << c.model;
