@@ -15,13 +15,15 @@ namespace pointflight {
 
 /// Noise within a range of ranges and incidences.
 struct NoiseBin {
-  double range_from = 0.0, range_to = 0.0;          ///< m
-  double incidence_from = 0.0, incidence_to = 0.0;  ///< rad
-  double range = 0.0;                               ///< Mean of its patches, m.
-  double tangent = 0.0;     ///< Root mean square of range times tan(incidence), m.
-  double sigma = 0.0;       ///< Of ranges about the patches' planes, m: the median patch's.
-  std::size_t patches = 0;  ///< Flat pieces of what was seen.
-  std::size_t points = 0;   ///< On them.
+  double range_from = 0.0;      ///< Nearest, m.
+  double range_to = 0.0;        ///< Before this, m.
+  double incidence_from = 0.0;  ///< Steepest, rad.
+  double incidence_to = 0.0;    ///< Before this, rad.
+  double range = 0.0;           ///< Mean of its patches, m.
+  double tangent = 0.0;         ///< Root mean square of range times tan(incidence), m.
+  double sigma = 0.0;           ///< Of ranges about the patches' planes, m: the median patch's.
+  std::size_t patches = 0;      ///< Flat pieces of what was seen.
+  std::size_t points = 0;       ///< On them.
 };
 
 /// One channel of a spinning sensor.
@@ -52,7 +54,8 @@ struct SensorFit {
   double range_sigma = 0.0;    ///< Of ranges, m.
   double angle_sigma = 0.0;    ///< Of directions about each of two axes, rad; 0: it does not show.
   double range_step = 0.0;     ///< Ranges are whole multiples of it, m; 0: they are not.
-  double range_min = 0.0, range_max = 0.0;  ///< Of all returns, m.
+  double range_min = 0.0;      ///< Of all returns, m.
+  double range_max = 0.0;      ///< Of all returns, m.
   /// Root mean square of what patches move from scan to scan, by what their noise explains: 1 for a
   /// sensor and a place at rest. 0: too few scans to tell.
   double unrest = 0.0;

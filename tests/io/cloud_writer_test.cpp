@@ -81,6 +81,7 @@ TEST(CloudWriter, NormalsAndEllipsoidsHaveColumns) {
   row.point = kPoints[0];
   row.normal = {0.0f, 0.6f, 0.8f};
   row.spread = {0.001f, 0.02f, 0.03f};
+  row.surfel = 123456;
   for (const char* name : {"a.pcd", "a.ply"}) {
     auto writer = write_cloud(OutputFile(folder / name), {.normal = true, .ellipsoid = true});
     writer->write(std::span(&row, 1));
@@ -88,8 +89,11 @@ TEST(CloudWriter, NormalsAndEllipsoidsHaveColumns) {
     const std::string bytes = read_file(folder / name);
     const std::array<float, 13> wanted = {
         1.5f, -2.25f, 3.0f, 0.0f, 0.6f, 0.8f, 0.001f, 0.02f, 0.03f, 1.0f, 0.0f, 0.0f, 0.0f};
-    ASSERT_GT(bytes.size(), sizeof wanted);
-    EXPECT_EQ(std::memcmp(&bytes[bytes.size() - sizeof wanted], wanted.data(), sizeof wanted), 0);
+    const std::size_t size = sizeof wanted + sizeof row.surfel;
+    ASSERT_GT(bytes.size(), size);
+    const char* last = &bytes[bytes.size() - size];
+    EXPECT_EQ(std::memcmp(last, wanted.data(), sizeof wanted), 0);
+    EXPECT_EQ(std::memcmp(last + sizeof wanted, &row.surfel, sizeof row.surfel), 0);
   }
   expect_contains(error_of([&] { write_cloud(OutputFile(folder / "a.las"), {.normal = true}); }),
                   "LAS");

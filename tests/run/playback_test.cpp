@@ -99,16 +99,17 @@ TEST(Playback, ARunsFolderGivesTheMessagesOfTheRun) {
   Link* const links[] = {ros.get()};
   play(run, links, {});
 
-  // statuses are not in the folder, and the way within a scan is known by 200 states per second
+  // statuses and infrared pictures are not in the folder, and the way within a scan is known by 200 states per second
   const std::set<std::string> differ = {"/diagnostics"};
   for (const auto& [topic, messages] : flown) {
+    if (topic.ends_with("infrared")) continue;
     ASSERT_EQ(played[topic].size(), messages.size()) << topic;
     if (differ.contains(topic) || topic.ends_with("points_world")) continue;
     std::size_t same = 0;
     for (std::size_t i = 0; i < messages.size(); ++i) same += messages[i] == played[topic][i];
     EXPECT_EQ(same, messages.size()) << topic;
   }
-  EXPECT_EQ(flown.size(), played.size());
+  EXPECT_EQ(flown.size(), played.size() + 1);
 
   // once more, behind a thread of its own
   Messages again;

@@ -33,7 +33,8 @@ struct Flown {
 
 Flown fly(const Scenario& scenario) {
   Flown flown;
-  Simulation simulation(scenario, hall(), Executor(2));
+  const Executor executor(2);
+  Simulation simulation(scenario, hall(), executor);
   while (simulation.step(flown.sink)) {
   }
   for (std::size_t v = 0; v < simulation.vehicle_count(); ++v) {
