@@ -17,6 +17,7 @@
 #include "apps/scenario_command.hpp"
 #include "apps/settings_json.hpp"
 #include "apps/terminal.hpp"
+#include "apps/view_flags.hpp"
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/core/number_text.hpp"
 #include "pointflight/core/output_file.hpp"
@@ -24,6 +25,7 @@
 #include "pointflight/sim/flight_recorder.hpp"
 #include "pointflight/sim/scenario_maker.hpp"
 #include "pointflight/sim/start_check.hpp"
+#include "view/view_link.hpp"
 
 namespace pointflight::apps {
 namespace {
@@ -48,6 +50,7 @@ struct FlyFlags {
   bool no_scans = false;
   bool json = false;
   RosFlags ros;
+  ViewFlags view;
 };
 
 double parse_rate(const std::string& text) {
@@ -81,7 +84,7 @@ Scenario scenario_for_map(const FlyFlags& flags,
   if (!flags.start.empty()) wish.start = Vector3d(flags.start.data());
   wish.bounds = bounds;
   // with ROS somebody else will say where to fly
-  wish.mission = !flags.ros.is_live() && flags.mission.empty();
+  wish.mission = !flags.ros.has_ros() && flags.mission.empty();
   if (wish.mission || !wish.start) log(fmt::format("looking for a way through {}", flags.input));
   Scenario scenario = make_scenario(wish, executor);
   scenario.path.clear();
@@ -243,7 +246,8 @@ void say_waits(const RunLoop& loop, const RosFlags& ros) {
 
 int fly(const FlyFlags& flags) {
   if (flags.output.empty() && !flags.ros.any()) {
-    throw InputError("give a folder for the results with -o, or --ros1, --ros2 or --record");
+    throw InputError(
+        "give a folder for the results with -o, or --view, --ros1, --ros2 or --record");
   }
   check_ros_flags(flags.ros);
   RunOptions options;
@@ -273,8 +277,11 @@ int fly(const FlyFlags& flags) {
   TerminalLink terminal(simulation);
   loop.add(terminal);
   catch_interrupts();
-  const std::unique_ptr<RosLink> ros = make_ros_link(flags.ros, simulation);
+  const std::shared_ptr<LiveServer> server = start_viewing(flags.view, map);
+  const std::unique_ptr<RosLink> ros = make_ros_link(flags.ros, simulation, server);
   if (ros) loop.add(*ros);
+  std::optional<ViewLink> view;
+  if (server) loop.add(view.emplace(server, ros->epoch()));
   const RunEnd end = loop.run();
   end_progress();
   const bool failed = ros && has_failed_recording(*ros);
@@ -291,7 +298,8 @@ void add_fly_command(CLI::App& parent, int& exit_code) {
   auto* app = parent.add_subcommand("fly", "Fly a scenario, or a map in a scenario made up for it");
   auto flags = std::make_shared<FlyFlags>();
   app->add_option("scenario", flags->input, "A scenario .yaml, or a .pfmap")->required();
-  app->add_option("-o,--output", flags->output, "Folder for the results; needed without ROS");
+  app->add_option(
+      "-o,--output", flags->output, "Folder for the results; needed without ROS and --view");
   app->add_option("--seed", flags->seed, "Instead of the scenario's")
       ->check(CLI::Range(std::int64_t{0}, std::int64_t{9000000000000000}));
   app->add_option(
@@ -326,8 +334,10 @@ void add_fly_command(CLI::App& parent, int& exit_code) {
   app->add_flag(
       "--snapshot", flags->snapshot, "All beams of a scan from one pose, as in the paper");
   add_ros_flags(*app, flags->ros);
+  add_view_flags(*app, flags->view);
   app->callback([flags, &exit_code] {
     flags->ros.overwrite = flags->force;
+    flags->ros.view = flags->view.view;
     exit_code = fly(*flags);
   });
 }

@@ -17,6 +17,7 @@
 #include "recording/mcap_writer.hpp"
 #include "recording/recording.hpp"
 #include "ros_common/ros_names.hpp"
+#include "view/foxglove_transport.hpp"
 
 namespace pointflight::apps {
 namespace {
@@ -96,11 +97,11 @@ void check_ros_flags(const RosFlags& flags) {
                                     std::pair{"--stay", flags.stay},
                                     std::pair{"--no-wait", flags.no_wait}}) {
     if (given && !flags.is_live()) {
-      throw InputError(fmt::format("{}: has no effect without --ros1 or --ros2", flag));
+      throw InputError(fmt::format("{}: has no effect without --ros1, --ros2 or --view", flag));
     }
   }
   if (!flags.profile.empty() && !flags.any()) {
-    throw InputError("--profile: has no effect without --ros1, --ros2 or --record");
+    throw InputError("--profile: has no effect without --ros1, --ros2, --view or --record");
   }
 }
 
@@ -155,7 +156,9 @@ void check_twice(const std::vector<std::string>& paths) {
 
 }  // namespace
 
-std::unique_ptr<RosLink> make_ros_link(const RosFlags& flags, const Simulation& simulation) {
+std::unique_ptr<RosLink> make_ros_link(const RosFlags& flags,
+                                       const Simulation& simulation,
+                                       const std::shared_ptr<LiveServer>& view) {
   if (!flags.any()) return nullptr;
   const bool digit = flags.node.find_first_of("0123456789") == 0;
   if (!is_ros_word(flags.node) || digit) {
@@ -184,6 +187,7 @@ std::unique_ptr<RosLink> make_ros_link(const RosFlags& flags, const Simulation& 
   if (flags.ros2) transport.large_rate = large_rate(run, profile);
   if (flags.ros1) link->add_transport(ros1_module().transport(transport));
   if (flags.ros2) link->add_transport(ros2_module().transport(transport));
+  if (view) link->add_transport(std::make_unique<FoxgloveTransport>(view));
   return link;
 }
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "ros_common/ros_link.hpp"
+#include "view/live_server.hpp"
 
 namespace pointflight::apps {
 
@@ -25,8 +26,12 @@ struct RosFlags {
   std::string compression = "zstd";
   bool overwrite = false;  ///< Recordings that are there already.
 
+  bool view = false;       ///< Somebody watches by the protocol of Foxglove (`ViewFlags`).
+
+  /// Others' nodes may listen and command.
+  [[nodiscard]] bool has_ros() const { return ros1 || ros2; }
   /// Somebody outside may listen and command.
-  [[nodiscard]] bool is_live() const { return ros1 || ros2; }
+  [[nodiscard]] bool is_live() const { return has_ros() || view; }
   [[nodiscard]] bool any() const { return is_live() || !records.empty(); }
 };
 
@@ -40,9 +45,11 @@ void check_ros_flags(const RosFlags& flags);
 /// real time (`rate` > 0) and not told to end (--no-stay, a duration, lockstep). Throws InputError.
 void prepare_for_ros(const RosFlags& flags, double rate, Scenario& scenario);
 
-/// ROS and recordings as a link, as the flags ask for, with everything open; null where they ask
-/// for none. Throws InputError.
-std::unique_ptr<RosLink> make_ros_link(const RosFlags& flags, const Simulation& simulation);
+/// ROS, recordings and viewers (those of `view`, if any) as a link, as the flags ask for, with
+/// everything open; null where they ask for none. Throws InputError.
+std::unique_ptr<RosLink> make_ros_link(const RosFlags& flags,
+                                       const Simulation& simulation,
+                                       const std::shared_ptr<LiveServer>& view);
 
 /// Says which recordings were made and how large they are.
 void say_recordings(const RosFlags& flags, const RosLink& link);

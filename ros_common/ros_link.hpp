@@ -52,6 +52,8 @@ class RosLink : public Link {
   [[nodiscard]] bool is_in_use() const override { return in_use_; }
   [[nodiscard]] std::uint64_t dropped() const override;
 
+  /// What its stamps count from, since the Unix epoch.
+  [[nodiscard]] Duration epoch() const { return bridge_.epoch(); }
   /// How many recordings it has.
   [[nodiscard]] std::size_t recordings() const { return recordings_.size(); }
   /// True where a recording, counted as they were added, could not be written to its end; it was

@@ -20,8 +20,12 @@ struct PauseOrder {
 struct StepOrder {};   ///< While paused: go on until the next scan.
 struct ResetOrder {};  ///< Back to the start.
 struct EndOrder {};    ///< End the run as interrupted.
+/// Hold the run to so many simulated seconds per second from here on.
+struct RateOrder {
+  double rate = 1.0;  ///< 0: as fast as it goes.
+};
 
 /// What may be told to a run from outside; those without a vehicle are about the run.
-using Order = std::variant<VehicleOrder, PauseOrder, StepOrder, ResetOrder, EndOrder>;
+using Order = std::variant<VehicleOrder, PauseOrder, StepOrder, ResetOrder, EndOrder, RateOrder>;
 
 }  // namespace pointflight

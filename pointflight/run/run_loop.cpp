@@ -214,6 +214,9 @@ void RunLoop::obey(Link& link, const Order& order) {
     step_once_ = paused_;
   } else if (std::holds_alternative<ResetOrder>(order)) {
     reset_ = true;
+  } else if (const auto* rate = std::get_if<RateOrder>(&order)) {
+    pace_ = Pace(rate->rate);
+    pace_.restart_at(simulation_.time());
   } else {
     ended_ = true;
   }

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <CLI/App.hpp>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "pointflight/map/surfel_map.hpp"
+#include "view/live_server.hpp"
+
+namespace pointflight::apps {
+
+/// Flags of commands whose result can be looked at in a browser.
+struct ViewFlags {
+  bool view = false;            ///< Serve it.
+  std::vector<std::string> at;  ///< ADDRESS:PORT, at most one.
+  bool control = false;         ///< Viewers may command, wherever it listens.
+  bool no_control = false;      ///< They may not, on loopback either.
+};
+
+/// --view, --view-control, --no-view-control.
+void add_view_flags(CLI::App& app, ViewFlags& flags);
+
+/// Serves the page and the map and says its address; null where nobody asked. Throws InputError.
+std::shared_ptr<LiveServer> start_viewing(const ViewFlags& flags,
+                                          const std::shared_ptr<const SurfelMap>& map);
+
+}  // namespace pointflight::apps

@@ -1,0 +1,351 @@
+import * as THREE from "three";
+import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
+import { Client, cloudOf, json } from "./protocol.js";
+import { SurfelMap } from "./map.js";
+import { Obstacles, ScanCloud, Vehicle, append, line } from "./vehicles.js";
+
+const $ = (id) => document.getElementById(id);
+const query = new URLSearchParams(location.search);
+THREE.Object3D.DEFAULT_UP.set(0, 0, 1); // the world's z is up
+
+// ---- what is drawn with ----
+
+const renderer = new THREE.WebGLRenderer({ antialias: true, preserveDrawingBuffer: true });
+renderer.setPixelRatio(Math.min(devicePixelRatio, Number(query.get("pixels") ?? 2)));
+$("scene").append(renderer.domElement);
+const scene = new THREE.Scene();
+scene.add(new THREE.HemisphereLight("#ffffff", "#888888", 2.2));
+const sun = new THREE.DirectionalLight("#ffffff", 1.2);
+sun.position.set(3, 2, 8);
+scene.add(sun);
+const camera = new THREE.PerspectiveCamera(60, 1, 0.05, 3000);
+camera.up.set(0, 0, 1);
+camera.position.set(-12, -12, 10);
+const controls = new OrbitControls(camera, renderer.domElement);
+controls.enableDamping = true;
+const map = new SurfelMap(scene);
+const obstacles = new Obstacles(scene);
+const measured = line(new THREE.Color("#00b894"), 2);
+scene.add(measured);
+
+const state = { vehicles: [], chosen: 0, run: null, last: null, ruler: false, marks: [], keys: new Set(), frames: 0, cost: 0 };
+
+function resize() {
+  renderer.setSize(innerWidth, innerHeight);
+  camera.aspect = innerWidth / innerHeight;
+  camera.updateProjectionMatrix();
+}
+addEventListener("resize", resize);
+
+function setTheme(dark) {
+  document.documentElement.dataset.theme = dark ? "dark" : "light";
+  $("theme").checked = !dark;
+  scene.background = new THREE.Color(dark ? "#101216" : "#f4f4f2");
+}
+setTheme(query.get("theme") !== "light");
+
+// ---- the run ----
+
+const address = `ws://${location.host}/?token=${encodeURIComponent(query.get("token") ?? "")}`;
+const client = new Client(address, {
+  open: () => say("connected"),
+  close: () => ($("title").textContent = "the run has ended, or the connection is gone"),
+  session: () => state.vehicles.forEach((v) => v.forget()),
+  info: () => setPermission(),
+  status: (message) => say(message.message),
+});
+
+function setPermission() {
+  for (const id of ["pause", "step", "reset"]) $(id).disabled = !client.mayCommand;
+  $("hint").textContent = client.mayCommand ? "double click: fly there; ? for keys" : "watching only; ? for keys";
+}
+
+client.want("/pointflight/run", (bytes) => {
+  const run = json(bytes);
+  state.vehicles.forEach((v) => v.remove(scene));
+  state.run = run;
+  state.vehicles = run.vehicles.map((v, i) => new Vehicle(scene, $("tags"), v, i));
+  $("title").textContent = run.vehicles.length > 1 ? `${run.vehicles.length} vehicles` : run.vehicles[0]?.name ?? "map";
+  $("vehicle").replaceChildren(...run.vehicles.map((v, i) => new Option(v.name, i)));
+  for (const vehicle of state.vehicles) {
+    for (const lidar of vehicle.description.lidars) {
+      const cloud = new ScanCloud(scene);
+      cloud.material.uniforms.tint.value = vehicle.colour.clone().lerp(new THREE.Color("#ffd23f"), 0.7);
+      vehicle.scans.set(lidar.topic, cloud);
+      client.want(lidar.topic, (data) => {
+        if (!$("scans").checked) return;
+        cloud.set(cloudOf(data));
+        if (vehicle === chosen()) drawRange(vehicle, cloud.cloud);
+      });
+    }
+  }
+  lookAtStart();
+});
+
+client.want("/pointflight/state", (bytes) => {
+  const now = json(bytes);
+  state.last = now;
+  now.vehicles.forEach((v, i) => state.vehicles[i]?.update(v, now.t));
+  obstacles.update(now.obstacles);
+  $("time").textContent = `${now.t.toFixed(1)} s`;
+  $("pause").textContent = now.doing === "paused" ? "go on" : "pause";
+  showFigures();
+});
+
+client.want("/pointflight/events", (bytes) => {
+  const event = json(bytes);
+  say(`${event.t.toFixed(2)} s ${event.vehicle}: ${event.words}`, true);
+});
+
+const chosen = () => state.vehicles[state.chosen];
+
+function lookAtStart() {
+  const first = state.run?.vehicles[0];
+  if (!first || state.placed) return;
+  state.placed = true;
+  const p = new THREE.Vector3(...first.start);
+  controls.target.copy(p);
+  camera.position.copy(p).add(new THREE.Vector3(-9, -7, 6));
+}
+
+const lines = [];
+function say(words, hot = false) {
+  lines.push([words, hot]);
+  if (lines.length > 5) lines.shift();
+  $("log").style.display = "block";
+  $("log").replaceChildren(
+    ...lines.map(([text, isHot]) => Object.assign(document.createElement("div"), { textContent: text, className: isHot ? "hit" : "" })),
+  );
+}
+
+function showFigures() {
+  const v = chosen()?.state;
+  const now = state.last;
+  if (!v?.p) return;
+  const rows = [
+    ["time", `${now.t.toFixed(2)} s`],
+    ["real-time factor", now.rate.toFixed(2)],
+    ["place", v.p.map((x) => x.toFixed(2)).join(", ")],
+    ["speed", `${Math.hypot(...v.v).toFixed(2)} m/s`],
+    ["clearance", v.nearest ? `${v.nearest.distance.toFixed(2)} m` : "over 10 m"],
+    ["command", v.command ?? ""],
+    ["scans", v.scans ?? 0],
+    ["collisions", v.collisions ?? 0],
+    ["drawn", `${(map.drawn / 1e6).toFixed(2)} of ${((map.surfels ?? 0) / 1e6).toFixed(2)} M surfels`],
+    ["frame", `${state.cost.toFixed(0)} ms`],
+  ];
+  $("figures").replaceChildren(
+    ...rows.map(([name, value]) => {
+      const row = document.createElement("tr");
+      for (const words of [name, value]) row.append(Object.assign(document.createElement("td"), { textContent: words }));
+      return row;
+    }),
+  );
+}
+
+// The scan as a picture over azimuth and elevation, as its sensor sees it.
+function drawRange(vehicle, cloud) {
+  const pose = vehicle.state;
+  if (!pose?.p) return;
+  const canvas = $("image");
+  const context = canvas.getContext("2d");
+  const image = context.createImageData(canvas.width, canvas.height);
+  const inverse = new THREE.Quaternion(pose.q[1], pose.q[2], pose.q[3], pose.q[0]).invert();
+  const p = new THREE.Vector3();
+  for (let i = 0; i < cloud.count; ++i) {
+    p.fromArray(cloud.positions, 3 * i).sub(vehicle.group.position).applyQuaternion(inverse);
+    const range = p.length();
+    const u = Math.floor((0.5 - Math.atan2(p.y, p.x) / (2 * Math.PI)) * canvas.width);
+    const v = Math.floor((0.5 - Math.asin(p.z / range) / (Math.PI * 0.7)) * canvas.height);
+    if (u < 0 || v < 0 || u >= canvas.width || v >= canvas.height) continue;
+    const near = Math.exp(-range / 12);
+    image.data.set([255 * near, 200 * (1 - Math.abs(near - 0.5)), 255 * (1 - near), 255], 4 * (v * canvas.width + u));
+  }
+  context.putImageData(image, 0, 0);
+}
+
+// ---- cameras ----
+
+function moveCamera() {
+  const vehicle = chosen();
+  const mode = $("camera").value;
+  controls.enabled = mode === "orbit" || mode === "follow" || mode === "top";
+  if (!vehicle?.state?.p) return;
+  const p = vehicle.group.position;
+  if (mode === "follow" || mode === "top") {
+    const moved = p.clone().sub(state.followed ?? p);
+    camera.position.add(moved);
+    controls.target.copy(p);
+    state.followed = p.clone();
+  } else {
+    state.followed = null;
+  }
+  if (mode === "board") {
+    const q = vehicle.group.quaternion;
+    camera.position.copy(p).add(new THREE.Vector3(0.15, 0, 0.12).applyQuaternion(q));
+    camera.up.copy(new THREE.Vector3(0, 0, 1).applyQuaternion(q));
+    camera.lookAt(camera.position.clone().add(new THREE.Vector3(1, 0, 0).applyQuaternion(q)));
+  } else {
+    camera.up.set(0, 0, 1);
+  }
+}
+
+function setCamera(mode) {
+  $("camera").value = mode;
+  const p = chosen()?.group.position;
+  if (!p) return;
+  if (mode === "top") camera.position.copy(p).add(new THREE.Vector3(0, -0.01, 25));
+  if (mode === "follow") camera.position.copy(p).add(new THREE.Vector3(-4, -3, 2.5));
+  if (mode !== "board") controls.target.copy(p);
+}
+$("camera").onchange = () => setCamera($("camera").value);
+$("vehicle").onchange = () => (state.chosen = Number($("vehicle").value));
+
+// ---- picking, ordering ----
+
+const caster = new THREE.Raycaster();
+function rayAt(event) {
+  const pointer = new THREE.Vector2((2 * event.clientX) / innerWidth - 1, 1 - (2 * event.clientY) / innerHeight);
+  caster.setFromCamera(pointer, camera);
+  return caster.ray;
+}
+let pressed = null;
+renderer.domElement.addEventListener("pointerdown", (event) => (pressed = [event.clientX, event.clientY]));
+renderer.domElement.addEventListener("click", (event) => {
+  if (!pressed || Math.hypot(event.clientX - pressed[0], event.clientY - pressed[1]) > 4) return;
+  const met = map.pick(rayAt(event));
+  if (!met) return;
+  const words = met.place.toArray().map((x) => x.toFixed(2)).join(", ");
+  if (!state.ruler) return say(`surfel at ${words}`);
+  state.marks = state.marks.length === 1 ? [state.marks[0], met.place] : [met.place];
+  measured.userData.count = 0;
+  state.marks.forEach((mark) => append(measured, mark.toArray()));
+  say(state.marks.length === 2 ? `${state.marks[0].distanceTo(state.marks[1]).toFixed(3)} m apart` : `from ${words}`);
+});
+renderer.domElement.addEventListener("dblclick", (event) => {
+  const met = map.pick(rayAt(event));
+  if (!met || !client.mayCommand) return;
+  flyTo(met.place.x, met.place.y, met.place.z + 1.5);
+});
+function flyTo(x, y, z) {
+  client.order({ vehicle: state.chosen, goal: [x, y, z] });
+  say(`fly to ${[x, y, z].map((v) => v.toFixed(1)).join(", ")}`);
+}
+
+$("pause").onclick = () => client.order({ pause: state.last?.doing !== "paused" });
+$("step").onclick = () => client.order({ step: true });
+$("reset").onclick = () => client.order({ reset: true });
+$("shot").onclick = () => {
+  draw(0);
+  const link = document.createElement("a");
+  link.download = "pointflight.png";
+  link.href = renderer.domElement.toDataURL("image/png");
+  link.click();
+};
+$("ruler").onclick = () => {
+  state.ruler = !state.ruler;
+  state.marks = [];
+  measured.geometry.setDrawRange(0, 0);
+  say(state.ruler ? "ruler: click on two surfels" : "ruler off");
+};
+$("keys").onclick = () => ($("help").style.display = $("help").style.display === "block" ? "none" : "block");
+$("theme").onchange = () => setTheme(!$("theme").checked);
+$("colour").onchange = () => (map.uniforms.colouring.value = ["height", "intensity", "planar"].indexOf($("colour").value));
+$("budget").onchange = () => (map.budget = Number($("budget").value));
+$("scans").onchange = () => state.vehicles.forEach((v) => v.scans.forEach((s) => (s.points.visible = $("scans").checked)));
+$("path").onchange = () => state.vehicles.forEach((v) => (v.path.visible = $("path").checked));
+$("ceiling").oninput = () => {
+  if (!map.bounds) return;
+  const { min, max } = map.bounds;
+  const share = Number($("ceiling").value);
+  map.uniforms.clipHigh.value.z = share >= 1 ? 1e9 : min.z + share * (max.z - min.z);
+};
+
+const ARROWS = { ArrowUp: [1, 0, 0, 0], ArrowDown: [-1, 0, 0, 0], ArrowLeft: [0, 0, 0, 1], ArrowRight: [0, 0, 0, -1], PageUp: [0, 0, 1, 0], PageDown: [0, 0, -1, 0] };
+addEventListener("keydown", (event) => {
+  if (event.target.tagName === "SELECT") return;
+  if (ARROWS[event.key]) {
+    event.preventDefault();
+    state.keys.add(event.key);
+    return;
+  }
+  const cut = (by) => {
+    $("ceiling").value = Number($("ceiling").value) + by;
+    $("ceiling").oninput();
+  };
+  const actions = {
+    1: () => setCamera("orbit"),
+    2: () => setCamera("follow"),
+    3: () => setCamera("board"),
+    4: () => setCamera("top"),
+    " ": () => $("pause").onclick(),
+    ".": () => $("step").onclick(),
+    r: () => $("reset").onclick(),
+    v: () => ($("vehicle").value = state.chosen = (state.chosen + 1) % Math.max(1, state.vehicles.length)),
+    t: () => setTheme(document.documentElement.dataset.theme !== "dark"),
+    p: () => $("shot").onclick(),
+    m: () => $("ruler").onclick(),
+    "?": () => $("keys").onclick(),
+    "[": () => cut(-0.02),
+    "]": () => cut(0.02),
+  };
+  if (!actions[event.key]) return;
+  event.preventDefault();
+  actions[event.key]();
+});
+addEventListener("keyup", (event) => {
+  if (!state.keys.delete(event.key) || state.keys.size > 0) return;
+  client.order({ vehicle: state.chosen, hover: true });
+});
+setInterval(() => {
+  if (state.keys.size === 0) return;
+  const sum = [0, 0, 0, 0];
+  for (const key of state.keys) ARROWS[key].forEach((x, i) => (sum[i] += x));
+  client.order({ vehicle: state.chosen, velocity: [2 * sum[0], 2 * sum[1], 1 * sum[2]], yaw_rate: sum[3] });
+}, 50);
+
+// ---- frames ----
+
+function draw(dt) {
+  moveCamera();
+  if (controls.enabled) controls.update();
+  for (const vehicle of state.vehicles) vehicle.animate(dt);
+  map.update(camera);
+  renderer.render(scene, camera);
+  const place = new THREE.Vector3();
+  for (const vehicle of state.vehicles) {
+    place.copy(vehicle.group.position).project(camera);
+    const isSeen = vehicle.group.visible && place.z < 1 && $("camera").value !== "board";
+    vehicle.tag.style.display = isSeen ? "block" : "none";
+    vehicle.tag.style.left = `${(0.5 + 0.5 * place.x) * innerWidth}px`;
+    vehicle.tag.style.top = `${(0.5 - 0.5 * place.y) * innerHeight}px`;
+  }
+}
+
+let before = performance.now();
+function frame(now) {
+  const start = performance.now();
+  draw(Math.min(0.1, 1e-3 * (now - before)));
+  before = now;
+  ++state.frames;
+  state.cost = 0.9 * state.cost + 0.1 * (performance.now() - start);
+  requestAnimationFrame(frame);
+}
+
+resize();
+map.budget = Number(query.get("budget") ?? 2e6);
+map
+  .load()
+  .then(() => {
+    if (!map.hasIntensity) $("colour").querySelector("[value=intensity]").disabled = true;
+    if (!state.run) {
+      const middle = map.bounds.getCenter(new THREE.Vector3());
+      controls.target.copy(middle);
+      camera.position.copy(middle).add(new THREE.Vector3(-15, -15, 12));
+    }
+  })
+  .catch((error) => say(`the map: ${error.message}`, true));
+requestAnimationFrame(frame);
+
+// For tests and for those who script it.
+window.pointflight = { state, map, camera, controls, scene, client, flyTo, setCamera, THREE };

@@ -1,0 +1,306 @@
+// The map: surfels as oriented discs, unpacked in the shader from the words that the simulator traces.
+import * as THREE from "three";
+
+const ROW = 16; // bytes of a surfel, MapBlocks
+
+const vertex = `
+precision highp float;
+precision highp int;
+in vec2 corner;
+in uvec2 word;
+in vec4 leaf;   // origin of its leaf from the map's, m; intensity code
+uniform float resolution;
+uniform float grow;      // thinned surfels stand for their neighbours
+uniform vec3 clipLow, clipHigh;
+uniform int colouring;
+uniform vec2 heights;
+out vec2 place;
+out vec3 shade;
+vec3 turbo(float x) {
+  x = clamp(x, 0.0, 1.0);
+  const vec4 r4 = vec4(0.13572138, 4.61539260, -42.66032258, 132.13108234);
+  const vec4 g4 = vec4(0.09140261, 2.19418839, 4.84296658, -14.18503333);
+  const vec4 b4 = vec4(0.10667330, 12.64194608, -60.58204836, 110.36276771);
+  const vec2 r2 = vec2(-152.94239396, 59.28637943);
+  const vec2 g2 = vec2(4.27729857, 2.82956604);
+  const vec2 b2 = vec2(-89.90310912, 27.34824973);
+  vec4 v4 = vec4(1.0, x, x * x, x * x * x);
+  vec2 v2 = v4.zw * v4.z;
+  return vec3(dot(v4, r4) + dot(v2, r2), dot(v4, g4) + dot(v2, g2), dot(v4, b4) + dot(v2, b2));
+}
+void main() {
+  // SurfelWord: see pointflight/map/surfel.hpp
+  uint lo = word.x, hi = word.y;
+  vec3 centre = (vec3(float(lo & 1023u), float((lo >> 10) & 1023u), float((lo >> 20) & 1023u)) + 0.5) / 64.0;
+  int thickness = int((lo >> 30) & 3u);
+  vec3 q = vec3(float(int(hi << 24) >> 24), float(int(hi << 16) >> 24), float(int(hi << 8) >> 24)) * (0.70711 / 127.0);
+  float w = sqrt(max(0.0, 1.0 - dot(q, q)));
+  float s2 = sqrt(uintBitsToFloat(0x3b6bedfau + (hi >> 27) * 0x288000u));
+  float s1 = s2 * pow(0.75, float((hi >> 24) & 7u));
+  vec3 ax1 = vec3(2.0 * (q.x * q.y - w * q.z), 1.0 - 2.0 * (q.x * q.x + q.z * q.z), 2.0 * (q.y * q.z + w * q.x));
+  vec3 ax2 = vec3(2.0 * (q.x * q.z + w * q.y), 2.0 * (q.y * q.z - w * q.x), 1.0 - 2.0 * (q.x * q.x + q.y * q.y));
+  vec3 normal = cross(ax1, ax2);
+  vec3 middle = leaf.xyz + resolution * centre;
+  vec3 world = (modelMatrix * vec4(middle, 1.0)).xyz;
+  place = corner;
+  float reach = 2.0 * resolution * grow;
+  vec3 local = middle + reach * (corner.x * s1 * ax1 + corner.y * s2 * ax2);
+  gl_Position = projectionMatrix * viewMatrix * modelMatrix * vec4(local, 1.0);
+  if (any(lessThan(world, clipLow)) || any(greaterThan(world, clipHigh))) gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
+  vec3 sight = normalize(cameraPosition - world);
+  float light = 0.55 + 0.45 * abs(dot(normal, normalize(sight + vec3(0.3, 0.2, 0.9))));
+  vec3 colour;
+  if (colouring == 0) colour = turbo(0.06 + 0.88 * (world.z - heights.x) / max(0.1, heights.y - heights.x));
+  else if (colouring == 1) colour = vec3(0.15 + 0.85 * leaf.w / 255.0);
+  else colour = thickness == 0 ? mix(vec3(0.30, 0.55, 0.75), vec3(0.55, 0.75, 0.85), abs(normal.z))
+                               : vec3(0.85, 0.55, 0.25);
+  shade = colour * light;
+}`;
+
+const fragment = `
+precision highp float;
+in vec2 place;
+in vec3 shade;
+out vec4 colour;
+void main() {
+  if (dot(place, place) > 1.0) discard;
+  colour = vec4(shade, 1.0);
+}`;
+
+export class SurfelMap {
+  constructor(scene) {
+    this.group = new THREE.Group();
+    scene.add(this.group);
+    this.corners = new THREE.BufferAttribute(new Float32Array([-1, -1, 1, -1, 1, 1, -1, 1]), 2);
+    this.faces = new THREE.BufferAttribute(new Uint16Array([0, 1, 2, 0, 2, 3]), 1);
+    this.budget = 2e6;
+    this.blocks = [];
+    this.loading = 0;
+    this.bytes = 0;
+    this.uniforms = {
+      resolution: { value: 0.1 },
+      clipLow: { value: new THREE.Vector3(-1e9, -1e9, -1e9) },
+      clipHigh: { value: new THREE.Vector3(1e9, 1e9, 1e9) },
+      colouring: { value: 0 },
+      heights: { value: new THREE.Vector2(0, 1) },
+    };
+    this.materials = new Map(); // by how much discs grow
+  }
+
+  material(grow) {
+    const key = grow.toFixed(2);
+    if (!this.materials.has(key)) {
+      this.materials.set(
+        key,
+        new THREE.ShaderMaterial({
+          glslVersion: THREE.GLSL3,
+          vertexShader: vertex,
+          fragmentShader: fragment,
+          side: THREE.DoubleSide,
+          uniforms: { ...this.uniforms, grow: { value: grow } },
+        }),
+      );
+    }
+    return this.materials.get(key);
+  }
+
+  async load() {
+    const view = new DataView(await this.fetch("/map/index"));
+    const count = view.getUint32(4, true);
+    this.surfels = view.getUint32(8, true);
+    this.hasIntensity = view.getUint32(12, true) === 1;
+    const origin = new THREE.Vector3(...[16, 24, 32].map((at) => view.getFloat64(at, true)));
+    this.origin = origin;
+    const resolution = view.getFloat64(40, true);
+    this.resolution = resolution;
+    this.uniforms.resolution.value = resolution;
+    this.group.position.copy(origin);
+    this.bounds = new THREE.Box3();
+    this.blocks = [];
+    for (let i = 0, at = 56; i < count; ++i, at += 28) {
+      const f = (k) => view.getFloat32(at + 4 * k, true);
+      const box = new THREE.Box3(
+        new THREE.Vector3(f(0), f(1), f(2)).add(origin),
+        new THREE.Vector3(f(3), f(4), f(5)).add(origin),
+      );
+      this.bounds.union(box);
+      this.blocks.push({ box, sphere: box.getBoundingSphere(new THREE.Sphere()), surfels: view.getUint32(at + 24, true), level: -1, wanted: -1, mesh: null });
+    }
+    this.setHeights();
+    await this.loadOverview();
+  }
+
+  // Floors and roofs may be far off: colours are of what most surfels lie between.
+  setHeights() {
+    const z = this.blocks.map((b) => b.sphere.center.z).sort((a, b) => a - b);
+    const at = (share) => z[Math.min(z.length - 1, Math.floor(share * z.length))] ?? 0;
+    const room = 0.05 * (at(0.98) - at(0.02)) + 1;
+    this.uniforms.heights.value.set(at(0.02) - room, at(0.98) + room);
+  }
+
+  async fetch(path) {
+    const response = await fetch(path);
+    if (!response.ok) throw new Error(`${path}: ${response.status}`);
+    const buffer = await response.arrayBuffer();
+    this.bytes += buffer.byteLength;
+    return buffer;
+  }
+
+  // Rows of one block from `at` on: a geometry, and where the next one begins.
+  decode(view, at) {
+    const count = view.getUint32(at, true);
+    const low = [4, 8, 12].map((k) => view.getUint32(at + k, true));
+    at += 16;
+    const words = new Uint32Array(2 * count);
+    const leaves = new Float32Array(4 * count);
+    for (let i = 0; i < count; ++i, at += ROW) {
+      words[2 * i] = view.getUint32(at, true);
+      words[2 * i + 1] = view.getUint32(at + 4, true);
+      for (let k = 0; k < 3; ++k) leaves[4 * i + k] = this.resolution * (low[k] + view.getUint16(at + 8 + 2 * k, true));
+      leaves[4 * i + 3] = view.getUint16(at + 14, true);
+    }
+    return { count, words, leaves, end: at };
+  }
+
+  mesh(words, leaves, count, grow) {
+    const geometry = new THREE.InstancedBufferGeometry();
+    geometry.setAttribute("corner", this.corners);
+    geometry.setIndex(this.faces);
+    const word = new THREE.InstancedBufferAttribute(words, 2);
+    word.gpuType = THREE.IntType;
+    geometry.setAttribute("word", word);
+    geometry.setAttribute("leaf", new THREE.InstancedBufferAttribute(leaves, 4));
+    geometry.instanceCount = count;
+    const mesh = new THREE.Mesh(geometry, this.material(grow));
+    mesh.frustumCulled = false;
+    return mesh;
+  }
+
+  async loadOverview() {
+    const view = new DataView(await this.fetch(`/map/overview/${Math.min(this.budget, 200000)}`));
+    const stride = view.getUint32(0, true);
+    const grow = Math.min(6, Math.sqrt(stride));
+    for (let at = 4, i = 0; at < view.byteLength && i < this.blocks.length; ++i) {
+      const { count, words, leaves, end } = this.decode(view, at);
+      at = end;
+      const block = this.blocks[i];
+      block.coarse = { words, leaves, count };
+    }
+    this.overviewGrow = grow;
+    this.rebuildOverview();
+    this.overviewReady = true;
+    if (stride === 1) for (const block of this.blocks) block.level = 0;
+  }
+
+  // What is not there in detail, in one mesh.
+  rebuildOverview() {
+    const coarse = this.blocks.filter((b) => b.coarse && !b.mesh);
+    const count = coarse.reduce((sum, b) => sum + b.coarse.count, 0);
+    const words = new Uint32Array(2 * count);
+    const leaves = new Float32Array(4 * count);
+    let at = 0;
+    for (const block of coarse) {
+      words.set(block.coarse.words, 2 * at);
+      leaves.set(block.coarse.leaves, 4 * at);
+      at += block.coarse.count;
+    }
+    if (this.overview) {
+      this.group.remove(this.overview);
+      this.overview.geometry.dispose();
+    }
+    this.overview = this.mesh(words, leaves, count, this.overviewGrow);
+    this.group.add(this.overview);
+    this.stale = false;
+  }
+
+  // Which blocks in which detail, near and large ones first, within the budget.
+  update(camera) {
+    if (!this.overviewReady || performance.now() - (this.lastUpdate ?? 0) < 250) return;
+    this.lastUpdate = performance.now();
+    const frustum = new THREE.Frustum().setFromProjectionMatrix(
+      new THREE.Matrix4().multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse),
+    );
+    const ranked = this.blocks
+      .map((block) => {
+        const distance = Math.max(0.5, block.box.distanceToPoint(camera.position));
+        const size = block.sphere.radius / distance;
+        return { block, size: frustum.intersectsBox(block.box) ? size : 0.05 * size };
+      })
+      .sort((a, b) => b.size - a.size);
+    let left = this.budget - this.blocks.reduce((sum, b) => sum + (b.coarse?.count ?? 0), 0);
+    for (const { block, size } of ranked) {
+      const level = size > 0.35 ? 0 : size > 0.12 ? 1 : size > 0.04 ? 2 : -1;
+      const cost = level < 0 ? 0 : block.surfels / 4 ** level;
+      if (level >= 0 && cost <= left && !(block.level === 0 && !block.mesh)) {
+        block.wanted = level;
+        left -= cost;
+      } else {
+        block.wanted = -1;
+      }
+    }
+    for (const { block } of ranked) {
+      if (block.wanted < 0 && block.mesh) this.drop(block);
+    }
+    for (const { block } of ranked) {
+      if (this.loading >= 6) break;
+      if (block.wanted >= 0 && block.level !== block.wanted && !block.busy) this.loadBlock(block, block.wanted);
+    }
+    if (this.stale) this.rebuildOverview();
+  }
+
+  drop(block) {
+    this.group.remove(block.mesh);
+    block.mesh.geometry.dispose();
+    block.mesh = null;
+    block.level = -1;
+    this.stale = true;
+  }
+
+  async loadBlock(block, level) {
+    block.busy = true;
+    ++this.loading;
+    try {
+      const view = new DataView(await this.fetch(`/map/block/${this.blocks.indexOf(block)}/${level}`));
+      const { count, words, leaves } = this.decode(view, 0);
+      if (block.mesh) this.drop(block);
+      block.mesh = this.mesh(words, leaves, count, 2 ** level);
+      block.level = level;
+      this.group.add(block.mesh);
+      this.stale = true;
+    } catch {
+      // the run has ended: what is there stays
+    }
+    block.busy = false;
+    --this.loading;
+  }
+
+  get drawn() {
+    return this.group.children.reduce((sum, mesh) => sum + mesh.geometry.instanceCount, 0);
+  }
+
+  // The nearest surfel to a ray, by its centre: { place, distance } or null.
+  pick(ray) {
+    let best = null;
+    const place = new THREE.Vector3();
+    for (const mesh of this.group.children) {
+      const words = mesh.geometry.getAttribute("word").array;
+      const leaves = mesh.geometry.getAttribute("leaf").array;
+      for (let i = 0; i < mesh.geometry.instanceCount; ++i) {
+        const lo = words[2 * i];
+        place.set(
+          this.origin.x + leaves[4 * i] + (this.resolution * ((lo & 1023) + 0.5)) / 64,
+          this.origin.y + leaves[4 * i + 1] + (this.resolution * (((lo >>> 10) & 1023) + 0.5)) / 64,
+          this.origin.z + leaves[4 * i + 2] + (this.resolution * (((lo >>> 20) & 1023) + 0.5)) / 64,
+        );
+        if (place.z > this.uniforms.clipHigh.value.z) continue;
+        const along = place.clone().sub(ray.origin).dot(ray.direction);
+        if (along < 0.1) continue;
+        const off = ray.distanceToPoint(place);
+        // within a disc, or a hundredth of a radian
+        if (off > Math.max(this.resolution, 0.006 * along)) continue;
+        if (!best || along < best.distance) best = { place: place.clone(), distance: along };
+      }
+    }
+    return best;
+  }
+}
