@@ -337,7 +337,7 @@ void add_fly_command(CLI::App& parent, int& exit_code) {
   add_view_flags(*app, flags->view);
   app->callback([flags, &exit_code] {
     flags->ros.overwrite = flags->force;
-    flags->ros.view = flags->view.view;
+    flags->ros.view = flags->view.is_asked();
     exit_code = fly(*flags);
   });
 }

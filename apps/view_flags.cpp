@@ -65,12 +65,12 @@ void add_view_flags(CLI::App& app, ViewFlags& flags) {
   app.add_flag("--no-view-control", flags.no_control, "They may only watch")
       ->needs(view)
       ->excludes(control);
-  app.final_callback([&flags, view] { flags.view = view->count() > 0; });
+  flags.option = view;
 }
 
 std::shared_ptr<LiveServer> start_viewing(const ViewFlags& flags,
                                           const std::shared_ptr<const SurfelMap>& map) {
-  if (!flags.view) return nullptr;
+  if (!flags.is_asked()) return nullptr;
   LiveServerOptions options;
   parse_place(flags.at.empty() ? "" : flags.at.front(), options);
   options.control = flags.control || (is_loopback(options.address) && !flags.no_control);

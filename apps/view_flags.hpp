@@ -12,10 +12,13 @@ namespace pointflight::apps {
 
 /// Flags of commands whose result can be looked at in a browser.
 struct ViewFlags {
-  bool view = false;            ///< Serve it.
-  std::vector<std::string> at;  ///< ADDRESS:PORT, at most one.
-  bool control = false;         ///< Viewers may command, wherever it listens.
-  bool no_control = false;      ///< They may not, on loopback either.
+  const CLI::Option* option = nullptr;  ///< --view itself.
+  std::vector<std::string> at;          ///< ADDRESS:PORT, at most one.
+  bool control = false;                 ///< Viewers may command, wherever it listens.
+  bool no_control = false;              ///< They may not, on loopback either.
+
+  /// Somebody wants to look.
+  [[nodiscard]] bool is_asked() const { return option != nullptr && option->count() > 0; }
 };
 
 /// --view, --view-control, --no-view-control.

@@ -105,7 +105,8 @@ function lookAtStart() {
   state.placed = true;
   const p = new THREE.Vector3(...first.start);
   controls.target.copy(p);
-  camera.position.copy(p).add(new THREE.Vector3(-9, -7, 6));
+  camera.position.copy(p).add(new THREE.Vector3(-5, -4, 3));
+  $("camera").value = "follow";
 }
 
 const lines = [];
