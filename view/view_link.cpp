@@ -150,14 +150,15 @@ void ViewLink::open(const RunDescription& run) {
     }
   }
   const Aabb& bounds = run.map->bounds_world();
-  const json description = {{"seed", run.seed},
-                            {"vehicles", vehicles},
-                            {"epoch", epoch_.count()},
-                            {"map",
-                             {{"surfels", run.map->surfel_count()},
-                              {"resolution", run.map->resolution()},
-                              {"min", list_of(bounds.min)},
-                              {"max", list_of(bounds.max)}}}};
+  const json description = {
+      {"seed", run.seed},
+      {"vehicles", vehicles},
+      {"epoch", std::to_string(epoch_.count())},  // ns: more than a JSON number holds
+      {"map",
+       {{"surfels", run.map->surfel_count()},
+        {"resolution", run.map->resolution()},
+        {"min", list_of(bounds.min)},
+        {"max", list_of(bounds.max)}}}};
   server_->publish(run_, bytes_of(description), stamp(SimTime{}));
   server_->subscribe_json("/pointflight/order", "pointflight.Order", [this](const Received& text) {
     const Order order = page_order({reinterpret_cast<const char*>(text.data), text.size}, motions_);

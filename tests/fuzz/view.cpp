@@ -1,0 +1,38 @@
+// Frames that a stranger sends to the port of `--view`: a request, or an InputError of one line.
+// The first byte says whether it is text, binary, an order of the page, or a path.
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "pointflight/core/input_error.hpp"
+#include "view/foxglove.hpp"
+#include "view/page_content.hpp"
+#include "view/page_orders.hpp"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace pointflight;
+  if (size == 0) return 0;
+  const std::string_view text(reinterpret_cast<const char*>(data + 1), size - 1);
+  const auto bytes = std::as_bytes(std::span(data + 1, size - 1));
+  static const std::vector<MotionLimits> motions(2);
+  static const auto content = page_content("", nullptr);
+  try {
+    switch (data[0] % 4) {
+      case 0:
+        static_cast<void>(foxglove::parse_text(text));
+        break;
+      case 1:
+        static_cast<void>(foxglove::parse_binary(bytes));
+        break;
+      case 2:
+        static_cast<void>(page_order(text, motions));
+        break;
+      default:
+        if (content(std::string(text))) __builtin_trap();
+    }
+  } catch (const InputError& error) {
+    if (std::string(error.what()).find('\n') != std::string::npos) __builtin_trap();
+  }
+  return 0;
+}
