@@ -11,6 +11,10 @@ import path from "node:path";
 
 const [, , program, modules, folder, map] = process.argv;
 const require = createRequire(path.resolve(modules, "x.js"));
+if (!fs.existsSync(path.join(modules, "@foxglove/ws-protocol"))) {
+  console.log("@foxglove/ws-protocol is not there; ./dev test fetches it");
+  process.exit(77);
+}
 const { FoxgloveClient } = require("@foxglove/ws-protocol");
 const WebSocket = require("ws");
 const { parse } = require("@foxglove/rosmsg");

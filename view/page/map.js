@@ -43,14 +43,14 @@ void main() {
   vec3 middle = leaf.xyz + resolution * centre;
   vec3 world = (modelMatrix * vec4(middle, 1.0)).xyz;
   place = corner;
-  float reach = 2.0 * resolution * grow;
+  float reach = 2.5 * resolution * grow;  // discs of full cells close the gaps between their corners
   vec3 local = middle + reach * (corner.x * s1 * ax1 + corner.y * s2 * ax2);
   gl_Position = projectionMatrix * viewMatrix * modelMatrix * vec4(local, 1.0);
   if (any(lessThan(world, clipLow)) || any(greaterThan(world, clipHigh))) gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
   vec3 sight = normalize(cameraPosition - world);
   float light = 0.55 + 0.45 * abs(dot(normal, normalize(sight + vec3(0.3, 0.2, 0.9))));
   vec3 colour;
-  if (colouring == 0) colour = turbo(0.06 + 0.88 * (world.z - heights.x) / max(0.1, heights.y - heights.x));
+  if (colouring == 0) colour = turbo(0.08 + 0.84 * clamp((world.z - heights.x) / max(0.1, heights.y - heights.x), 0.0, 1.0));
   else if (colouring == 1) colour = vec3(0.15 + 0.85 * leaf.w / 255.0);
   else colour = thickness == 0 ? mix(vec3(0.30, 0.55, 0.75), vec3(0.55, 0.75, 0.85), abs(normal.z))
                                : vec3(0.85, 0.55, 0.25);
@@ -132,10 +132,11 @@ export class SurfelMap {
 
   // Floors and roofs may be far off: colours are of what most surfels lie between.
   setHeights() {
-    const z = this.blocks.map((b) => b.sphere.center.z).sort((a, b) => a - b);
-    const at = (share) => z[Math.min(z.length - 1, Math.floor(share * z.length))] ?? 0;
-    const room = 0.05 * (at(0.98) - at(0.02)) + 1;
-    this.uniforms.heights.value.set(at(0.02) - room, at(0.98) + room);
+    const sorted = (values) => values.sort((a, b) => a - b);
+    const low = sorted(this.blocks.map((b) => b.box.min.z));
+    const high = sorted(this.blocks.map((b) => b.box.max.z));
+    const at = (z, share) => z[Math.min(z.length - 1, Math.floor(share * z.length))] ?? 0;
+    this.uniforms.heights.value.set(at(low, 0.05), at(high, 0.95));
   }
 
   async fetch(path) {

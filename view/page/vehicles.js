@@ -142,7 +142,9 @@ export class ScanCloud {
       depthWrite: false,
       uniforms: { size: { value: 3 }, tint: { value: new THREE.Color("#ffd23f") } },
       vertexShader: `in float age; uniform float size; out float fade;
-        void main() { fade = 1.0 - 0.7 * age; gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0);
+        void main() { fade = 1.0 - 0.7 * age;
+        // a little nearer on the same sight line: points lie on what they measured and would sink into it
+        gl_Position = projectionMatrix * vec4(0.98 * (modelViewMatrix * vec4(position, 1.0)).xyz, 1.0);
         gl_PointSize = size; }`,
       fragmentShader: `precision highp float; in float fade; uniform vec3 tint; out vec4 colour;
         void main() { if (length(gl_PointCoord - 0.5) > 0.5) discard; colour = vec4(tint, fade); }`,

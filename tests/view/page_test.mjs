@@ -1,0 +1,169 @@
+// The page in the distribution's Chromium with software GL: a live flight. Map, drone and scan are where the
+// truth projects to, the drone moves, a double click flies it to a goal, keys pause and go on; nothing on the
+// console. Arguments: program, folder of node_modules, folder to work in, and a picture to write, if any.
+import assert from "node:assert/strict";
+import { spawn } from "node:child_process";
+import fs from "node:fs";
+import { createRequire } from "node:module";
+import path from "node:path";
+
+const [, , program, modules, folder, picture] = process.argv;
+const CHROMIUM = "/usr/bin/chromium";
+const require = createRequire(path.resolve(modules, "x.js"));
+let chromium;
+try {
+  ({ chromium } = require("playwright-core"));
+} catch {
+  console.log("playwright-core is not there; ./dev test fetches it");
+  process.exit(77);
+}
+if (!fs.existsSync(CHROMIUM)) {
+  console.log(`${CHROMIUM} is not there; ./dev view installs it`);
+  process.exit(77);
+}
+
+// A floor of 12 x 12 m, a wall at x = 6, 3 m high, and a post.
+const points = [];
+for (let x = -6; x < 6; x += 0.04) for (let y = -6; y < 6; y += 0.04) points.push([x, y, 0]);
+for (let y = -6; y < 6; y += 0.04) for (let z = 0; z < 3; z += 0.04) points.push([6, y, z]);
+for (let a = 0; a < 6.28; a += 0.15) for (let z = 0; z < 2.5; z += 0.03) points.push([2 + 0.2 * Math.cos(a), -3 + 0.2 * Math.sin(a), z]);
+const xyz = path.join(folder, "place.xyz");
+const map = path.join(folder, "place.pfmap");
+fs.writeFileSync(xyz, points.map((p) => p.map((v) => v.toFixed(4)).join(" ")).join("\n") + "\n");
+const made = spawn(program, ["map", "import", xyz, "--resolution", "0.15", "-o", map, "--force"]);
+assert.equal(await new Promise((r) => made.on("close", r)), 0);
+fs.writeFileSync(
+  path.join(folder, "s.yaml"),
+  `map: place.pfmap\nvehicle: {start: [0, 0, 1.2]}\nlidars: [{model: os1_32}]\nobstacles:\n  - {motion: still, position: [3, 3, 0.5], shape: box, size: [1, 1, 1]}\n`,
+);
+
+const run = spawn(program, ["fly", path.join(folder, "s.yaml"), "--view", "127.0.0.1:0"]);
+let log = "";
+const address = await new Promise((resolve, reject) => {
+  run.stderr.on("data", (data) => {
+    log += data;
+    const found = log.match(/watch it: (http:\/\/[^\s]+)/);
+    if (found) resolve(found[1]);
+  });
+  run.on("close", () => reject(new Error(log)));
+});
+const flags = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"];
+const browser = await chromium.launch({ executablePath: CHROMIUM, args: ["--headless=new", ...flags] });
+try {
+  const page = await browser.newPage({ viewport: { width: 900, height: 600 } });
+  const wrong = [];
+  page.on("console", (m) => m.type() === "error" && wrong.push(m.text()));
+  page.on("pageerror", (e) => wrong.push(e.message));
+  const opened = Date.now();
+  await page.goto(`${address}&budget=30000&pixels=1`);
+  const until = (what, condition) => page.waitForFunction(condition, null, { timeout: 60000, polling: 100 }).catch(() => assert.fail(`${what}: not within a minute`));
+  await until("the map", () => window.pointflight?.map.overviewReady);
+  console.log(`first picture of the map after ${Date.now() - opened} ms`);
+  await until("a state", () => window.pointflight.state.last?.vehicles[0]?.p);
+  await until("a scan", () => [...window.pointflight.state.vehicles[0].scans.values()].some((s) => s.cloud?.count > 100));
+
+  // a camera of our own: what is where it projects to
+  const look = (from, to) =>
+    page.evaluate(
+      ([a, b]) => {
+        const { camera, controls } = window.pointflight;
+        document.getElementById("camera").value = "orbit";
+        controls.enableDamping = false;
+        camera.position.set(...a);
+        controls.target.set(...b);
+        controls.update();
+      },
+      [from, to],
+    );
+  // After two frames: colours where places project to, and whether each is in the picture.
+  const colours = (places) =>
+    page.evaluate(async (list) => {
+      const { camera, THREE } = window.pointflight;
+      const frames = window.pointflight.state.frames + 2;
+      while (window.pointflight.state.frames < frames) await new Promise((r) => setTimeout(r, 20));
+      const canvas = document.querySelector("#scene canvas");
+      const copy = new OffscreenCanvas(canvas.width, canvas.height);
+      const context = copy.getContext("2d");
+      context.drawImage(canvas, 0, 0);
+      camera.updateMatrixWorld();
+      return list.map((p) => {
+        const v = new THREE.Vector3(...p).project(camera);
+        const x = Math.round((0.5 + 0.5 * v.x) * canvas.width);
+        const y = Math.round((0.5 - 0.5 * v.y) * canvas.height);
+        const seen = Math.abs(v.z) < 1 && x >= 0 && y >= 0 && x < canvas.width && y < canvas.height;
+        return { x, y, seen, rgb: [...context.getImageData(x, y, 1, 1).data].slice(0, 3) };
+      });
+    }, places);
+  const paper = [0x10, 0x12, 0x16];
+  const isPaper = ({ rgb }) => rgb.every((v, i) => Math.abs(v - paper[i]) < 12);
+
+  await look([-9, 0, 6], [2, 0, 0.5]);
+  const hideScans = (hide) => page.evaluate((h) => { const box = document.getElementById("scans"); if (box.checked === h) box.click(); }, hide);
+  await hideScans(true);
+  const there = [];
+  for (let y = -5; y <= 5; y += 1) for (let z = 0.4; z < 2.8; z += 0.6) there.push([6, y, z]);
+  for (let x = -4; x <= 4; x += 1) for (let y = -5; y <= 5; y += 1) there.push([x, y, 0]);
+  const nothing = [];
+  for (let y = -5; y <= 5; y += 1) nothing.push([6, y, 3.8], [6, y, 4.5]);
+  const onMap = (await colours(there)).filter((c) => c.seen);
+  const beside = (await colours(nothing)).filter((c) => c.seen);
+  assert.ok(onMap.length > 100 && beside.length > 10);
+  const covered = onMap.filter((c) => !isPaper(c)).length / onMap.length;
+  if (covered <= 0.97) { if (picture) await page.screenshot({ path: picture, timeout: 60000 }); console.log(JSON.stringify(onMap.filter(isPaper).slice(0, 12)), JSON.stringify(there.length)); }
+  assert.ok(covered > 0.97, `${covered} of the map's places are drawn`);
+  assert.ok(beside.every(isPaper), "nothing is drawn where nothing is");
+  // heights have their colours: the wall is redder above than below
+  const [low, high] = await colours([[6, 2, 0.3], [6, 2, 2.8]]);
+  assert.ok(high.rgb[0] - high.rgb[2] > low.rgb[0] - low.rgb[2] + 60, `${low.rgb} below, ${high.rgb} above`);
+  // the obstacle
+  const [box] = await colours([[2.5, 3, 0.8]]);
+  assert.ok(box.rgb[0] > 1.4 * box.rgb[1] && !isPaper(box), `the box is ${box.rgb}`);
+
+  // the drone: its body is the vehicle's colour
+  const p = await page.evaluate(() => window.pointflight.state.last.vehicles[0].p);
+  await look([p[0] - 1.2, p[1] - 0.6, p[2] + 0.6], p);
+  const [body] = await colours([[p[0], p[1], p[2]]]);
+  assert.ok(body.rgb[0] > 1.5 * body.rgb[2] && body.rgb[0] > 80, `the drone is ${body.rgb}`);
+
+  // the scan: its points are drawn where they are, in their colour
+  await hideScans(false);
+  await look([-9, 0, 6], [2, 0, 0.5]);
+  await page.evaluate(() => window.pointflight.client.order({ pause: true }));
+  await until("the pause", () => window.pointflight.state.last.doing === "paused");
+  const cloud = await page.evaluate(() => {
+    const { cloud: c } = [...window.pointflight.state.vehicles[0].scans.values()][0];
+    const young = [];
+    for (let i = Math.floor(0.7 * c.count); i < c.count; i += 3) young.push([...c.positions.subarray(3 * i, 3 * i + 3)]);
+    return young;
+  });
+  const onScan = (await colours(cloud)).filter((c) => c.seen);
+  const yellow = onScan.filter(({ rgb }) => rgb[0] > 150 && rgb[1] > 110 && rgb[2] < 0.75 * rgb[1]).length / onScan.length;
+  assert.ok(onScan.length > 100 && yellow > 0.85, `${yellow} of ${onScan.length} points are drawn`);
+  const on = cloud.filter((q) => Math.abs(q[2]) < 0.15 || Math.abs(q[0] - 6) < 0.15 || Math.hypot(q[0] - 2, q[1] + 3) < 0.4 || (Math.abs(q[0] - 3) < 0.65 && Math.abs(q[1] - 3) < 0.65));
+  // noise, and mixed pixels between post and wall
+  assert.ok(on.length > 0.95 * cloud.length, `${on.length} of ${cloud.length} points lie on what is there`);
+  if (picture) await page.screenshot({ path: picture, timeout: 60000 });
+
+  // a double click on the floor flies it there
+  await page.evaluate(() => window.pointflight.client.order({ pause: false }));
+  await hideScans(true);
+  const goal = [-3, -3, 0];
+  await look([-9, 0, 6], [2, 0, 0.5]);
+  const [pixel] = await colours([goal]);
+  await page.mouse.dblclick(pixel.x, pixel.y);
+  await page
+    .waitForFunction((g) => { const q = window.pointflight.state.last.vehicles[0].p; return Math.hypot(q[0] - g[0], q[1] - g[1]) < 0.4 && Math.abs(q[2] - 1.5) < 0.3; }, goal, { timeout: 60000, polling: 200 })
+    .catch(async () => assert.fail(`it did not fly there: ${JSON.stringify(await page.evaluate(() => window.pointflight.state.last.vehicles[0].p))}`));
+  // and an arrow key moves it, while it is held
+  const before = await page.evaluate(() => window.pointflight.state.last.vehicles[0].p[2]);
+  await page.keyboard.down("PageUp");
+  await page.waitForFunction((z) => window.pointflight.state.last.vehicles[0].p[2] > z + 0.3, before, { timeout: 60000, polling: 100 });
+  await page.keyboard.up("PageUp");
+  const cost = await page.evaluate(() => window.pointflight.state.cost);
+  console.log(`${onMap.length} places of the map, ${onScan.length} of a scan; ${cost.toFixed(0)} ms of script per frame`);
+  assert.deepEqual(wrong, [], "errors on the console");
+} finally {
+  await browser.close();
+  run.kill("SIGINT");
+}
+assert.ok([0, 1, 130].includes(await new Promise((r) => run.on("close", r))), log);
