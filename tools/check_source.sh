@@ -26,7 +26,7 @@ allowed() {
     ros1) echo "ros_common ros1" ;;
     ros2) echo "core ros_common ros2" ;;
     recording) echo "core geometry io fit ros_common recording" ;;
-    view) echo "core geometry io map lidar sim run ros_common view" ;;
+    view) echo "core geometry io map lidar vehicle sim run ros_common view" ;;
   esac
 }
 for folder in core geometry io map render lidar vehicle world fit fidelity sim run ros_common recording view ros1 ros2; do

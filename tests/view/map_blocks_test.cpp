@@ -93,7 +93,7 @@ TEST(MapBlocks, LevelsAndTheOverviewAreThinner) {
     }
     EXPECT_EQ(heads, blocks.size());
     if (most == 1000) {
-      EXPECT_NEAR(surfels, 1000, 500);
+      EXPECT_NEAR(static_cast<double>(surfels), 1000.0, 500.0);
     }
     if (most > 1000) {
       EXPECT_EQ(surfels, map->surfel_count());
