@@ -26,7 +26,7 @@ struct RosFlags {
   std::string compression = "zstd";
   bool overwrite = false;  ///< Recordings that are there already.
 
-  bool view = false;       ///< Somebody watches by the protocol of Foxglove (`ViewFlags`).
+  bool view = false;  ///< Somebody watches by the protocol of Foxglove (`ViewFlags`).
 
   /// Others' nodes may listen and command.
   [[nodiscard]] bool has_ros() const { return ros1 || ros2; }

@@ -99,7 +99,8 @@ TEST(Playback, ARunsFolderGivesTheMessagesOfTheRun) {
   Link* const links[] = {ros.get()};
   play(run, links, {});
 
-  // statuses and infrared pictures are not in the folder, and the way within a scan is known by 200 states per second
+  // statuses and infrared pictures are not in the folder, and the way within a scan is known by 200
+  // states per second
   const std::set<std::string> differ = {"/diagnostics"};
   for (const auto& [topic, messages] : flown) {
     if (topic.ends_with("infrared")) continue;
