@@ -71,15 +71,26 @@ void add_view_flags(CLI::App& app, ViewFlags& flags) {
 std::shared_ptr<LiveServer> start_viewing(const ViewFlags& flags,
                                           const std::shared_ptr<const SurfelMap>& map) {
   if (!flags.is_asked()) return nullptr;
+  return serve_view({flags.at.empty() ? "" : flags.at.front(), flags.control, flags.no_control},
+                    map);
+}
+
+std::shared_ptr<LiveServer> serve_view(
+    const ViewPlace& place,
+    const std::shared_ptr<const SurfelMap>& map,
+    const std::optional<std::pair<std::int64_t, std::int64_t>>& range) {
   LiveServerOptions options;
-  parse_place(flags.at.empty() ? "" : flags.at.front(), options);
-  options.control = flags.control || (is_loopback(options.address) && !flags.no_control);
+  parse_place(place.at, options);
+  options.control = place.control || (is_loopback(options.address) && !place.no_control);
+  options.range = range;
+  if (range) options.capabilities = {"playbackControl"};
   const std::string folder = page_folder();
   options.content = page_content(folder, std::make_shared<const MapBlocks>(map));
   auto server = std::make_shared<LiveServer>(std::move(options));
   if (folder.empty()) {
-    log("--view: the page was not built, which takes node and npm (./dev build); Foxglove and "
-        "Lichtblick can connect:");
+    log("the page was not built, which takes node and npm (./dev build); Foxglove and Lichtblick "
+        "can "
+        "connect:");
   }
   log(fmt::format("watch it: {}", server->address()));
   return server;

@@ -1,8 +1,11 @@
 #pragma once
 
 #include <CLI/App.hpp>
+#include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "pointflight/map/surfel_map.hpp"
@@ -21,10 +24,24 @@ struct ViewFlags {
   [[nodiscard]] bool is_asked() const { return option != nullptr && option->count() > 0; }
 };
 
+/// Where viewers connect and what they may.
+struct ViewPlace {
+  std::string at;           ///< ADDRESS:PORT; empty: 127.0.0.1:8765.
+  bool control = false;     ///< As `ViewFlags`.
+  bool no_control = false;  ///< As `ViewFlags`.
+};
+
+/// Serves the page and the map and says its address; `range`: first and last time of what can be
+/// played back, ns. Throws InputError.
+std::shared_ptr<LiveServer> serve_view(
+    const ViewPlace& place,
+    const std::shared_ptr<const SurfelMap>& map,
+    const std::optional<std::pair<std::int64_t, std::int64_t>>& range = std::nullopt);
+
 /// --view, --view-control, --no-view-control.
 void add_view_flags(CLI::App& app, ViewFlags& flags);
 
-/// Serves the page and the map and says its address; null where nobody asked. Throws InputError.
+/// As the flags say; null where nobody asked. Throws InputError.
 std::shared_ptr<LiveServer> start_viewing(const ViewFlags& flags,
                                           const std::shared_ptr<const SurfelMap>& map);
 

@@ -115,6 +115,10 @@ void RosLink::on_reset(SimTime reached) {
   bridge_.shift_epoch(reached.time_since_epoch() + std::chrono::seconds(1));
 }
 
+void RosLink::on_seek(SimTime /*to*/) {
+  bridge_.shift_epoch(Duration{});  // schedules start anew, stamps are the recorded ones
+}
+
 void RosLink::close() {
   for (StoredOutlet& recording : recordings_) recording.outlet->close();
   say_failed_recordings();

@@ -47,6 +47,7 @@ class RosLink : public Link {
   void on_wait(SimTime now, Waiting why) override;
   std::vector<Order> take_orders() override;
   void on_reset(SimTime reached) override;
+  void on_seek(SimTime to) override;
   void close() override;
   [[nodiscard]] bool is_over() const override;
   [[nodiscard]] bool is_in_use() const override { return in_use_; }

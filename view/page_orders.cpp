@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -16,6 +17,7 @@ using nlohmann::json;
 constexpr double kFarthest = 1e7;   // m
 constexpr double kFastest = 200.0;  // m/s
 constexpr double kMostRate = 1000.0;
+constexpr double kLongestRun = 1e6;  // s
 
 double number_of(const json& value, const char* name, double most) {
   const double number = value.is_number() ? value.get<double>() : std::nan("");
@@ -44,6 +46,10 @@ std::optional<Order> run_order(const json& order) {
   if (order.contains("pause")) return PauseOrder{flag_of(order["pause"], "pause")};
   if (order.contains("step")) return StepOrder{};
   if (order.contains("reset")) return ResetOrder{};
+  if (order.contains("seek")) {
+    const double to = number_of(order["seek"], "seek", kLongestRun);
+    return SeekOrder{SimTime(from_seconds(std::max(0.0, to)))};
+  }
   if (order.contains("rate")) {
     const double rate = number_of(order["rate"], "rate", kMostRate);
     if (rate < 0.0) throw InputError("'rate' is not below 0");
@@ -81,7 +87,7 @@ Order page_order(std::string_view text, const std::vector<MotionLimits>& motions
   } else if (order.contains("hover")) {
     told.command = HoverCommand{};
   } else {
-    throw InputError("an order has a goal, a velocity, hover, pause, step, reset or rate");
+    throw InputError("an order has a goal, a velocity, hover, pause, step, reset, rate or seek");
   }
   return told;
 }

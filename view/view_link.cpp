@@ -168,6 +168,26 @@ void ViewLink::open(const RunDescription& run) {
   });
 }
 
+void ViewLink::let_play_back() {
+  server_->on_playback([this](const foxglove::PlaybackControl& control) {
+    const std::lock_guard lock(mutex_);
+    if (control.seek) orders_.emplace_back(SeekOrder{SimTime(Duration(*control.seek) - epoch_)});
+    orders_.emplace_back(RateOrder{static_cast<double>(control.speed)});
+    orders_.emplace_back(PauseOrder{!control.play});
+  });
+}
+
+void ViewLink::publish_playback(const PlaybackStatus& status) {
+  using Status = foxglove::PlaybackState::Status;
+  foxglove::PlaybackState state;
+  state.status = status.playing ? Status::kPlaying : Status::kPaused;
+  if (status.ended) state.status = Status::kEnded;
+  state.time = stamp(status.time);
+  state.speed = static_cast<float>(status.rate);
+  state.did_seek = status.did_seek;
+  server_->publish_playback(state);
+}
+
 std::vector<Order> ViewLink::take_orders() {
   const std::lock_guard lock(mutex_);
   return std::exchange(orders_, {});
@@ -284,6 +304,12 @@ void ViewLink::on_reset(SimTime reached) {
   rate_from_ = SimTime{};
   obstacles_.reset();
   server_->new_session();
+}
+
+void ViewLink::on_seek(SimTime to) {
+  rate_from_ = to;
+  last_rate_ = Clock::now();
+  obstacles_.reset();
 }
 
 void ViewLink::close() {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "pointflight/run/link.hpp"
+#include "pointflight/run/playback.hpp"
 #include "view/live_server.hpp"
 
 namespace pointflight {
@@ -24,12 +25,18 @@ class ViewLink : public Link {
   /// Stamps count from `epoch`.
   ViewLink(std::shared_ptr<LiveServer> server, Duration epoch);
 
+  /// Before `open`, for a run that is played back: clients' playback controls become orders.
+  void let_play_back();
+  /// Tells clients how the playback stands.
+  void publish_playback(const PlaybackStatus& status);
+
   void open(const RunDescription& run) override;
   void on_sample(const Sample& sample) override;
   void on_step(const StepDone& step) override;
   void on_wait(SimTime now, Waiting why) override;
   std::vector<Order> take_orders() override;
   void on_reset(SimTime reached) override;
+  void on_seek(SimTime to) override;
   void close() override;
   /// Nobody flies for a viewer's sake alone... but those who watch want the run to go on.
   [[nodiscard]] bool is_in_use() const override { return true; }

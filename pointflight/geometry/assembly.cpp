@@ -106,8 +106,9 @@ std::vector<Vector3d> surface_points(const Assembly& assembly, double spacing, S
     for (int k = 0; k < propeller.blades; ++k) {
       const Blade blade = blade_at(propeller, k, time);
       for (int i = 0; i < along * across; ++i) {
+        const int row = i / along;
         const double out = propeller.hub_radius + length * (i % along + 0.5) / along;
-        const double side = propeller.chord * ((i / along + 0.5) / across - 0.5);
+        const double side = propeller.chord * ((row + 0.5) / across - 0.5);
         points.push_back(propeller.center + out * blade.outward + side * blade.chord);
       }
     }

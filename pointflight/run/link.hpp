@@ -47,6 +47,8 @@ class Link : public SampleSink {
 
   /// The run is about to start again at time zero; it has come to `reached`.
   virtual void on_reset(SimTime /*reached*/) {}
+  /// A run that is played back goes on at another time; nothing of what came before holds.
+  virtual void on_seek(SimTime /*to*/) {}
   /// The run has ended: nothing comes any more.
   virtual void close() {}
 

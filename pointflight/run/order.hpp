@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <variant>
 
+#include "pointflight/core/time.hpp"
 #include "pointflight/vehicle/command.hpp"
 
 namespace pointflight {
@@ -24,8 +25,13 @@ struct EndOrder {};    ///< End the run as interrupted.
 struct RateOrder {
   double rate = 1.0;  ///< 0: as fast as it goes.
 };
+/// Of a run that is played back: go to another time.
+struct SeekOrder {
+  SimTime to;  ///< Of the run.
+};
 
 /// What may be told to a run from outside; those without a vehicle are about the run.
-using Order = std::variant<VehicleOrder, PauseOrder, StepOrder, ResetOrder, EndOrder, RateOrder>;
+using Order =
+    std::variant<VehicleOrder, PauseOrder, StepOrder, ResetOrder, EndOrder, RateOrder, SeekOrder>;
 
 }  // namespace pointflight

@@ -32,7 +32,9 @@ class RecordedRun {
   [[nodiscard]] Duration step() const;
 
   /// To be played from its start again.
-  void rewind();
+  void rewind() { seek(SimTime{}); }
+  /// To be played on from the step that starts at `time` or before it.
+  void seek(SimTime time);
   /// Samples that came in the step that starts at `time`, in the order in which they came. Steps
   /// are asked for one after the other. Throws InputError.
   void play_step(SimTime time, SampleSink& sink);
@@ -42,15 +44,29 @@ class RecordedRun {
   std::unique_ptr<Files> files_;
 };
 
+/// How a playback stands.
+struct PlaybackStatus {
+  SimTime time;           ///< Reached.
+  bool playing = true;    ///< False: it stands still.
+  bool ended = false;     ///< At the run's end.
+  double rate = 0.0;      ///< As `PlaybackOptions`.
+  bool did_seek = false;  ///< It jumped there.
+};
+
 /// How a recorded run is played.
 struct PlaybackOptions {
   double rate = 0.0;                  ///< Recorded seconds per second; 0: as fast as it goes.
   Progress progress;                  ///< Of the run's length.
   std::function<bool()> interrupted;  ///< True once the user wants it to end.
+  /// Pause, step, rate and seek are obeyed, and at its end it stands still until it is interrupted.
+  bool controlled = false;
+  /// Called when it starts, stands still, goes on, jumps; where it is controlled.
+  std::function<void(const PlaybackStatus&)> on_status;
 };
 
 /// Plays it from its start through links, which get what they got when it was flown: samples and
-/// steps. Their orders are taken and not obeyed, but for `EndOrder`.
+/// steps. Their orders are taken and not obeyed, but for `EndOrder` and, where it is controlled,
+/// those that say when.
 void play(RecordedRun& run, std::span<Link* const> links, const PlaybackOptions& options);
 
 }  // namespace pointflight

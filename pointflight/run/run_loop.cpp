@@ -217,7 +217,7 @@ void RunLoop::obey(Link& link, const Order& order) {
   } else if (const auto* rate = std::get_if<RateOrder>(&order)) {
     pace_ = Pace(rate->rate);
     pace_.restart_at(simulation_.time());
-  } else {
+  } else if (std::holds_alternative<EndOrder>(order)) {
     ended_ = true;
   }
 }

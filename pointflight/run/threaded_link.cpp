@@ -48,6 +48,10 @@ void ThreadedLink::on_reset(SimTime reached) {
   push(Reset{reached});
 }
 
+void ThreadedLink::on_seek(SimTime to) {
+  push(Seek{to});
+}
+
 std::vector<Order> ThreadedLink::take_orders() {
   rethrow();
   const std::lock_guard lock(mutex_);
@@ -131,7 +135,8 @@ void ThreadedLink::hand_over(const Event& event) {
                         [this](const StepDone& step) { link_.on_step(step); },
                         [this](const Waited& waited) { link_.on_wait(waited.now, waited.why); },
                         [this](const Rejected& r) { link_.on_rejected(r.order, r.why); },
-                        [this](const Reset& reset) { link_.on_reset(reset.reached); }},
+                        [this](const Reset& reset) { link_.on_reset(reset.reached); },
+                        [this](const Seek& seek) { link_.on_seek(seek.to); }},
              event);
 }
 

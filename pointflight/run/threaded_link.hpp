@@ -37,6 +37,7 @@ class ThreadedLink : public Link {
   std::vector<Order> take_orders() override;
   void on_rejected(const VehicleOrder& order, const std::string& why) override;
   void on_reset(SimTime reached) override;
+  void on_seek(SimTime to) override;
   /// Waits until the link has taken all that is queued. Throws what it threw.
   void close() override;
   [[nodiscard]] bool is_over() const override { return link_.is_over(); }
@@ -55,7 +56,10 @@ class ThreadedLink : public Link {
   struct Reset {
     SimTime reached;
   };
-  using Event = std::variant<Sample, StepDone, Waited, Rejected, Reset>;
+  struct Seek {
+    SimTime to;
+  };
+  using Event = std::variant<Sample, StepDone, Waited, Rejected, Reset, Seek>;
 
   static bool merge(const Event& earlier, Event& later);
   void drop_sample();

@@ -26,6 +26,7 @@ TEST(PageOrders, AreReadOrSaidWhatIsWrongWithThem) {
   EXPECT_TRUE(std::holds_alternative<StepOrder>(order(R"({"step":true})")));
   EXPECT_TRUE(std::holds_alternative<ResetOrder>(order(R"({"reset":true})")));
   EXPECT_EQ(std::get<RateOrder>(order(R"({"rate":0.1})")).rate, 0.1);
+  EXPECT_EQ(std::get<SeekOrder>(order(R"({"seek":2.5})")).to, SimTime(from_seconds(2.5)));
   for (const char* wrong : {"",
                             "[]",
                             "{}",

@@ -51,12 +51,17 @@ const client = new Client(address, {
   open: () => say("connected"),
   close: () => ($("title").textContent = "the run has ended, or the connection is gone"),
   session: () => state.vehicles.forEach((v) => v.forget()),
-  info: () => setPermission(),
+  info: (info) => {
+    setPermission();
+    const seconds = (t) => t.sec + 1e-9 * t.nsec;
+    $("line").style.display = info.dataEndTime ? "" : "none";
+    if (info.dataEndTime) $("line").max = seconds(info.dataEndTime) - seconds(info.dataStartTime);
+  },
   status: (message) => say(message.message),
 });
 
 function setPermission() {
-  for (const id of ["pause", "step", "reset"]) $(id).disabled = !client.mayCommand;
+  for (const id of ["pause", "step", "reset", "rate", "line"]) $(id).disabled = !client.mayCommand;
   $("hint").textContent = client.mayCommand ? "double click: fly there; ? for keys" : "watching only; ? for keys";
 }
 
@@ -84,7 +89,9 @@ client.want("/pointflight/run", (bytes) => {
 
 client.want("/pointflight/state", (bytes) => {
   const now = json(bytes);
+  if (state.last && now.t < state.last.t - 0.5) state.vehicles.forEach((v) => v.forget());
   state.last = now;
+  if (document.activeElement !== $("line")) $("line").value = now.t;
   now.vehicles.forEach((v, i) => state.vehicles[i]?.update(v, now.t));
   obstacles.update(now.obstacles);
   $("time").textContent = `${now.t.toFixed(1)} s`;
@@ -235,6 +242,9 @@ function flyTo(x, y, z) {
 
 $("pause").onclick = () => client.order({ pause: state.last?.doing !== "paused" });
 $("step").onclick = () => client.order({ step: true });
+$("rate").onchange = () => client.order({ rate: Number($("rate").value) });
+$("line").oninput = () => client.order({ seek: Number($("line").value) });
+$("line").onchange = () => $("line").blur();
 $("reset").onclick = () => client.order({ reset: true });
 $("shot").onclick = () => {
   draw(0);

@@ -1,0 +1,110 @@
+#include <fmt/format.h>
+
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <array>
+#include <chrono>
+#include <filesystem>
+#include <memory>
+#include <thread>
+
+#include "apps/commands.hpp"
+#include "apps/terminal.hpp"
+#include "apps/view_flags.hpp"
+#include "pointflight/core/input_error.hpp"
+#include "pointflight/run/playback.hpp"
+#include "ros_common/profile.hpp"
+#include "ros_common/ros_link.hpp"
+#include "view/foxglove_transport.hpp"
+#include "view/view_link.hpp"
+
+namespace pointflight::apps {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct ViewCommandFlags {
+  std::string input;
+  std::string at;
+  bool control = false;
+  bool no_control = false;
+  int threads = 0;
+};
+
+ViewPlace place_of(const ViewCommandFlags& flags) {
+  return {flags.at, flags.control, flags.no_control};
+}
+
+/// A map alone, until it is interrupted.
+void view_map(const ViewCommandFlags& flags) {
+  const auto map = SurfelMap::open(flags.input);
+  const auto server = serve_view(place_of(flags), map);
+  catch_interrupts();
+  while (!interrupted()) std::this_thread::sleep_for(std::chrono::milliseconds(50));
+}
+
+/// A finished run, to be played as viewers like.
+void view_run(const ViewCommandFlags& flags) {
+  const Executor executor(flags.threads);
+  RecordedRun run(flags.input, executor);
+  const RunDescription& description = run.description();
+  const Duration epoch = kFixedEpoch;
+  const std::pair range(epoch.count(), (run.end().time_since_epoch() + epoch).count());
+  const auto server = serve_view(place_of(flags), description.map, range);
+  RosLinkOptions options;
+  options.epoch = epoch;
+  options.log = [](const std::string& line) { log(line); };
+  RosLink ros(description, load_ros_profile("default"), std::move(options));
+  ros.add_transport(std::make_unique<FoxgloveTransport>(server));
+  ViewLink view(server, epoch);
+  view.let_play_back();
+  catch_interrupts();
+  PlaybackOptions playback;
+  playback.rate = 1.0;
+  playback.interrupted = interrupted;
+  playback.controlled = true;
+  playback.on_status = [&](const PlaybackStatus& status) { view.publish_playback(status); };
+  const std::array<Link*, 2> links = {&ros, &view};
+  play(run, links, playback);
+}
+
+int view(const ViewCommandFlags& flags) {
+  std::error_code ignored;
+  if (fs::is_directory(flags.input, ignored)) {
+    view_run(flags);
+  } else if (flags.input.ends_with(".pfmap")) {
+    view_map(flags);
+  } else if (flags.input.ends_with(".mcap")) {
+    throw InputError(fmt::format(
+        "{}: is a recording: open it in Foxglove or Lichtblick; here the folder of a run is shown",
+        flags.input));
+  } else {
+    throw InputError(fmt::format("{}: is no folder of a run and no map (.pfmap)", flags.input));
+  }
+  return kDone;
+}
+
+}  // namespace
+
+void add_view_command(CLI::App& parent, int& exit_code) {
+  auto* app = parent.add_subcommand(
+      "view", "Show a map, or a finished run with a time line, in a browser; until Ctrl-C");
+  auto flags = std::make_shared<ViewCommandFlags>();
+  app->add_option("input", flags->input, "A .pfmap, or the folder of a run")
+      ->required()
+      ->check(CLI::ExistingPath);
+  app->add_option("--at",
+                  flags->at,
+                  "ADDRESS:PORT; 127.0.0.1:8765 or the next port that is free, so that only this "
+                  "machine can connect");
+  auto* control = app->add_flag("--view-control",
+                                flags->control,
+                                "Viewers may play, pause and jump (the default where only this "
+                                "machine can connect)");
+  app->add_flag("--no-view-control", flags->no_control, "They may only watch")->excludes(control);
+  app->add_option("--threads", flags->threads, "0: all cores")->check(CLI::Range(0, 1024));
+  app->callback([flags, &exit_code] { exit_code = view(*flags); });
+}
+
+}  // namespace pointflight::apps
