@@ -130,7 +130,7 @@ void read_scan_points(const std::string& path, std::span<const Beam> beams, Scan
     if (marks.unknown) point.is_unknown = *mark++ != 0;
     if (marks.echoes) point.echo = static_cast<std::uint8_t>(*mark++);
     if (marks.truth) {
-      TruthRow truth;
+      TruthRow truth{};
       std::memcpy(&truth, mark, sizeof truth);
       scan.truth[i] = truth_of(truth);
     }
