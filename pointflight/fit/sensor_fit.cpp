@@ -17,7 +17,7 @@
 namespace pointflight {
 namespace {
 
-constexpr double kNearest = 0.05;         // m: drivers put what did not come back at zero
+constexpr double kTooNear = 0.05;         // m: drivers put what did not come back at zero
 constexpr std::size_t kLeastPoints = 40;  // of a patch
 constexpr std::size_t kLeastPatches = 30;
 constexpr double kOnPlane = 0.9;        // of a patch's points, at least
@@ -328,7 +328,7 @@ RingPoints rings_of(const RecordedScan& scan) {
   RingPoints rings;
   for (const RecordedPoint& point : scan.points) {
     const double level = std::hypot(point.position.x(), point.position.y());
-    if (point.ring < 0 || !std::isfinite(point.time) || !(level > kNearest)) continue;
+    if (point.ring < 0 || !std::isfinite(point.time) || !(level > kTooNear)) continue;
     rings[point.ring].push_back(&point);
   }
   for (auto& [number, points] : rings) {
@@ -558,7 +558,7 @@ SensorFit fit_sensor(std::span<const RecordedScan> scans,
   for (std::size_t k = 0; k < scans.size(); ++k) {
     for (const RecordedPoint& point : scans[k].points) {
       const float range = point.position.norm();
-      if (!(static_cast<double>(range) > kNearest) || !std::isfinite(range)) continue;
+      if (!(static_cast<double>(range) > kTooNear) || !std::isfinite(range)) continue;
       sights.push_back({point.position / range, range, static_cast<std::uint32_t>(k), point.ring});
       fit.range_min = std::min(fit.range_min, static_cast<double>(range));
       fit.range_max = std::max(fit.range_max, static_cast<double>(range));
