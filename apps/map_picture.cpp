@@ -6,6 +6,7 @@
 
 #include "apps/map_layers.hpp"
 #include "apps/map_views.hpp"
+#include "apps/perspective.hpp"
 #include "apps/pictures.hpp"
 
 namespace pointflight::apps {
@@ -15,7 +16,8 @@ std::unique_ptr<Canvas> map_page(const SurfelMap& map, const std::string& title)
   const MapLayers layers(map);
   Aabb bounds = map.bounds_world();
   if (bounds.empty()) bounds.add(Vector3d::Zero());
-  const Page page = lay_out(with_room(bounds), kHeader);
+  Page page = lay_out(with_room(bounds), kHeader);
+  add_perspective(page);
   Views views = render(map, page, [&](const Vector3d& p) { return !layers.is_ceiling(p); });
   // colours are for heights that occur
   std::vector<float> heights;
@@ -41,6 +43,14 @@ std::unique_ptr<Canvas> map_page(const SurfelMap& map, const std::string& title)
     const Color color = z > high && layers.has_ceiling() ? kDim : color_at(z);  // cut away above
     return mixed(kPaper, color, 0.25 + 0.75 * ink_of(n, usual));
   });
+  const Perspective perspective(map,
+                                page.shown,
+                                ceiling_cut(layers),
+                                page.top.left,
+                                page.perspective_top,
+                                page.width - page.top.left - 12.0,
+                                page.perspective_height);
+  perspective.paint(*canvas, color_at);
   draw_axes(*canvas, page.top);
   draw_axes(*canvas, page.side);
   draw_color_bar(*canvas,

@@ -45,6 +45,14 @@ Page lay_out(const Aabb& shown, double header) {
   return page;
 }
 
+void add_perspective(Page& page) {
+  constexpr double kShare = 0.58;  // of its width
+  constexpr double kCaption = 24.0;
+  page.perspective_top = page.height + kCaption;
+  page.perspective_height = std::round(kShare * (page.width - page.top.left - 12.0));
+  page.height = static_cast<int>(page.perspective_top + page.perspective_height + 12.0);
+}
+
 Aabb with_room(Aabb box) {
   const double room = 0.01 * box.size().maxCoeff() + 0.05;
   for (int axis = 0; axis < 3; ++axis) {
@@ -103,6 +111,12 @@ void draw_captions(Canvas& canvas, const Page& page, const std::string& top) {
   canvas.text_within(
       page.top.left, page.top.top - 7.0, top, kTickText, page.width - page.top.left - 12.0, kDim);
   canvas.text(page.side.left, page.side.top - 7.0, "from the side", kTickText, kDim);
+  if (page.perspective_height <= 0.0) return;
+  canvas.text(page.side.left,
+              page.perspective_top - 7.0,
+              "in perspective, from the south west (-x, -y)",
+              kTickText,
+              kDim);
 }
 
 }  // namespace pointflight::apps

@@ -38,7 +38,9 @@ struct Raster {
 struct Page {
   Plot top, side;
   int width = 0, height = 0;
-  Aabb shown;  ///< World, m.
+  double perspective_top = 0.0;     ///< Of the view in perspective below both.
+  double perspective_height = 0.0;  ///< 0: there is none.
+  Aabb shown;                       ///< World, m.
 
   [[nodiscard]] std::pair<double, double> on_top(const Vector3d& p) const {
     return top.at(p.x(), p.y());
@@ -50,6 +52,9 @@ struct Page {
 
 /// A page for a box of the world, its titles and legends `header` pixels high.
 Page lay_out(const Aabb& shown, double header);
+
+/// Makes room for a view in perspective below the others.
+void add_perspective(Page& page);
 
 /// The box with some room around and at least a metre on a side.
 Aabb with_room(Aabb box);

@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <optional>
 
 #include "apps/map_layers.hpp"
 #include "apps/map_views.hpp"
+#include "apps/perspective.hpp"
 #include "apps/pictures.hpp"
 
 namespace pointflight::apps {
@@ -303,6 +305,40 @@ void draw_marks(Canvas& canvas, const Page& page, const RunPicture& run) {
   }
 }
 
+/// The same place as an eye sees it, with the flown ways.
+void draw_perspective(Canvas& canvas,
+                      const Page& page,
+                      const SurfelMap& map,
+                      const RunPicture& run,
+                      const MapLayers& layers,
+                      const Aabb& flight) {
+  const double cut = flight.empty() ? ceiling_cut(layers)
+                                    : std::min(ceiling_cut(layers), flight.max.z() + kAboveFlight);
+  const Perspective view(map,
+                         page.shown,
+                         layers.has_ceiling() ? cut : std::numeric_limits<double>::infinity(),
+                         page.top.left,
+                         page.perspective_top,
+                         page.width - page.top.left - 12.0,
+                         page.perspective_height);
+  const double low = layers.box().min.z();
+  const double high = std::max(low + 1.0, layers.has_ceiling() ? cut : layers.box().max.z());
+  view.paint(canvas, [&](double z) { return mixed(ramp((z - low) / (high - low)), kPaper, 0.45); });
+  for (std::size_t v = 0; v < run.paths.size(); ++v) {
+    view.draw_way(canvas, run.paths[v].points(), vehicle_color(v));
+    if (run.paths[v].empty()) continue;
+    if (const auto at = view.visible(run.paths[v].first())) {
+      mark_start(canvas, at->first, at->second, vehicle_color(v));
+    }
+    if (const auto at = view.visible(run.paths[v].last())) {
+      mark_end(canvas, at->first, at->second, vehicle_color(v));
+    }
+  }
+  for (const Vector3d& p : run.collisions.items()) {
+    if (const auto at = view.visible(p)) mark_collision(canvas, at->first, at->second);
+  }
+}
+
 }  // namespace
 
 std::unique_ptr<Canvas> overview_page(const SurfelMap& map, const RunPicture& run) {
@@ -314,11 +350,13 @@ std::unique_ptr<Canvas> overview_page(const SurfelMap& map, const RunPicture& ru
   Page page = lay_out(shown, 0.0);  // its width says how many rows the legend takes
   const double room = page.width - page.top.left - 12.0;
   page = lay_out(shown, kTopMargin + 78.0 + legend_rows(entries, room) * kLegendRow);
+  add_perspective(page);
 
   auto canvas = std::make_unique<Canvas>(page.width, page.height, kPaper);
   paint_map(*canvas, page, map, slab);
   tint_seen(*canvas, page, run, slab);
   draw_marks(*canvas, page, run);
+  draw_perspective(*canvas, page, map, run, layers, flight);
   draw_axes(*canvas, page.top);
   draw_axes(*canvas, page.side);
   draw_color_bar(*canvas,

@@ -1,0 +1,182 @@
+#include "apps/perspective.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <memory>
+
+#include "pointflight/core/constants.hpp"
+#include "pointflight/render/renderer.hpp"
+
+namespace pointflight::apps {
+namespace {
+
+constexpr double kField = 45.0 * kDegree;      // across the picture's width
+constexpr double kElevation = 38.0 * kDegree;  // of the eye over what it looks at
+constexpr double kAzimuth = 235.0 * kDegree;   // where the eye is: south west
+constexpr double kHidden = 0.3;                // m behind what is seen
+
+}  // namespace
+
+Perspective::Perspective(const SurfelMap& map,
+                         const Aabb& shown,
+                         double cut,
+                         double left,
+                         double top,
+                         double width,
+                         double height)
+    : left_(left),
+      top_(top),
+      width_(width),
+      height_(height),
+      columns_(static_cast<int>(width)),
+      rows_(static_cast<int>(height)) {
+  Aabb box = shown;
+  box.max.z() = std::max(box.min.z() + 0.5, std::min(box.max.z(), cut));
+  const Vector3d target = 0.5 * (box.min + box.max);
+  const Vector3d back(std::cos(kElevation) * std::cos(kAzimuth),
+                      std::cos(kElevation) * std::sin(kAzimuth),
+                      std::sin(kElevation));
+  axes_.row(2) = -back;
+  axes_.row(0) = Vector3d(-back).cross(Vector3d::UnitZ()).normalized();
+  axes_.row(1) = Vector3d(axes_.row(2)).cross(Vector3d(axes_.row(0)));
+  focal_ = 0.5 * width / std::tan(0.5 * kField);
+  // as near as all corners allow
+  double away = 1.0;
+  for (int corner = 0; corner < 8; ++corner) {
+    const Vector3d p((corner & 1) != 0 ? box.max.x() : box.min.x(),
+                     (corner & 2) != 0 ? box.max.y() : box.min.y(),
+                     (corner & 4) != 0 ? box.max.z() : box.min.z());
+    const Vector3d q = axes_ * (p - target);
+    away = std::max({away,
+                     std::abs(q.x()) * focal_ / (0.5 * width) - q.z(),
+                     std::abs(q.y()) * focal_ / (0.5 * height) - q.z()});
+  }
+  eye_ = target + 1.02 * away * back;
+
+  const auto count = static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_);
+  std::vector<Ray> rays(count);
+  std::vector<float> before(count, 0.0f);  // from the eye to where a ray begins
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto x = static_cast<double>(i % static_cast<std::size_t>(columns_));
+    const auto y = static_cast<double>(i / static_cast<std::size_t>(columns_));
+    const Vector3d d =
+        (axes_.transpose() * Vector3d(x + 0.5 - 0.5 * width, y + 0.5 - 0.5 * height, focal_))
+            .normalized();
+    const double above = d.z() < 0.0 ? std::max(0.0, (cut - eye_.z()) / d.z()) : 0.0;
+    before[i] = std::isfinite(above) ? static_cast<float>(above) : 0.0f;
+    rays[i].origin_world = eye_ + static_cast<double>(before[i]) * d;
+    rays[i].direction_world = d.cast<float>();
+    rays[i].range_max = static_cast<float>(10.0 * away + 100.0);
+  }
+  std::vector<Hit> hits(count);
+  RayBatch batch;
+  batch.rays = rays;
+  batch.range_max = rays.empty() ? 1.0f : rays.front().range_max;
+  // not owned: it outlives the renderer
+  const std::shared_ptr<const SurfelMap> shared(std::shared_ptr<void>(), &map);
+  make_renderer("beam", Scene{shared})->render(batch, hits, Executor(0));
+  ranges_.assign(count, -1.0f);
+  cosines_.resize(count);
+  heights_.resize(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    if (!hits[i].is_return()) continue;
+    ranges_[i] = before[i] + hits[i].range;
+    cosines_[i] = hits[i].cos_incidence;
+    heights_[i] =
+        static_cast<float>(rays[i].origin_world.z()) + hits[i].range * rays[i].direction_world.z();
+  }
+}
+
+void Perspective::paint(Canvas& canvas, const std::function<Color(double z)>& color_at) const {
+  canvas.begin_pixels();
+  for (int y = 0; y < rows_; ++y) {
+    for (int x = 0; x < columns_; ++x) {
+      const std::size_t i = static_cast<std::size_t>(y) * static_cast<std::size_t>(columns_) +
+                            static_cast<std::size_t>(x);
+      if (ranges_[i] < 0.0f) continue;
+      const double light = 0.35 + 0.65 * static_cast<double>(cosines_[i]);
+      const Color c = color_at(static_cast<double>(heights_[i]));
+      canvas.put(static_cast<int>(left_) + x,
+                 static_cast<int>(top_) + y,
+                 {light * c.r, light * c.g, light * c.b},
+                 1.0);
+    }
+  }
+  canvas.end_pixels();
+}
+
+std::optional<Vector3d> Perspective::project(const Vector3d& p_world) const {
+  const Vector3d q = axes_ * (p_world - eye_);
+  if (q.z() <= 0.01) return std::nullopt;
+  return Vector3d(
+      0.5 * width_ + focal_ * q.x() / q.z(), 0.5 * height_ + focal_ * q.y() / q.z(), q.norm());
+}
+
+bool Perspective::is_hidden(const Vector3d& projected) const {
+  const int x = static_cast<int>(std::floor(projected.x()));
+  const int y = static_cast<int>(std::floor(projected.y()));
+  if (x < 0 || y < 0 || x >= columns_ || y >= rows_) return true;
+  const float range = ranges_[static_cast<std::size_t>(y) * static_cast<std::size_t>(columns_) +
+                              static_cast<std::size_t>(x)];
+  return range >= 0.0f && static_cast<double>(range) < projected.z() - kHidden;
+}
+
+std::optional<std::pair<double, double>> Perspective::visible(const Vector3d& p_world) const {
+  const auto q = project(p_world);
+  if (!q || is_hidden(*q)) return std::nullopt;
+  return std::pair(left_ + q->x(), top_ + q->y());
+}
+
+void Perspective::draw_way(Canvas& canvas, const std::vector<Vector3d>& points, Color color) const {
+  constexpr double kFaint = 0.3;
+  std::vector<std::pair<double, double>> piece;
+  bool hidden = false;
+  const auto flush = [&] {
+    if (piece.size() > 1) {
+      if (!hidden) canvas.line(piece, 4.5, kPaper, 0.8);
+      canvas.line(piece, 2.2, color, hidden ? kFaint : 1.0);
+    }
+  };
+  canvas.begin_clip(left_, top_, width_, height_);
+  for (const Vector3d& p : points) {
+    const auto q = project(p);
+    const bool now = q && is_hidden(*q);
+    if (!q || now != hidden) {
+      flush();
+      // a piece begins where the last one ended
+      const auto last = piece.empty() ? std::nullopt : std::optional(piece.back());
+      piece.clear();
+      if (q && last) piece.push_back(*last);
+      hidden = now;
+    }
+    if (q) piece.emplace_back(left_ + q->x(), top_ + q->y());
+  }
+  flush();
+  canvas.end_clip();
+}
+
+double ceiling_cut(const MapLayers& layers) {
+  constexpr int kPlaces = 24;     // along each side
+  constexpr double kStep = 0.1;   // m
+  constexpr double kBelow = 0.3;  // m
+  if (!layers.has_ceiling()) return std::numeric_limits<double>::infinity();
+  std::vector<double> heights;
+  const Aabb& box = layers.box();
+  for (int i = 0; i < kPlaces * kPlaces; ++i) {
+    Vector3d p = box.min;
+    p.x() += (i % kPlaces + 0.5) / kPlaces * box.size().x();
+    p.y() += (i / kPlaces + 0.5) / kPlaces * box.size().y();
+    for (p.z() = layers.floor_at(p); p.z() < box.max.z(); p.z() += kStep) {
+      if (!layers.is_ceiling(p)) continue;
+      heights.push_back(p.z());
+      break;
+    }
+  }
+  if (heights.empty()) return std::numeric_limits<double>::infinity();
+  const auto low = heights.begin() + static_cast<std::ptrdiff_t>(heights.size() / 10);
+  std::nth_element(heights.begin(), low, heights.end());
+  return *low - kBelow;
+}
+
+}  // namespace pointflight::apps
