@@ -40,19 +40,22 @@ Perspective::Perspective(const SurfelMap& map,
   axes_.row(2) = -back;
   axes_.row(0) = Vector3d(-back).cross(Vector3d::UnitZ()).normalized();
   axes_.row(1) = Vector3d(axes_.row(2)).cross(Vector3d(axes_.row(0)));
-  focal_ = 0.5 * width / std::tan(0.5 * kField);
-  // as near as all corners allow
-  double away = 1.0;
+  // so far that it looks natural; then what is there fills the picture
+  const double away = 0.5 * box.size().norm() / std::tan(0.5 * kField);
+  eye_ = target + away * back;
+  Eigen::Vector2d low = Eigen::Vector2d::Constant(std::numeric_limits<double>::infinity());
+  Eigen::Vector2d high = -low;
   for (int corner = 0; corner < 8; ++corner) {
     const Vector3d p((corner & 1) != 0 ? box.max.x() : box.min.x(),
                      (corner & 2) != 0 ? box.max.y() : box.min.y(),
                      (corner & 4) != 0 ? box.max.z() : box.min.z());
-    const Vector3d q = axes_ * (p - target);
-    away = std::max({away,
-                     std::abs(q.x()) * focal_ / (0.5 * width) - q.z(),
-                     std::abs(q.y()) * focal_ / (0.5 * height) - q.z()});
+    const Vector3d q = axes_ * (p - eye_);
+    const Eigen::Vector2d at = q.head<2>() / std::max(q.z(), 0.1 * away);
+    low = low.cwiseMin(at);
+    high = high.cwiseMax(at);
   }
-  eye_ = target + 1.02 * away * back;
+  focal_ = 0.97 * std::min(width / (high.x() - low.x()), height / (high.y() - low.y()));
+  middle_ = 0.5 * Eigen::Vector2d(width, height) - 0.5 * focal_ * (low + high);
 
   const auto count = static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_);
   std::vector<Ray> rays(count);
@@ -61,7 +64,7 @@ Perspective::Perspective(const SurfelMap& map,
     const auto x = static_cast<double>(i % static_cast<std::size_t>(columns_));
     const auto y = static_cast<double>(i / static_cast<std::size_t>(columns_));
     const Vector3d d =
-        (axes_.transpose() * Vector3d(x + 0.5 - 0.5 * width, y + 0.5 - 0.5 * height, focal_))
+        (axes_.transpose() * Vector3d(x + 0.5 - middle_.x(), y + 0.5 - middle_.y(), focal_))
             .normalized();
     const double above = d.z() < 0.0 ? std::max(0.0, (cut - eye_.z()) / d.z()) : 0.0;
     before[i] = std::isfinite(above) ? static_cast<float>(above) : 0.0f;
@@ -110,7 +113,7 @@ std::optional<Vector3d> Perspective::project(const Vector3d& p_world) const {
   const Vector3d q = axes_ * (p_world - eye_);
   if (q.z() <= 0.01) return std::nullopt;
   return Vector3d(
-      0.5 * width_ + focal_ * q.x() / q.z(), 0.5 * height_ + focal_ * q.y() / q.z(), q.norm());
+      middle_.x() + focal_ * q.x() / q.z(), middle_.y() + focal_ * q.y() / q.z(), q.norm());
 }
 
 bool Perspective::is_hidden(const Vector3d& projected) const {

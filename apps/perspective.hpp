@@ -46,9 +46,10 @@ class Perspective {
   double left_, top_, width_, height_;
   int columns_, rows_;
   Vector3d eye_ = Vector3d::Zero();
-  Matrix3d axes_ = Matrix3d::Identity();  ///< Rows: right, down, ahead.
-  double focal_ = 1.0;                    ///< Pixels.
-  std::vector<float> ranges_;             ///< From the eye, m; negative: nothing.
+  Matrix3d axes_ = Matrix3d::Identity();              ///< Rows: right, down, ahead.
+  double focal_ = 1.0;                                ///< Pixels.
+  Eigen::Vector2d middle_ = Eigen::Vector2d::Zero();  ///< Where the eye looks straight on, pixels.
+  std::vector<float> ranges_;                         ///< From the eye, m; negative: nothing.
   std::vector<float> cosines_, heights_;
 };
 

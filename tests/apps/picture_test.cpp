@@ -3,10 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "apps/canvas.hpp"
 #include "apps/lidar_picture.hpp"
 #include "apps/map_layers.hpp"
+#include "apps/perspective.hpp"
 #include "apps/pictures.hpp"
 #include "apps/plot.hpp"
 #include "apps/scan_statistics.hpp"
@@ -254,6 +256,38 @@ TEST(Coverage, IsCompleteForADenseGridAndGrowsForARosette) {
   EXPECT_TRUE(std::is_sorted(avia.share.begin(), avia.share.end()));
   EXPECT_LT(avia.share[6], 0.7);
   EXPECT_GT(avia.share.back(), 0.7);
+}
+
+TEST(Perspective, ShowsWhatIsInFrontAndHidesWhatIsBehind) {
+  // a floor, and a wall along its diagonal that stands between the eye in the south west and a half
+  ShapeScene scene;
+  scene.add_rectangle({-10, -10, 0}, {20, 0, 0}, {0, 20, 0});
+  scene.add_rectangle({-7, 7, 0}, {14, -14, 0}, {0, 0, 3});
+  const auto map = map_of(scene, 0.2);
+  Aabb shown;
+  shown.add({-10, -10, 0});
+  shown.add({10, 10, 3});
+  const double none = std::numeric_limits<double>::infinity();
+  const Perspective view(*map, shown, none, 50, 80, 640, 400);
+  std::size_t looked_at = 0;
+  for (double x = -9; x <= 9; x += 0.75) {
+    for (double y = -9; y <= 9; y += 0.75) {
+      const bool before_the_wall = x + y < -0.5;
+      const bool right_behind = x + y > 0.5 && x + y < 2.5 && std::abs(x - y) < 10;
+      if (!before_the_wall && !right_behind) continue;
+      ++looked_at;
+      const auto at = view.visible({x, y, 0.05});
+      EXPECT_EQ(at.has_value(), before_the_wall) << x << ", " << y;
+      EXPECT_FALSE(view.visible({x, y, -1.5})) << "under the floor";
+      if (!at) continue;
+      EXPECT_TRUE(at->first >= 50 && at->first <= 690 && at->second >= 80 && at->second <= 480);
+    }
+  }
+  EXPECT_GT(looked_at, 200u);
+  // above the wall one sees what is behind it once it is cut lower
+  const Perspective cut(*map, shown, 0.5, 50, 80, 640, 400);
+  EXPECT_TRUE(cut.visible({1.2, 1.2, 0.05}));
+  EXPECT_FALSE(view.visible({1.2, 1.2, 0.05}));
 }
 
 }  // namespace
