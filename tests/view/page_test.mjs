@@ -1,4 +1,4 @@
-// The page in the distribution's Chromium with software GL: a live flight. Map, drone and scan are where the
+// The page in the distribution's Chromium with software GL: a live flight, then the same one finished. Map, drone and scan are where the
 // truth projects to, the drone moves, a double click flies it to a goal, keys pause and go on; nothing on the
 // console. Arguments: program, folder of node_modules, folder to work in, and a picture to write, if any.
 import assert from "node:assert/strict";
@@ -37,16 +37,24 @@ fs.writeFileSync(
   `map: place.pfmap\nvehicle: {start: [0, 0, 1.2]}\nlidars: [{model: os1_32}]\nobstacles:\n  - {motion: still, position: [3, 3, 0.5], shape: box, size: [1, 1, 1]}\n`,
 );
 
-const run = spawn(program, ["fly", path.join(folder, "s.yaml"), "--view", "127.0.0.1:0"]);
-let log = "";
-const address = await new Promise((resolve, reject) => {
-  run.stderr.on("data", (data) => {
-    log += data;
-    const found = log.match(/watch it: (http:\/\/[^\s]+)/);
-    if (found) resolve(found[1]);
+// A program that serves: it, its address, and how it ends.
+async function serve(...args) {
+  const child = spawn(program, args);
+  let log = "";
+  const ended = new Promise((resolve) => child.on("close", (code) => resolve({ code, log })));
+  const address = await new Promise((resolve, reject) => {
+    child.stderr.on("data", (data) => {
+      log += data;
+      const found = log.match(/watch it: (http:\/\/[^\s]+)/);
+      if (found) resolve(found[1]);
+    });
+    child.on("close", () => reject(new Error(log)));
   });
-  run.on("close", () => reject(new Error(log)));
-});
+  return { child, address, ended };
+}
+const out = path.join(folder, "run");
+const flight = await serve("fly", path.join(folder, "s.yaml"), "-o", out, "--force", "--view", "127.0.0.1:0");
+const { child: run, address } = flight;
 const flags = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"];
 const browser = await chromium.launch({ executablePath: CHROMIUM, args: ["--headless=new", ...flags] });
 try {
@@ -162,8 +170,38 @@ try {
   const cost = await page.evaluate(() => window.pointflight.state.cost);
   console.log(`${onMap.length} places of the map, ${onScan.length} of a scan; ${cost.toFixed(0)} ms of script per frame`);
   assert.deepEqual(wrong, [], "errors on the console");
+  await page.close();
+  run.kill("SIGINT");
+  const end = await flight.ended;
+  assert.ok([0, 1, 130].includes(end.code), end.log);
+
+  // the finished run: its time line goes to where it was
+  const finished = await serve("view", out, "--at", "127.0.0.1:0");
+  try {
+    const again = await browser.newPage({ viewport: { width: 900, height: 600 } });
+    again.on("pageerror", (e) => wrong.push(e.message));
+    again.on("console", (m) => m.type() === "error" && wrong.push(m.text()));
+    await again.goto(`${finished.address}&budget=30000&pixels=1`);
+    const wait = (what, condition, argument) => again.waitForFunction(condition, argument, { timeout: 60000, polling: 100 }).catch(() => assert.fail(`${what}: not within a minute`));
+    await wait("a state", () => window.pointflight?.state.last?.vehicles[0]?.p && window.pointflight.map.overviewReady);
+    const table = fs.readFileSync(path.join(out, "trajectory.csv"), "utf8").trim().split("\n").slice(1).map((l) => l.split(",").map(Number));
+    const length = table.at(-1)[0];
+    assert.ok(Math.abs(Number(await again.locator("#line").getAttribute("max")) - length) < 1, "the time line is as long as the run");
+    await again.evaluate(() => window.pointflight.client.order({ pause: true }));
+    for (const share of [0.9, 0.3]) {
+      const to = share * length;
+      await again.evaluate((t) => window.pointflight.client.order({ seek: t }), to);
+      await wait("where it was then", (t) => Math.abs(window.pointflight.state.last.t - t) < 0.05 && window.pointflight.state.last.doing === "paused", to);
+      const { p: q } = await again.evaluate(() => window.pointflight.state.last.vehicles[0]);
+      const row = table.reduce((best, r) => (Math.abs(r[0] - to) < Math.abs(best[0] - to) ? r : best));
+      q.forEach((v, i) => assert.ok(Math.abs(v - row[1 + i]) < 0.1, `at ${to} s ${q}, it was at ${row.slice(1, 4)}`));
+    }
+    assert.deepEqual(wrong, [], "errors on the console");
+  } finally {
+    finished.child.kill("SIGINT");
+    await finished.ended;
+  }
 } finally {
   await browser.close();
   run.kill("SIGINT");
 }
-assert.ok([0, 1, 130].includes(await new Promise((r) => run.on("close", r))), log);
