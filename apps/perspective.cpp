@@ -61,8 +61,9 @@ Perspective::Perspective(const SurfelMap& map,
   std::vector<Ray> rays(count);
   std::vector<float> before(count, 0.0f);  // from the eye to where a ray begins
   for (std::size_t i = 0; i < count; ++i) {
+    const std::size_t row = i / static_cast<std::size_t>(columns_);
     const auto x = static_cast<double>(i % static_cast<std::size_t>(columns_));
-    const auto y = static_cast<double>(i / static_cast<std::size_t>(columns_));
+    const auto y = static_cast<double>(row);
     const Vector3d d =
         (axes_.transpose() * Vector3d(x + 0.5 - middle_.x(), y + 0.5 - middle_.y(), focal_))
             .normalized();
@@ -168,8 +169,9 @@ double ceiling_cut(const MapLayers& layers) {
   const Aabb& box = layers.box();
   for (int i = 0; i < kPlaces * kPlaces; ++i) {
     Vector3d p = box.min;
+    const int row = i / kPlaces;
     p.x() += (i % kPlaces + 0.5) / kPlaces * box.size().x();
-    p.y() += (i / kPlaces + 0.5) / kPlaces * box.size().y();
+    p.y() += (row + 0.5) / kPlaces * box.size().y();
     for (p.z() = layers.floor_at(p); p.z() < box.max.z(); p.z() += kStep) {
       if (!layers.is_ceiling(p)) continue;
       heights.push_back(p.z());

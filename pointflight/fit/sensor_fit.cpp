@@ -164,6 +164,7 @@ std::vector<Patch> patches_of(std::span<const Sight> sights,
     cells[{row, floor_to_integer(column)}].push_back(i);
   }
   std::vector<const std::vector<std::uint32_t>*> lists;
+  lists.reserve(cells.size());
   for (const auto& [place, members] : cells) lists.push_back(&members);
   std::vector<std::optional<Patch>> found(lists.size());
   executor.parallel_for(lists.size(), 16, [&](std::size_t begin, std::size_t end) {
@@ -191,6 +192,7 @@ double lever_of(const Patch& patch) {
 /// known; patches far above it are not flat.
 void fit_noise(std::vector<Patch>& patches, SensorFit& fit) {
   std::vector<double> variances;
+  variances.reserve(patches.size());
   for (const Patch& patch : patches) variances.push_back(patch.variance);
   double of_range = median(variances);
   double of_angle = 0.0;
@@ -403,6 +405,7 @@ std::optional<Pace> pace_of(const std::vector<RingPoints>& scans) {
   Pace pace;
   pace.slope = median(slopes);
   std::vector<double> off;
+  off.reserve(slopes.size());
   for (const double slope : slopes) off.push_back(std::abs(slope - pace.slope));
   if (!(median(off) < 0.05 * std::abs(pace.slope))) return std::nullopt;  // no turning head
   refine(pace, scans);
@@ -476,6 +479,7 @@ double within_cycle(const std::vector<double>& times, double cycle) {
 /// A cycle begins after its longest pause: nothing else tells which ring is the first.
 void start_after_the_pause(TurnFit& turn) {
   std::vector<double> times;
+  times.reserve(turn.rings.size());
   for (const RingFit& ring : turn.rings) times.push_back(ring.fire_time_us);
   std::sort(times.begin(), times.end());
   double first = times.front();
@@ -495,6 +499,7 @@ void start_after_the_pause(TurnFit& turn) {
 
 std::optional<TurnFit> turn_of(std::span<const RecordedScan> scans) {
   std::vector<RingPoints> rings;
+  rings.reserve(scans.size());
   for (const RecordedScan& scan : scans) rings.push_back(rings_of(scan));
   const auto pace = pace_of(rings);
   if (!pace) return std::nullopt;
@@ -516,6 +521,7 @@ std::optional<TurnFit> turn_of(std::span<const RecordedScan> scans) {
     ring.points = of_ring.points;
     ring.elevation_deg = median(of_ring.elevations) / kDegree;
     std::vector<double> off;
+    off.reserve(of_ring.elevations.size());
     for (const double e : of_ring.elevations)
       off.push_back(std::abs(e - ring.elevation_deg * kDegree));
     // a Mid-360's azimuths go round evenly as well, but up and down meanwhile
