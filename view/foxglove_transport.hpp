@@ -25,7 +25,7 @@ class FoxgloveTransport : public Transport {
   void subscribe(const Topic& topic, std::function<void(const Received&)> on_message) override;
   [[nodiscard]] bool is_connected() const override { return true; }
   void serve(const Service& service, Answer answer) override;
-  void close() override {}
+  void close() override { server_->refuse_input(); }
   [[nodiscard]] bool has_senders() const override { return server_->has_senders(); }
   [[nodiscard]] std::uint64_t dropped() const override { return server_->dropped(); }
 

@@ -196,7 +196,9 @@ class LiveServer::Impl {
   Clock::time_point last_time_{};
   std::function<void(const foxglove::PlaybackControl&)> on_playback_;
 
-  mutable std::mutex mutex_;  ///< Of the four below: their lengths and entries' texts.
+  std::mutex input_mutex_;  ///< Held while a handler of clients' input runs.
+  bool takes_input_ = true;
+  mutable std::mutex mutex_;  ///< Of the three below: their lengths and entries' texts.
   std::deque<KnownChannel> channels_;
   std::deque<Input> inputs_;
   std::deque<KnownService> services_;
@@ -423,7 +425,8 @@ class LiveServer::Impl::Client : public std::enable_shared_from_this<Client> {
     Received received;
     received.data = message.data.data();
     received.size = message.data.size();
-    found->second->on_message(received);
+    const std::lock_guard lock(server_.input_mutex_);
+    if (server_.takes_input_) found->second->on_message(received);
   }
 
   void obey(const foxglove::ServiceRequest& request) {
@@ -443,7 +446,12 @@ class LiveServer::Impl::Client : public std::enable_shared_from_this<Client> {
     Received received;
     received.data = request.data.data();
     received.size = request.data.size();
-    const std::vector<std::byte> answer = found->answer(received);
+    std::vector<std::byte> answer;
+    {
+      const std::lock_guard lock(server_.input_mutex_);
+      if (!server_.takes_input_) return fail("the run has ended");
+      answer = found->answer(received);
+    }
     if (answer.empty()) return fail("the request could not be read");
     send({{}, foxglove::service_response_frame(request.service, request.call, answer), {}, false});
   }
@@ -877,6 +885,11 @@ void LiveServer::subscribe_json(const std::string& topic,
   Topic named;
   named.name = topic;
   impl_->inputs_.push_back({named, "json", schema, std::move(on_message)});
+}
+
+void LiveServer::refuse_input() {
+  const std::lock_guard lock(impl_->input_mutex_);
+  impl_->takes_input_ = false;
 }
 
 void LiveServer::serve(foxglove::ServiceRow service, Transport::Answer answer) {

@@ -78,6 +78,8 @@ class LiveServer {
   void subscribe_json(const std::string& topic,
                       const std::string& schema,
                       std::function<void(const Received&)> on_message);
+  /// When it returns no handler of these runs or will run any more.
+  void refuse_input();
   /// A service that clients may call.
   void serve(foxglove::ServiceRow service, Transport::Answer answer);
   /// What clients want of a playback; the server's thread.

@@ -127,6 +127,10 @@ ViewLink::ViewLink(std::shared_ptr<LiveServer> server, Duration epoch)
   events_ = server_->add_channel(json_channel("/pointflight/events", "pointflight.Event"), false);
 }
 
+ViewLink::~ViewLink() {
+  server_->close();
+}
+
 std::int64_t ViewLink::stamp(SimTime time) const {
   return (time.time_since_epoch() + epoch_).count();
 }

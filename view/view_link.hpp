@@ -24,6 +24,8 @@ class ViewLink : public Link {
  public:
   /// Stamps count from `epoch`.
   ViewLink(std::shared_ptr<LiveServer> server, Duration epoch);
+  /// Ends the server, whose thread calls this.
+  ~ViewLink() override;
 
   /// Before `open`, for a run that is played back: clients' playback controls become orders.
   void let_play_back();
