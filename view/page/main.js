@@ -272,6 +272,18 @@ $("ceiling").oninput = () => {
   map.uniforms.clipHigh.value.z = share >= 1 ? 1e9 : min.z + share * (max.z - min.z);
 };
 
+// A box around the chosen vehicle, 2 m to the map's size.
+function cutAround() {
+  const { clipLow, clipHigh } = map.uniforms;
+  const share = Number($("around").value);
+  const p = chosen()?.group.position ?? controls.target;
+  const size = map.bounds ? map.bounds.getSize(new THREE.Vector3()).length() : 1e3;
+  const reach = share >= 1 ? 1e9 : 2 * (size / 2) ** share;
+  clipLow.value.set(p.x - reach, p.y - reach, -1e9);
+  clipHigh.value.x = p.x + reach;
+  clipHigh.value.y = p.y + reach;
+}
+
 const ARROWS = { ArrowUp: [1, 0, 0, 0], ArrowDown: [-1, 0, 0, 0], ArrowLeft: [0, 0, 0, 1], ArrowRight: [0, 0, 0, -1], PageUp: [0, 0, 1, 0], PageDown: [0, 0, -1, 0] };
 addEventListener("keydown", (event) => {
   if (event.target.tagName === "SELECT") return;
@@ -321,6 +333,7 @@ function draw(dt) {
   moveCamera();
   if (controls.enabled) controls.update();
   for (const vehicle of state.vehicles) vehicle.animate(dt);
+  cutAround();
   map.update(camera);
   renderer.render(scene, camera);
   const place = new THREE.Vector3();
