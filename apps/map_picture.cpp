@@ -46,10 +46,10 @@ std::unique_ptr<Canvas> map_page(const SurfelMap& map, const std::string& title)
   const Perspective perspective(map,
                                 page.shown,
                                 ceiling_cut(layers),
-                                page.top.left,
-                                page.perspective_top,
-                                page.width - page.top.left - 12.0,
-                                page.perspective_height);
+                                {page.top.left,
+                                 page.perspective_top,
+                                 page.width - page.top.left - 12.0,
+                                 page.perspective_height});
   perspective.paint(*canvas, color_at);
   draw_axes(*canvas, page.top);
   draw_axes(*canvas, page.side);

@@ -21,25 +21,6 @@ constexpr Color kNearFloor{0.93, 0.93, 0.93};
 constexpr Color kHighUp{0.45, 0.45, 0.47};
 constexpr double kAboveFlight = 1.0;  // m over the highest place of the flight that is still shown
 
-/// One colour for each vehicle: first those that are told apart by who sees no red or green (Okabe,
-/// Ito 2008), then hues all round.
-Color vehicle_color(std::size_t number) {
-  constexpr Color kFirst[] = {{0.84, 0.37, 0.0},
-                              {0.0, 0.45, 0.70},
-                              {0.0, 0.62, 0.45},
-                              {0.80, 0.47, 0.65},
-                              {0.90, 0.62, 0.0},
-                              {0.20, 0.20, 0.20}};
-  if (number < std::size(kFirst)) return kFirst[number];
-  const double hue = 6.0 * std::fmod(0.618034 * static_cast<double>(number), 1.0);
-  const double value = number % 2 == 0 ? 0.85 : 0.6;
-  const auto part = [&](double shift) {
-    const double k = std::fmod(shift + hue, 6.0);
-    return value * (1.0 - 0.85 * std::clamp(std::min(k, 4.0 - k), 0.0, 1.0));
-  };
-  return {part(5.0), part(3.0), part(1.0)};
-}
-
 /// What must be in the picture of a run.
 Aabb flight_box(const RunPicture& run) {
   Aabb box;
@@ -317,10 +298,10 @@ void draw_perspective(Canvas& canvas,
   const Perspective view(map,
                          page.shown,
                          layers.has_ceiling() ? cut : std::numeric_limits<double>::infinity(),
-                         page.top.left,
-                         page.perspective_top,
-                         page.width - page.top.left - 12.0,
-                         page.perspective_height);
+                         {page.top.left,
+                          page.perspective_top,
+                          page.width - page.top.left - 12.0,
+                          page.perspective_height});
   const double low = layers.box().min.z();
   const double high = std::max(low + 1.0, layers.has_ceiling() ? cut : layers.box().max.z());
   view.paint(canvas, [&](double z) { return mixed(ramp((z - low) / (high - low)), kPaper, 0.45); });
@@ -340,6 +321,25 @@ void draw_perspective(Canvas& canvas,
 }
 
 }  // namespace
+
+/// One colour for each vehicle: first those that are told apart by who sees no red or green (Okabe,
+/// Ito 2008), then hues all round.
+Color vehicle_color(std::size_t number) {
+  constexpr Color kFirst[] = {{0.84, 0.37, 0.0},
+                              {0.0, 0.45, 0.70},
+                              {0.0, 0.62, 0.45},
+                              {0.80, 0.47, 0.65},
+                              {0.90, 0.62, 0.0},
+                              {0.20, 0.20, 0.20}};
+  if (number < std::size(kFirst)) return kFirst[number];
+  const double hue = 6.0 * std::fmod(0.618034 * static_cast<double>(number), 1.0);
+  const double value = number % 2 == 0 ? 0.85 : 0.6;
+  const auto part = [&](double shift) {
+    const double k = std::fmod(shift + hue, 6.0);
+    return value * (1.0 - 0.85 * std::clamp(std::min(k, 4.0 - k), 0.0, 1.0));
+  };
+  return {part(5.0), part(3.0), part(1.0)};
+}
 
 std::unique_ptr<Canvas> overview_page(const SurfelMap& map, const RunPicture& run) {
   const MapLayers layers(map);

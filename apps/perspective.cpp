@@ -18,31 +18,20 @@ constexpr double kHidden = 0.3;                // m behind what is seen
 
 }  // namespace
 
-Perspective::Perspective(const SurfelMap& map,
-                         const Aabb& shown,
-                         double cut,
-                         double left,
-                         double top,
-                         double width,
-                         double height)
-    : left_(left),
-      top_(top),
-      width_(width),
-      height_(height),
-      columns_(static_cast<int>(width)),
-      rows_(static_cast<int>(height)) {
+Perspective::Perspective(const SurfelMap& map, const Aabb& shown, double cut, const Frame& frame)
+    : frame_(frame),
+      columns_(static_cast<int>(frame.width)),
+      rows_(static_cast<int>(frame.height)) {
   Aabb box = shown;
   box.max.z() = std::max(box.min.z() + 0.5, std::min(box.max.z(), cut));
   const Vector3d target = 0.5 * (box.min + box.max);
   const Vector3d back(std::cos(kElevation) * std::cos(kAzimuth),
                       std::cos(kElevation) * std::sin(kAzimuth),
                       std::sin(kElevation));
-  axes_.row(2) = -back;
-  axes_.row(0) = Vector3d(-back).cross(Vector3d::UnitZ()).normalized();
-  axes_.row(1) = Vector3d(axes_.row(2)).cross(Vector3d(axes_.row(0)));
   // so far that it looks natural; then what is there fills the picture
   const double away = 0.5 * box.size().norm() / std::tan(0.5 * kField);
   eye_ = target + away * back;
+  look(target);
   Eigen::Vector2d low = Eigen::Vector2d::Constant(std::numeric_limits<double>::infinity());
   Eigen::Vector2d high = -low;
   for (int corner = 0; corner < 8; ++corner) {
@@ -54,9 +43,37 @@ Perspective::Perspective(const SurfelMap& map,
     low = low.cwiseMin(at);
     high = high.cwiseMax(at);
   }
-  focal_ = 0.97 * std::min(width / (high.x() - low.x()), height / (high.y() - low.y()));
-  middle_ = 0.5 * Eigen::Vector2d(width, height) - 0.5 * focal_ * (low + high);
+  focal_ = 0.97 * std::min(frame.width / (high.x() - low.x()), frame.height / (high.y() - low.y()));
+  middle_ = 0.5 * Eigen::Vector2d(frame.width, frame.height) - 0.5 * focal_ * (low + high);
+  render(map, cut, {});
+}
 
+Perspective::Perspective(const SurfelMap& map,
+                         const Eye& eye,
+                         double cut,
+                         const Frame& frame,
+                         const MovingThings& things)
+    : frame_(frame),
+      columns_(static_cast<int>(frame.width)),
+      rows_(static_cast<int>(frame.height)),
+      eye_(eye.place),
+      focal_(0.5 * frame.width / std::tan(0.5 * eye.field_deg * kDegree)),
+      middle_(0.5 * frame.width, 0.5 * frame.height) {
+  look(eye.target);
+  render(map, cut, things);
+}
+
+/// Turns the eye.
+void Perspective::look(const Vector3d& target) {
+  const Vector3d ahead = (target - eye_).normalized();
+  const Vector3d right = ahead.cross(Vector3d::UnitZ()).normalized();
+  axes_.row(0) = right;
+  axes_.row(1) = ahead.cross(right);
+  axes_.row(2) = ahead;
+}
+
+void Perspective::render(const SurfelMap& map, double cut, const MovingThings& things) {
+  constexpr float kFarthest = 2000.0f;  // m
   const auto count = static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_);
   std::vector<Ray> rays(count);
   std::vector<float> before(count, 0.0f);  // from the eye to where a ray begins
@@ -71,28 +88,34 @@ Perspective::Perspective(const SurfelMap& map,
     before[i] = std::isfinite(above) ? static_cast<float>(above) : 0.0f;
     rays[i].origin_world = eye_ + static_cast<double>(before[i]) * d;
     rays[i].direction_world = d.cast<float>();
-    rays[i].range_max = static_cast<float>(10.0 * away + 100.0);
+    rays[i].range_max = kFarthest;
   }
   std::vector<Hit> hits(count);
   RayBatch batch;
   batch.rays = rays;
-  batch.range_max = rays.empty() ? 1.0f : rays.front().range_max;
+  batch.range_max = kFarthest;
+  batch.bodies = things.bodies;
+  batch.time = batch.snapshot_time = things.time;
   // not owned: it outlives the renderer
   const std::shared_ptr<const SurfelMap> shared(std::shared_ptr<void>(), &map);
   make_renderer("beam", Scene{shared})->render(batch, hits, Executor(0));
   ranges_.assign(count, -1.0f);
   cosines_.resize(count);
   heights_.resize(count);
+  labels_.assign(count, kMapLabel);
   for (std::size_t i = 0; i < count; ++i) {
     if (!hits[i].is_return()) continue;
     ranges_[i] = before[i] + hits[i].range;
     cosines_[i] = hits[i].cos_incidence;
     heights_[i] =
         static_cast<float>(rays[i].origin_world.z()) + hits[i].range * rays[i].direction_world.z();
+    labels_[i] = hits[i].label;
   }
 }
 
-void Perspective::paint(Canvas& canvas, const std::function<Color(double z)>& color_at) const {
+void Perspective::paint(Canvas& canvas,
+                        const std::function<Color(double z)>& color_at,
+                        const std::function<Color(Label)>& color_of) const {
   canvas.begin_pixels();
   for (int y = 0; y < rows_; ++y) {
     for (int x = 0; x < columns_; ++x) {
@@ -100,9 +123,10 @@ void Perspective::paint(Canvas& canvas, const std::function<Color(double z)>& co
                             static_cast<std::size_t>(x);
       if (ranges_[i] < 0.0f) continue;
       const double light = 0.35 + 0.65 * static_cast<double>(cosines_[i]);
-      const Color c = color_at(static_cast<double>(heights_[i]));
-      canvas.put(static_cast<int>(left_) + x,
-                 static_cast<int>(top_) + y,
+      const bool moves = labels_[i] != kMapLabel && color_of;
+      const Color c = moves ? color_of(labels_[i]) : color_at(static_cast<double>(heights_[i]));
+      canvas.put(static_cast<int>(frame_.left) + x,
+                 static_cast<int>(frame_.top) + y,
                  {light * c.r, light * c.g, light * c.b},
                  1.0);
     }
@@ -129,7 +153,7 @@ bool Perspective::is_hidden(const Vector3d& projected) const {
 std::optional<std::pair<double, double>> Perspective::visible(const Vector3d& p_world) const {
   const auto q = project(p_world);
   if (!q || is_hidden(*q)) return std::nullopt;
-  return std::pair(left_ + q->x(), top_ + q->y());
+  return std::pair(frame_.left + q->x(), frame_.top + q->y());
 }
 
 void Perspective::draw_way(Canvas& canvas, const std::vector<Vector3d>& points, Color color) const {
@@ -142,7 +166,7 @@ void Perspective::draw_way(Canvas& canvas, const std::vector<Vector3d>& points, 
       canvas.line(piece, 2.2, color, hidden ? kFaint : 1.0);
     }
   };
-  canvas.begin_clip(left_, top_, width_, height_);
+  canvas.begin_clip(frame_.left, frame_.top, frame_.width, frame_.height);
   for (const Vector3d& p : points) {
     const auto q = project(p);
     const bool now = q && is_hidden(*q);
@@ -154,7 +178,7 @@ void Perspective::draw_way(Canvas& canvas, const std::vector<Vector3d>& points, 
       if (q && last) piece.push_back(*last);
       hidden = now;
     }
-    if (q) piece.emplace_back(left_ + q->x(), top_ + q->y());
+    if (q) piece.emplace_back(frame_.left + q->x(), frame_.top + q->y());
   }
   flush();
   canvas.end_clip();

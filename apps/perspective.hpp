@@ -2,30 +2,53 @@
 
 #include <functional>
 #include <optional>
+#include <span>
 #include <utility>
 #include <vector>
 
 #include "apps/canvas.hpp"
 #include "apps/map_layers.hpp"
+#include "pointflight/map/body.hpp"
 #include "pointflight/map/surfel_map.hpp"
 
 namespace pointflight::apps {
 
-/// A map as an eye sees it, rendered as scans are: a ray for each pixel.
+/// Where somebody looks from.
+struct Eye {
+  Vector3d place = Vector3d::Zero();    ///< World, m.
+  Vector3d target = Vector3d::UnitX();  ///< In the middle of the picture; not above or below.
+  double field_deg = 65.0;              ///< Across the picture's width.
+};
+
+/// Pixels of a canvas.
+struct Frame {
+  double left = 0.0, top = 0.0, width = 0.0, height = 0.0;
+};
+
+/// What moves, at an instant.
+struct MovingThings {
+  std::span<const Body> bodies;
+  SimTime time;
+};
+
+/// A map, and what moves in it, as an eye sees it, rendered as scans are: a ray for each pixel.
 class Perspective {
  public:
-  /// On the part of the map within `shown`, from the south west and above; what lies higher than
-  /// `cut` (m) is not there. `left`, `top`, `width`, `height`: pixels of the canvas.
+  /// On the part of the map within `shown`, from the south west and above, filling the frame; what
+  /// lies higher than `cut` (m) is not there.
+  Perspective(const SurfelMap& map, const Aabb& shown, double cut, const Frame& frame);
+  /// From an eye.
   Perspective(const SurfelMap& map,
-              const Aabb& shown,
+              const Eye& eye,
               double cut,
-              double left,
-              double top,
-              double width,
-              double height);
+              const Frame& frame,
+              const MovingThings& things);
 
-  /// Draws it, light falling from the eye; `color_at(z)`: of a height.
-  void paint(Canvas& canvas, const std::function<Color(double z)>& color_at) const;
+  /// Draws it, light falling from the eye; `color_at(z)`: of the map at a height;
+  /// `color_of(label)`: of what moves.
+  void paint(Canvas& canvas,
+             const std::function<Color(double z)>& color_at,
+             const std::function<Color(Label)>& color_of = {}) const;
 
   /// A way through it: what the map hides of it is faint.
   void draw_way(Canvas& canvas, const std::vector<Vector3d>& points, Color color) const;
@@ -33,17 +56,14 @@ class Perspective {
   /// Where a place is on the canvas; nothing where it is not in the picture, or hidden.
   [[nodiscard]] std::optional<std::pair<double, double>> visible(const Vector3d& p_world) const;
 
-  [[nodiscard]] double left() const { return left_; }
-  [[nodiscard]] double top() const { return top_; }
-  [[nodiscard]] double width() const { return width_; }
-  [[nodiscard]] double height() const { return height_; }
-
  private:
+  void look(const Vector3d& target);
+  void render(const SurfelMap& map, double cut, const MovingThings& things);
   /// Column, row (pixels) and range (m) of a place; nothing behind the eye.
   [[nodiscard]] std::optional<Vector3d> project(const Vector3d& p_world) const;
   [[nodiscard]] bool is_hidden(const Vector3d& projected) const;
 
-  double left_, top_, width_, height_;
+  Frame frame_;
   int columns_, rows_;
   Vector3d eye_ = Vector3d::Zero();
   Matrix3d axes_ = Matrix3d::Identity();              ///< Rows: right, down, ahead.
@@ -51,6 +71,7 @@ class Perspective {
   Eigen::Vector2d middle_ = Eigen::Vector2d::Zero();  ///< Where the eye looks straight on, pixels.
   std::vector<float> ranges_;                         ///< From the eye, m; negative: nothing.
   std::vector<float> cosines_, heights_;
+  std::vector<Label> labels_;
 };
 
 /// Height (m) below which a map has to be cut so that its inside is seen from above: infinite

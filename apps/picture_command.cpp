@@ -4,6 +4,9 @@
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
 #include <algorithm>
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <memory>
@@ -12,8 +15,10 @@
 #include <sstream>
 
 #include "apps/commands.hpp"
+#include "apps/film.hpp"
 #include "apps/flags.hpp"
 #include "apps/pictures.hpp"
+#include "apps/terminal.hpp"
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/core/mapped_file.hpp"
 #include "pointflight/io/cloud_reader.hpp"
@@ -28,6 +33,10 @@ struct PictureFlags {
   std::string run;
   std::string map;
   std::string output;
+  std::string frames;
+  std::string video;
+  std::size_t follow = 0;
+  double rate = 20.0;
   bool force = false;
 };
 
@@ -158,6 +167,46 @@ std::shared_ptr<const SurfelMap> map_of(const PictureFlags& flags,
   return scenario->open_map();
 }
 
+/// A folder without a name of its own, that goes with its pictures.
+class FrameFolder {
+ public:
+  FrameFolder() {
+    std::string name = (fs::temp_directory_path() / "pointflight_film_XXXXXX").string();
+    if (mkdtemp(name.data()) == nullptr) {
+      throw InputError(fmt::format("{}: {}", name, std::strerror(errno)));
+    }
+    path_ = name;
+  }
+  ~FrameFolder() {
+    std::error_code ignored;
+    fs::remove_all(path_, ignored);
+  }
+  FrameFolder(const FrameFolder&) = delete;
+  FrameFolder& operator=(const FrameFolder&) = delete;
+  [[nodiscard]] const std::string& path() const { return path_; }
+
+ private:
+  std::string path_;
+};
+
+void film(const PictureFlags& flags) {
+  if (!flags.video.empty()) refuse_to_overwrite(flags.video, flags.force);
+  if (!flags.frames.empty()) make_picture_folder(flags.frames, flags.force);
+  const Executor executor(0);
+  RecordedRun run(flags.run, executor);
+  const FrameFolder own;
+  FilmOptions options;
+  options.frames = flags.frames.empty() ? own.path() : flags.frames;
+  options.vehicle = flags.follow;
+  options.rate = flags.rate;
+  const std::size_t pictures = film_run(run, options, interruptible_progress());
+  end_progress();
+  if (!flags.frames.empty()) fmt::print("{} pictures in {}\n", pictures, flags.frames);
+  if (flags.video.empty()) return;
+  make_video(options, flags.video);
+  fmt::print("{}\n", flags.video);
+}
+
 }  // namespace
 
 void add_picture_command(CLI::App& parent, int& /*exit_code*/) {
@@ -166,8 +215,17 @@ void add_picture_command(CLI::App& parent, int& /*exit_code*/) {
   app->add_option("run", flags->run, "A folder that `fly` or a program of yours wrote")->required();
   app->add_option("--map", flags->map, "Where the map lies now, if not where the run says");
   app->add_option("-o,--output", flags->output, "The .png; else overview.png in the folder");
+  app->add_option(
+      "--video", flags->video, "Instead: a film of it (.mp4), from behind a vehicle; takes ffmpeg");
+  app->add_option("--frames", flags->frames, "The same as pictures, in a folder");
+  app->add_option("--follow", flags->follow, "Number of the vehicle that is followed")
+      ->check(CLI::Range(0, 100000));
+  app->add_option("--fps", flags->rate, "Pictures per second of the run")
+      ->check(within(0.1, 240.0))
+      ->capture_default_str();
   add_force_flag(*app, flags->force);
   app->callback([flags] {
+    if (!flags->video.empty() || !flags->frames.empty()) return film(*flags);
     // the run's own picture may be drawn again
     if (!flags->output.empty()) refuse_to_overwrite(flags->output, flags->force);
     const auto scenario = scenario_of(*flags);

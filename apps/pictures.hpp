@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "apps/canvas.hpp"
 #include "apps/run_picture.hpp"
 #include "pointflight/lidar/lidar.hpp"
 #include "pointflight/map/surfel_map.hpp"
@@ -11,8 +12,6 @@
 
 /// Each writes a PNG; throws InputError if it cannot.
 namespace pointflight::apps {
-
-class Canvas;
 
 /// A top and a side view of a map, coloured by height. A ceiling over most of it is left out of the
 /// top view.
@@ -27,6 +26,9 @@ void draw_scan(const std::vector<Beam>& beams,
 /// Top and side view of map, flown paths, obstacles, waypoints and what the LiDARs saw. The map
 /// above the flight is left out of the top view.
 void draw_overview(const SurfelMap& map, const RunPicture& run, const std::string& path);
+
+/// One colour for each vehicle, told apart by who sees no red or green.
+Color vehicle_color(std::size_t number);
 
 /// A vehicle's step responses beside what its loops were designed for.
 void draw_step_responses(const VehicleSettings& vehicle,

@@ -268,7 +268,8 @@ TEST(Perspective, ShowsWhatIsInFrontAndHidesWhatIsBehind) {
   shown.add({-10, -10, 0});
   shown.add({10, 10, 3});
   const double none = std::numeric_limits<double>::infinity();
-  const Perspective view(*map, shown, none, 50, 80, 640, 400);
+  const Frame frame{50, 80, 640, 400};
+  const Perspective view(*map, shown, none, frame);
   std::size_t looked_at = 0;
   for (double x = -9; x <= 9; x += 0.75) {
     for (double y = -9; y <= 9; y += 0.75) {
@@ -285,7 +286,7 @@ TEST(Perspective, ShowsWhatIsInFrontAndHidesWhatIsBehind) {
   }
   EXPECT_GT(looked_at, 200u);
   // above the wall one sees what is behind it once it is cut lower
-  const Perspective cut(*map, shown, 0.5, 50, 80, 640, 400);
+  const Perspective cut(*map, shown, 0.5, frame);
   EXPECT_TRUE(cut.visible({1.2, 1.2, 0.05}));
   EXPECT_FALSE(view.visible({1.2, 1.2, 0.05}));
 }
