@@ -84,8 +84,8 @@ TEST(Foxglove, RequestsOfClientsAreReadOrSaidWhatIsWrongWithThem) {
       {R"({"op":"subscribe","subscriptions":[7]})", "'id' is missing"},
       {R"({"op":"unsubscribe","subscriptionIds":["x"]})", "'subscriptionIds'"},
       {R"({"op":"advertise","channels":[{"id":1}]})", "'topic' is to be a text"}};
-  for (const auto& [text, why] : wrong) {
-    expect_contains(error_of([&] { static_cast<void>(parse_text(text)); }), why);
+  for (const auto& entry : wrong) {
+    expect_contains(error_of([&] { static_cast<void>(parse_text(entry.first)); }), entry.second);
   }
   for (const auto& frame :
        {bytes({}),
