@@ -156,7 +156,7 @@ TEST_F(Program, FliesWhatTheCommandLineSays) {
   expect_user_error(run(fmt::format("fly {} -o {} --mission 1,2", map(), folder / "no")),
                     "--mission (x,y,z x,y,z ...): 2 numbers; 3 are wanted");
   expect_user_error(run(fmt::format("fly {} -o {} --lockstep 1", map(), folder / "no")),
-                    "--lockstep: has no effect without --ros1 or --ros2");
+                    "--lockstep: has no effect without --ros1, --ros2 or --view");
   const Result check = run(fmt::format("scenario check {} --json", folder / "run/scenario.yaml"));
   EXPECT_EQ(nlohmann::json::parse(check.out)["vehicles"][0]["waypoints"], 2);
 }
