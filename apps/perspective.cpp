@@ -72,44 +72,55 @@ void Perspective::look(const Vector3d& target) {
   axes_.row(2) = ahead;
 }
 
+/// Some rows at a time: a page's rays together would take more memory than a flight.
 void Perspective::render(const SurfelMap& map, double cut, const MovingThings& things) {
   constexpr float kFarthest = 2000.0f;  // m
-  const auto count = static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_);
-  std::vector<Ray> rays(count);
-  std::vector<float> before(count, 0.0f);  // from the eye to where a ray begins
-  for (std::size_t i = 0; i < count; ++i) {
-    const std::size_t row = i / static_cast<std::size_t>(columns_);
-    const auto x = static_cast<double>(i % static_cast<std::size_t>(columns_));
-    const auto y = static_cast<double>(row);
-    const Vector3d d =
-        (axes_.transpose() * Vector3d(x + 0.5 - middle_.x(), y + 0.5 - middle_.y(), focal_))
-            .normalized();
-    const double above = d.z() < 0.0 ? std::max(0.0, (cut - eye_.z()) / d.z()) : 0.0;
-    before[i] = std::isfinite(above) ? static_cast<float>(above) : 0.0f;
-    rays[i].origin_world = eye_ + static_cast<double>(before[i]) * d;
-    rays[i].direction_world = d.cast<float>();
-    rays[i].range_max = kFarthest;
-  }
-  std::vector<Hit> hits(count);
-  RayBatch batch;
-  batch.rays = rays;
-  batch.range_max = kFarthest;
-  batch.bodies = things.bodies;
-  batch.time = batch.snapshot_time = things.time;
-  // not owned: it outlives the renderer
-  const std::shared_ptr<const SurfelMap> shared(std::shared_ptr<void>(), &map);
-  make_renderer("beam", Scene{shared})->render(batch, hits, Executor(0));
+  constexpr std::size_t kRowsAtOnce = 32;
+  const auto columns = static_cast<std::size_t>(columns_);
+  const std::size_t count = columns * static_cast<std::size_t>(rows_);
   ranges_.assign(count, -1.0f);
   cosines_.resize(count);
   heights_.resize(count);
   labels_.assign(count, kMapLabel);
-  for (std::size_t i = 0; i < count; ++i) {
-    if (!hits[i].is_return()) continue;
-    ranges_[i] = before[i] + hits[i].range;
-    cosines_[i] = hits[i].cos_incidence;
-    heights_[i] =
-        static_cast<float>(rays[i].origin_world.z()) + hits[i].range * rays[i].direction_world.z();
-    labels_[i] = hits[i].label;
+  // not owned: it outlives the renderer
+  const std::shared_ptr<const SurfelMap> shared(std::shared_ptr<void>(), &map);
+  const auto renderer = make_renderer("beam", Scene{shared});
+  const Executor executor(0);
+  std::vector<Ray> rays;
+  std::vector<float> before;  // from the eye to where a ray begins
+  std::vector<Hit> hits;
+  for (std::size_t first = 0; first < count; first += kRowsAtOnce * columns) {
+    const std::size_t now = std::min(kRowsAtOnce * columns, count - first);
+    rays.resize(now);
+    before.assign(now, 0.0f);
+    hits.assign(now, {});
+    for (std::size_t i = 0; i < now; ++i) {
+      const std::size_t row = (first + i) / columns;
+      const auto x = static_cast<double>((first + i) % columns);
+      const auto y = static_cast<double>(row);
+      const Vector3d d =
+          (axes_.transpose() * Vector3d(x + 0.5 - middle_.x(), y + 0.5 - middle_.y(), focal_))
+              .normalized();
+      const double above = d.z() < 0.0 ? std::max(0.0, (cut - eye_.z()) / d.z()) : 0.0;
+      before[i] = std::isfinite(above) ? static_cast<float>(above) : 0.0f;
+      rays[i].origin_world = eye_ + static_cast<double>(before[i]) * d;
+      rays[i].direction_world = d.cast<float>();
+      rays[i].range_max = kFarthest;
+    }
+    RayBatch batch;
+    batch.rays = rays;
+    batch.range_max = kFarthest;
+    batch.bodies = things.bodies;
+    batch.time = batch.snapshot_time = things.time;
+    renderer->render(batch, hits, executor);
+    for (std::size_t i = 0; i < now; ++i) {
+      if (!hits[i].is_return()) continue;
+      ranges_[first + i] = before[i] + hits[i].range;
+      cosines_[first + i] = hits[i].cos_incidence;
+      heights_[first + i] = static_cast<float>(rays[i].origin_world.z()) +
+                            hits[i].range * rays[i].direction_world.z();
+      labels_[first + i] = hits[i].label;
+    }
   }
 }
 
