@@ -9,10 +9,10 @@
 #include <algorithm>
 #include <cerrno>
 #include <cmath>
-#include <cstring>
 #include <filesystem>
 #include <limits>
 #include <optional>
+#include <system_error>
 #include <vector>
 
 #include "apps/map_layers.hpp"
@@ -196,7 +196,7 @@ void make_video(const FilmOptions& options, const std::string& path) {
   if (failed != 0) {
     throw InputError(
         fmt::format("--video: ffmpeg: {}; install it, or take the pictures of --frames",
-                    std::strerror(failed)));
+                    std::generic_category().message(failed)));
   }
   int status = 0;
   while (waitpid(child, &status, 0) < 0 && errno == EINTR) {

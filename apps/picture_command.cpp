@@ -6,13 +6,13 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstdlib>
-#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <sstream>
+#include <system_error>
 
 #include "apps/commands.hpp"
 #include "apps/film.hpp"
@@ -173,7 +173,7 @@ class FrameFolder {
   FrameFolder() {
     std::string name = (fs::temp_directory_path() / "pointflight_film_XXXXXX").string();
     if (mkdtemp(name.data()) == nullptr) {
-      throw InputError(fmt::format("{}: {}", name, std::strerror(errno)));
+      throw InputError(fmt::format("{}: {}", name, std::generic_category().message(errno)));
     }
     path_ = name;
   }
