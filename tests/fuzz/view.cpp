@@ -9,6 +9,7 @@
 #include "view/foxglove.hpp"
 #include "view/page_content.hpp"
 #include "view/page_orders.hpp"
+#include "view/web_rules.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace pointflight;
@@ -18,7 +19,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   static const std::vector<MotionLimits> motions(2);
   static const auto content = page_content("", nullptr);
   try {
-    switch (data[0] % 4) {
+    switch (data[0] % 5) {
       case 0:
         static_cast<void>(foxglove::parse_text(text));
         break;
@@ -28,6 +29,16 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       case 2:
         static_cast<void>(page_order(text, motions));
         break;
+      case 3: {
+        const auto range = range_of(text, 1000);
+        if (range && (range->from > range->to || range->to >= 1000)) __builtin_trap();
+        const std::size_t half = text.size() / 2;
+        const Asker asker{text.substr(0, half), text.substr(half), text};
+        if (permission_of(asker, "0123456789abcdef0123456789abcdef", true).command)
+          __builtin_trap();
+        static_cast<void>(chosen_subprotocol(text));
+        break;
+      }
       default:
         if (content(std::string(text))) __builtin_trap();
     }
