@@ -9,6 +9,7 @@
 
 #include "pointflight/core/parallel.hpp"
 #include "pointflight/fit/recorded_scans.hpp"
+#include "pointflight/fit/ring_fit.hpp"
 #include "pointflight/lidar/lidar_settings.hpp"
 
 namespace pointflight {
@@ -24,24 +25,6 @@ struct NoiseBin {
   double sigma = 0.0;           ///< Of ranges about the patches' planes, m: the median patch's.
   std::size_t patches = 0;      ///< Flat pieces of what was seen.
   std::size_t points = 0;       ///< On them.
-};
-
-/// One channel of a spinning sensor.
-struct RingFit {
-  std::int32_t ring = 0;            ///< As the recording numbers it.
-  double elevation_deg = 0.0;       ///< Median.
-  double azimuth_offset_deg = 0.0;  ///< After the first ring's, counter-clockwise seen from above.
-  double fire_time_us = 0.0;        ///< After the first to fire of a cycle.
-  double range_offset = 0.0;        ///< Mean of range minus the patches' planes, m.
-  std::size_t points = 0;           ///< That it has.
-};
-
-/// How a sensor turns.
-struct TurnFit {
-  double rate = 0.0;           ///< Turns per second.
-  bool is_clockwise = true;    ///< Seen from above.
-  double cycle_us = 0.0;       ///< From one firing of a channel to the next.
-  std::vector<RingFit> rings;  ///< By ascending number.
 };
 
 /// What scans of a sensor that stood still say of it.
@@ -77,9 +60,5 @@ SensorFit fit_sensor(std::span<const RecordedScan> scans,
 /// `base` with what was measured in place of its own: rate, noise, and, where `rings_table` is
 /// given (the name of a file of `rings_csv`), rings.
 LidarSettings with_fit(LidarSettings base, const SensorFit& fit, const std::string& rings_table);
-
-/// The rings as a table for a sensor file with `convention: velodyne`: ring, elevation_deg,
-/// azimuth_offset_deg, fire_time_us.
-std::string rings_csv(const TurnFit& turn);
 
 }  // namespace pointflight
