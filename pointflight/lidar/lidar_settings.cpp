@@ -337,6 +337,16 @@ void check(const LidarSettings& settings) {
     if (grid.projection == GridProjection::kPinhole && (grid.fx <= 0.0 || grid.fy <= 0.0)) {
       fail("grid.projection", "pinhole needs fx and fy");
     }
+    if (grid.projection == GridProjection::kPinhole && grid.stereo.baseline > 0.0) {
+      // what a matcher measures has no echoes and no signal
+      const char* const why = "has no effect beside grid.stereo; remove one of them";
+      if (!settings.detection.rated.empty()) fail("detection.rated", why);
+      if (settings.optics.divergence_horizontal_deg > 0.0) {
+        fail("optics.divergence_horizontal_deg", why);
+      }
+      if (settings.optics.divergence_vertical_deg > 0.0)
+        fail("optics.divergence_vertical_deg", why);
+    }
   }
   if (const double beams = beams_a_scan(settings); beams > kMostBeams) {
     fail(settings.pattern == ScanPattern::kGrid ? "grid.columns" : "rate",

@@ -1,6 +1,7 @@
 #include "pointflight/lidar/stereo.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "pointflight/core/constants.hpp"
@@ -59,34 +60,40 @@ std::vector<double> StereoCamera::nearest_in_right(std::span<const double> dispa
   return nearest;
 }
 
-/// Of unit deviation: part of it common to a window (between nodes a window apart, bilinear, scaled
-/// to the same deviation everywhere), part of it the pixel's own.
-double StereoCamera::noise_at(std::size_t row, std::size_t column, const Draws& draws) const {
-  const auto window = static_cast<double>(stereo_.window);
-  const double x = static_cast<double>(column) / window;
-  const double y = static_cast<double>(row) / window;
-  const double i = std::floor(x);
-  const double j = std::floor(y);
-  const double right = x - i;
-  const double down = y - j;
-  const std::uint64_t node = static_cast<std::uint64_t>(j) * nodes_ + static_cast<std::uint64_t>(i);
-  const auto at = [&](std::uint64_t n) { return draws.windows.normal(draws.image << 32 | n); };
-  const double a = (1.0 - right) * (1.0 - down);
-  const double b = right * (1.0 - down);
-  const double c = (1.0 - right) * down;
-  const double d = right * down;
-  const double common =
-      (a * at(node) + b * at(node + 1) + c * at(node + nodes_) + d * at(node + nodes_ + 1)) /
-      std::sqrt(a * a + b * b + c * c + d * d);
-  const double own = draws.pixels.normal(draws.image << 32 | (row * columns_ + column));
+/// Of a row's pixels, of unit deviation: part of it common to a window (between nodes a window
+/// apart, bilinear, scaled to the same deviation everywhere), part of it the pixel's own.
+std::vector<double> StereoCamera::noise_of(std::size_t row,
+                                           const Draws& draws,
+                                           std::span<const double> nodes) const {
+  const auto window = static_cast<std::size_t>(stereo_.window);
+  const std::span<const double> above = nodes.subspan(row / window * nodes_, nodes_);
+  const std::span<const double> below = nodes.subspan((row / window + 1) * nodes_, nodes_);
+  const double down = static_cast<double>(row % window) / static_cast<double>(window);
   const double share = stereo_.white_share;
-  return std::sqrt(1.0 - share * share) * common + share * own;
+  const double common_share = std::sqrt(1.0 - share * share);
+  const std::size_t pairs = (columns_ + 1) / 2;
+  std::vector<double> noise(columns_);
+  std::array<double, 2> own{};
+  for (std::size_t u = 0; u < columns_; ++u) {
+    if (u % 2 == 0) own = draws.pixels.normal2(draws.image << 32 | (row * pairs + u / 2));
+    const std::size_t i = u / window;
+    const double right = static_cast<double>(u % window) / static_cast<double>(window);
+    const double a = (1.0 - right) * (1.0 - down);
+    const double b = right * (1.0 - down);
+    const double c = (1.0 - right) * down;
+    const double d = right * down;
+    const double common = (a * above[i] + b * above[i + 1] + c * below[i] + d * below[i + 1]) /
+                          std::sqrt(a * a + b * b + c * c + d * d);
+    noise[u] = common_share * common + share * own[u % 2];
+  }
+  return noise;
 }
 
 void StereoCamera::measure_row(std::size_t row,
                                std::span<const Hit> hits,
                                std::span<const float> shares,
                                const Draws& draws,
+                               std::span<const double> nodes,
                                std::span<Return> returns) const {
   std::vector<double> disparities(columns_, kNothing);
   for (std::size_t u = 0; u < columns_; ++u) {
@@ -95,15 +102,16 @@ void StereoCamera::measure_row(std::size_t row,
         focal_baseline_ / (static_cast<double>(hits[u].range) * static_cast<double>(shares[u]));
   }
   const std::vector<double> nearest = nearest_in_right(disparities);
+  const std::vector<double> noise =
+      draws.noise ? noise_of(row, draws, nodes) : std::vector<double>(columns_, 0.0);
   for (std::size_t u = 0; u < columns_; ++u) {
     const double disparity = disparities[u];
     if (disparity < 0.0 || disparity > static_cast<double>(stereo_.disparities)) continue;
     if (static_cast<double>(hits[u].cos_incidence) < least_cosine_) continue;
     const std::int64_t right = floor_to_integer(static_cast<double>(u) - disparity + 0.5);
     if (right < 0 || nearest[static_cast<std::size_t>(right)] > disparity + kOneSurface) continue;
-    double seen = disparity;
-    if (draws.noise) seen += stereo_.disparity_sigma * noise_at(row, u, draws);
-    seen = rounded(seen, static_cast<double>(stereo_.disparity_steps));
+    const double seen = rounded(disparity + stereo_.disparity_sigma * noise[u],
+                                static_cast<double>(stereo_.disparity_steps));
     if (seen <= 0.0) continue;
     const double depth =
         rounded(focal_baseline_ / seen, depth_step_ > 0.0 ? 1.0 / depth_step_ : 0.0);
@@ -123,6 +131,14 @@ std::vector<Return> StereoCamera::measure(std::span<const Hit> hits,
                                           const Draws& draws,
                                           const Executor& executor) const {
   std::vector<Return> returns(hits.size());
+  // once for all rows: each is a corner of four windows
+  std::vector<double> nodes;
+  if (draws.noise) {
+    nodes.resize(nodes_ * (rows_ / static_cast<std::size_t>(stereo_.window) + 2));
+    for (std::size_t n = 0; n < nodes.size(); ++n) {
+      nodes[n] = draws.windows.normal(draws.image << 32 | n);
+    }
+  }
   executor.parallel_for(rows_, 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t row = begin; row < end; ++row) {
       const std::size_t first = row * columns_;
@@ -130,6 +146,7 @@ std::vector<Return> StereoCamera::measure(std::span<const Hit> hits,
                   hits.subspan(first, columns_),
                   shares.subspan(first, columns_),
                   draws,
+                  nodes,
                   std::span(returns).subspan(first, columns_));
     }
   });

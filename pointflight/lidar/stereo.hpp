@@ -28,7 +28,7 @@ class StereoCamera {
 
   /// How the camera's noise is drawn.
   struct Draws {
-    const RandomStream& pixels;   ///< Of each pixel, index: image << 32 | pixel.
+    const RandomStream& pixels;   ///< Two pixels each, index: image << 32 | the pair in its rows.
     const RandomStream& windows;  ///< Of the nodes between windows, index: image << 32 | node.
     std::uint64_t image = 0;      ///< Its number.
     bool noise = true;            ///< False: disparities are rounded and no more.
@@ -46,16 +46,19 @@ class StereoCamera {
                    std::span<const Hit> hits,
                    std::span<const float> shares,
                    const Draws& draws,
+                   std::span<const double> nodes,
                    std::span<Return> returns) const;
   [[nodiscard]] std::vector<double> nearest_in_right(std::span<const double> disparities) const;
-  [[nodiscard]] double noise_at(std::size_t row, std::size_t column, const Draws& draws) const;
+  [[nodiscard]] std::vector<double> noise_of(std::size_t row,
+                                             const Draws& draws,
+                                             std::span<const double> nodes) const;
 
   StereoSettings stereo_;
   std::size_t columns_, rows_;
   double focal_baseline_;  ///< f B, px m.
   double range_min_, range_max_, depth_step_;
   double least_cosine_;
-  std::size_t nodes_;  ///< In a row of the windows' grid.
+  std::size_t nodes_;  ///< In a row of the windows' grid, whose rows are a window apart.
 };
 
 }  // namespace pointflight

@@ -158,6 +158,20 @@ TEST(StereoCamera, WhatTheRightImagerDoesNotSeeHasNoDepth) {
   EXPECT_LT(wrong, hidden / 6);
 }
 
+TEST(StereoCamera, KeysThatAMatcherHasNoUseForAreRefused) {
+  const std::string camera =
+      "range_max: 6\npattern: grid\ngrid: {projection: pinhole, columns: 8, rows: 8, fx: 9, fy: 9, "
+      "cx: 4, cy: 4, stereo: {baseline: 0.1}}\n";
+  EXPECT_EQ(parse_lidar(camera, "c.yaml").grid.stereo.baseline, 0.1);
+  for (const char* more : {"optics: {divergence_horizontal_deg: 0.1}\n",
+                           "optics: {divergence_vertical_deg: 0.1}\n",
+                           "detection: {rated: [{reflectivity: 0.1, range: 5}]}\n"}) {
+    testing::expect_contains(
+        testing::error_of([&] { static_cast<void>(parse_lidar(camera + more, "c.yaml")); }),
+        "has no effect beside grid.stereo");
+  }
+}
+
 TEST(StereoCamera, GrazedSurfacesHaveNoDepth) {
   LeftView view(wall_at(2.0));
   for (std::size_t i = 0; i < view.hits.size(); ++i) {
