@@ -21,11 +21,9 @@
 #include "recording/recorded_survey.hpp"
 
 namespace pointflight::apps {
-namespace {
 
 namespace fs = std::filesystem;
 
-/// The MCAP files of a folder, in the order of their names.
 std::vector<std::string> recordings_in(const std::string& folder) {
   std::vector<std::string> paths;
   std::error_code error;
@@ -40,8 +38,6 @@ std::vector<std::string> recordings_in(const std::string& folder) {
   std::sort(paths.begin(), paths.end());
   return paths;
 }
-
-}  // namespace
 
 std::optional<RecordingOpener> recording_of(const std::string& path) {
   std::error_code ignored;

@@ -4,6 +4,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "pointflight/core/output_file.hpp"
 #include "pointflight/fit/map_fit.hpp"
@@ -28,6 +29,10 @@ struct FitFlags {
 /// --scans, --poses, --scan-topic, --pose-topic, --sensor-pose, --free, --deskewed, --leak-weight,
 /// --export-ghosts, --signal-of, --signal-limit.
 void add_fit_flags(CLI::App& app, FitFlags& flags, bool required);
+
+/// The MCAP files of a folder, in the order of their names. Throws InputError where it holds a
+/// recording in SQLite.
+std::vector<std::string> recordings_in(const std::string& folder);
 
 /// How to open a recording: a .bag, a .mcap, a folder of .mcap; nothing where `path` is a folder
 /// without any. Throws InputError where it is neither a folder nor a recording.

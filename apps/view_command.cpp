@@ -7,16 +7,22 @@
 #include <chrono>
 #include <filesystem>
 #include <memory>
+#include <optional>
+#include <string>
 #include <thread>
+#include <vector>
 
 #include "apps/commands.hpp"
+#include "apps/survey_flags.hpp"
 #include "apps/terminal.hpp"
 #include "apps/view_flags.hpp"
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/run/playback.hpp"
+#include "recording/mcap_timeline.hpp"
 #include "ros_common/profile.hpp"
 #include "ros_common/ros_link.hpp"
 #include "view/foxglove_transport.hpp"
+#include "view/recording_player.hpp"
 #include "view/view_link.hpp"
 
 namespace pointflight::apps {
@@ -26,6 +32,7 @@ namespace fs = std::filesystem;
 
 struct ViewCommandFlags {
   std::string input;
+  std::string map;
   std::string at;
   bool control = false;
   bool no_control = false;
@@ -69,18 +76,54 @@ void view_run(const ViewCommandFlags& flags) {
   play(run, links, playback);
 }
 
-int view(const ViewCommandFlags& flags) {
+/// A recording as it lies there, whoever made it.
+void view_recording(const ViewCommandFlags& flags) {
+  const auto map = flags.map.empty() ? nullptr : SurfelMap::open(flags.map);
+  const auto recording = open_timed_mcap(flags.input, terminal_progress());
+  const auto server = serve_view(place_of(flags), map, recording->range());
+  RecordingPlayer player(*recording, server);
+  catch_interrupts();
+  player.play(interrupted);
+}
+
+/// The recording in a folder that `ros2 bag record` made; nothing where it is another folder.
+std::optional<std::string> recording_in(const std::string& folder) {
   std::error_code ignored;
-  if (fs::is_directory(flags.input, ignored)) {
+  if (!fs::exists(fs::path(folder) / "metadata.yaml", ignored)) return std::nullopt;
+  const std::vector<std::string> found = recordings_in(folder);
+  if (found.size() != 1) {
+    throw InputError(
+        fmt::format("{}: is a recording in {} .mcap files: give one of them, such as {}",
+                    folder,
+                    found.size(),
+                    found.empty() ? "an .mcap" : found.front()));
+  }
+  return found.front();
+}
+
+int view(ViewCommandFlags flags) {
+  std::error_code ignored;
+  const bool is_folder = fs::is_directory(flags.input, ignored);
+  if (const auto inside = is_folder ? recording_in(flags.input) : std::nullopt) {
+    flags.input = *inside;
+  }
+  const bool is_recording = flags.input.ends_with(".mcap") || flags.input.ends_with(".mcap.active");
+  if (!flags.map.empty() && !is_recording) {
+    throw InputError("--map goes with a recording (.mcap); runs know their map");
+  }
+  if (is_recording) {
+    view_recording(flags);
+  } else if (is_folder) {
     view_run(flags);
   } else if (flags.input.ends_with(".pfmap")) {
     view_map(flags);
-  } else if (flags.input.ends_with(".mcap")) {
+  } else if (flags.input.ends_with(".bag") || flags.input.ends_with(".db3")) {
     throw InputError(fmt::format(
-        "{}: is a recording: open it in Foxglove or Lichtblick; here the folder of a run is shown",
+        "{}: recordings are shown as .mcap: `mcap convert` or `ros2 bag convert` makes one of it",
         flags.input));
   } else {
-    throw InputError(fmt::format("{}: is no folder of a run and no map (.pfmap)", flags.input));
+    throw InputError(fmt::format("{}: is no folder of a run, no map (.pfmap), no recording (.mcap)",
+                                 flags.input));
   }
   return kDone;
 }
@@ -89,11 +132,14 @@ int view(const ViewCommandFlags& flags) {
 
 void add_view_command(CLI::App& parent, int& exit_code) {
   auto* app = parent.add_subcommand(
-      "view", "Show a map, or a finished run with a time line, in a browser; until Ctrl-C");
+      "view",
+      "Show a map, a finished run or a recording with a time line, in a browser; until Ctrl-C");
   auto flags = std::make_shared<ViewCommandFlags>();
-  app->add_option("input", flags->input, "A .pfmap, or the folder of a run")
+  app->add_option("input", flags->input, "A .pfmap, the folder of a run, or an .mcap")
       ->required()
       ->check(CLI::ExistingPath);
+  app->add_option("--map", flags->map, "The .pfmap to draw around a recording")
+      ->check(CLI::ExistingFile);
   app->add_option("--at",
                   flags->at,
                   "ADDRESS:PORT; 127.0.0.1:8765 or the next port that is free, so that only this "

@@ -85,7 +85,7 @@ std::shared_ptr<LiveServer> serve_view(
   options.range = range;
   if (range) options.capabilities = {"playbackControl"};
   const std::string folder = page_folder();
-  options.content = page_content(folder, std::make_shared<const MapBlocks>(map));
+  options.content = page_content(folder, map ? std::make_shared<const MapBlocks>(map) : nullptr);
   auto server = std::make_shared<LiveServer>(std::move(options));
   if (folder.empty()) {
     log("the page was not built, which takes node and npm (./dev build); Foxglove and Lichtblick "

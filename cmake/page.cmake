@@ -1,11 +1,12 @@
-# The page of `--view`: own code and three.js in one file, by esbuild. ./dev fetches both by npm;
-# without them the program is built as ever, and --view says what is missing.
+# The page of `--view`: own code, three.js and Foxglove's readers of ROS messages in one
+# file, by esbuild. ./dev fetches them by npm; without them the program is built as ever, and --view says what is missing.
 set(modules ${PROJECT_SOURCE_DIR}/build/page_modules/node_modules)
 set(page ${PROJECT_BINARY_DIR}/page)
 target_compile_definitions(pointflight_view PRIVATE POINTFLIGHT_BUILT_PAGE="${page}")
 set(esbuild ${modules}/.bin/esbuild)
-if(NOT EXISTS ${esbuild} OR NOT EXISTS ${modules}/three/package.json)
-  message(STATUS "esbuild and three.js not found: the page of --view is left out (./dev build fetches them by npm)")
+if(NOT EXISTS ${esbuild} OR NOT EXISTS ${modules}/three/package.json OR
+   NOT EXISTS ${modules}/@foxglove/rosmsg2-serialization/package.json)
+  message(STATUS "esbuild, three.js or readers of messages not found: the page of --view is left out (./dev build fetches them by npm)")
   return()
 endif()
 file(GLOB page_sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/view/page/*)

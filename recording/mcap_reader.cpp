@@ -1,9 +1,6 @@
 #include "recording/mcap_reader.hpp"
 
 #include <fmt/format.h>
-#include <lz4frame.h>
-#include <zlib.h>
-#include <zstd.h>
 
 #include <algorithm>
 #include <array>
@@ -12,6 +9,7 @@
 
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/core/mapped_file.hpp"
+#include "recording/mcap_chunk.hpp"
 #include "recording/mcap_format.hpp"
 
 namespace pointflight {
@@ -19,43 +17,6 @@ namespace {
 
 using mcap::Opcode;
 using mcap::RecordReader;
-
-constexpr std::uint64_t kLargestChunk = std::uint64_t{1} << 28;  // bytes, unpacked
-
-/// Bytes of a packed chunk; empty where they do not unpack to `size`.
-std::vector<std::byte> unpacked(std::span<const std::byte> packed,
-                                const std::string& how,
-                                std::uint64_t size) {
-  std::vector<std::byte> out;
-  if (how.empty()) {
-    out.assign(packed.begin(), packed.end());
-  } else if (how == "zstd") {
-    // the frame says its size as well: memory is taken only where both agree
-    if (ZSTD_getFrameContentSize(packed.data(), packed.size()) != size) return {};
-    out.resize(size);
-    if (ZSTD_decompress(out.data(), size, packed.data(), packed.size()) != size) return {};
-  } else if (how == "lz4") {
-    constexpr std::uint64_t kMostGain = 255;  // of LZ4
-    if (size > kMostGain * packed.size()) return {};
-    out.resize(size);
-    LZ4F_dctx* context = nullptr;
-    if (LZ4F_isError(LZ4F_createDecompressionContext(&context, LZ4F_VERSION)) != 0) return {};
-    std::size_t to = 0;
-    std::size_t from = 0;
-    for (;;) {
-      std::size_t room = out.size() - to;
-      std::size_t taken = packed.size() - from;
-      const std::size_t more =
-          LZ4F_decompress(context, out.data() + to, &room, packed.data() + from, &taken, nullptr);
-      to += room;
-      from += taken;
-      if (LZ4F_isError(more) != 0 || more == 0 || (room == 0 && taken == 0)) break;
-    }
-    LZ4F_freeDecompressionContext(context);
-    if (to != size) return {};
-  }
-  return out.size() == size ? out : std::vector<std::byte>{};
-}
 
 /// Walks over records and counts.
 class Reading {
@@ -179,20 +140,16 @@ class Reading {
   }
 
   void chunk(RecordReader& reader) {
-    static_cast<void>(reader.take(16));  // times
-    const auto size = reader.number<std::uint64_t>();
-    const auto crc = reader.number<std::uint32_t>();
-    const std::string how = reader.text();
-    const auto packed = reader.take(reader.number<std::uint64_t>());
-    if (!reader.ok() || size > kLargestChunk) return;
-    chunk_ = unpacked(packed, how, size);
-    const auto sum = crc32_z(0, reinterpret_cast<const Bytef*>(chunk_.data()), chunk_.size());
-    if (chunk_.size() != size || (crc != 0 && crc != sum)) {
+    const auto packed = mcap::chunk_of(reader);
+    if (!packed) return;
+    auto bytes = mcap::unpack(*packed);
+    if (!bytes) {
       info_.complete = false;
       return;
     }
+    chunk_ = std::move(*bytes);
     ++info_.chunks;
-    compressions_.insert(how);
+    compressions_.insert(packed->compression);
     records(chunk_, true);
   }
 

@@ -9,7 +9,6 @@
 #include "ros_common/output.hpp"
 #include "ros_common/point_layout.hpp"
 #include "ros_common/scan_messages.hpp"
-#include "view/page_orders.hpp"
 
 namespace pointflight {
 namespace {
@@ -164,21 +163,11 @@ void ViewLink::open(const RunDescription& run) {
         {"min", list_of(bounds.min)},
         {"max", list_of(bounds.max)}}}};
   server_->publish(run_, bytes_of(description), stamp(SimTime{}));
-  server_->subscribe_json("/pointflight/order", "pointflight.Order", [this](const Received& text) {
-    const Order order = page_order({reinterpret_cast<const char*>(text.data), text.size}, motions_);
-    const std::lock_guard lock(mutex_);
-    constexpr std::size_t kMostOrders = 1000;  // that wait for a step
-    if (orders_.size() < kMostOrders) orders_.push_back(order);
-  });
+  inbox_.take_orders_of(*server_, motions_);
 }
 
 void ViewLink::let_play_back() {
-  server_->on_playback([this](const foxglove::PlaybackControl& control) {
-    const std::lock_guard lock(mutex_);
-    if (control.seek) orders_.emplace_back(SeekOrder{SimTime(Duration(*control.seek) - epoch_)});
-    orders_.emplace_back(RateOrder{static_cast<double>(control.speed)});
-    orders_.emplace_back(PauseOrder{!control.play});
-  });
+  inbox_.take_playback_of(*server_, epoch_);
 }
 
 void ViewLink::publish_playback(const PlaybackStatus& status) {
@@ -193,8 +182,7 @@ void ViewLink::publish_playback(const PlaybackStatus& status) {
 }
 
 std::vector<Order> ViewLink::take_orders() {
-  const std::lock_guard lock(mutex_);
-  return std::exchange(orders_, {});
+  return inbox_.take();
 }
 
 void ViewLink::on_sample(const Sample& sample) {

@@ -3,13 +3,13 @@
 #include <array>
 #include <chrono>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <vector>
 
 #include "pointflight/run/link.hpp"
 #include "pointflight/run/playback.hpp"
 #include "view/live_server.hpp"
+#include "view/order_inbox.hpp"
 
 namespace pointflight {
 
@@ -40,7 +40,7 @@ class ViewLink : public Link {
   void on_reset(SimTime reached) override;
   void on_seek(SimTime to) override;
   void close() override;
-  /// Nobody flies for a viewer's sake alone... but those who watch want the run to go on.
+  /// Who watches wants the run to go on when its mission is flown.
   [[nodiscard]] bool is_in_use() const override { return true; }
 
  private:
@@ -61,8 +61,7 @@ class ViewLink : public Link {
   std::vector<std::string> names_;
   std::optional<ObstacleSample> obstacles_;
   std::vector<MotionLimits> motions_;
-  std::mutex mutex_;  ///< Of what the server's thread puts in.
-  std::vector<Order> orders_;
+  OrderInbox inbox_;
   std::uint32_t run_ = 0, state_ = 0, events_ = 0;  ///< Channels.
   Clock::time_point last_state_{};
   Clock::time_point last_rate_{};

@@ -1,19 +1,48 @@
-// Any bytes as a recording: read as far as it goes, or an InputError of one line.
+// Any bytes as a recording: read as far as it goes, from the start and from any time on, or an
+// InputError of one line.
 #include <cstdint>
 #include <string>
 
 #include "pointflight/core/input_error.hpp"
 #include "recording/mcap_reader.hpp"
+#include "recording/mcap_timeline.hpp"
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+namespace {
+
+template <class Action>
+void expect_one_line(const Action& action) {
   try {
-    std::size_t bytes = 0;
-    pointflight::read_mcap_bytes(
-        std::as_bytes(std::span(data, size)),
-        "input.mcap",
-        [&](const pointflight::RecordedMessage& message) { bytes += message.data.size(); });
+    action();
   } catch (const pointflight::InputError& error) {
     if (std::string(error.what()).find('\n') != std::string::npos) __builtin_trap();
   }
+}
+
+void read_from_any_time(std::span<const std::byte> bytes) {
+  const auto recording = pointflight::timed_mcap(bytes, "input.mcap");
+  const auto [start, end] = recording->range();
+  if (start > end) __builtin_trap();
+  pointflight::TimedMessage message;
+  for (const std::int64_t time : {start, start + (end - start) / 2, end + 1}) {
+    recording->seek(time);
+    while (recording->next(message)) {
+      if (message.channel >= recording->channels().size() || message.time < time) __builtin_trap();
+    }
+    recording->latched_before(time, [&](const pointflight::TimedMessage& latched) {
+      if (latched.time >= time) __builtin_trap();
+    });
+  }
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const auto bytes = std::as_bytes(std::span(data, size));
+  expect_one_line([&] {
+    std::size_t sum = 0;
+    pointflight::read_mcap_bytes(
+        bytes, "input.mcap", [&](const pointflight::RecordedMessage& m) { sum += m.data.size(); });
+  });
+  expect_one_line([&] { read_from_any_time(bytes); });
   return 0;
 }

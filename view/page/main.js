@@ -1,8 +1,13 @@
 import * as THREE from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
-import { Client, cloudOf, json } from "./protocol.js";
+import { FrameBudget } from "./budget.js";
+import { ScanTrail, cloudOf } from "./clouds.js";
+import { showLegend } from "./legend.js";
 import { SurfelMap } from "./map.js";
-import { Obstacles, ScanCloud, Vehicle, append, line } from "./vehicles.js";
+import { Client, json } from "./protocol.js";
+import { Recording } from "./recording.js";
+import { EyeDome } from "./shading.js";
+import { Obstacles, Vehicle, append, line } from "./vehicles.js";
 
 const $ = (id) => document.getElementById(id);
 const query = new URLSearchParams(location.search);
@@ -10,8 +15,11 @@ THREE.Object3D.DEFAULT_UP.set(0, 0, 1); // the world's z is up
 
 // ---- what is drawn with ----
 
-const renderer = new THREE.WebGLRenderer({ antialias: true, preserveDrawingBuffer: true });
-renderer.setPixelRatio(Math.min(devicePixelRatio, Number(query.get("pixels") ?? 2)));
+const renderer = new THREE.WebGLRenderer({ preserveDrawingBuffer: true });
+const hardware = renderer.getContext().getExtension("WEBGL_debug_renderer_info");
+const isSoftware = /swiftshader|llvmpipe|software/i.test(hardware ? renderer.getContext().getParameter(hardware.UNMASKED_RENDERER_WEBGL) : "");
+renderer.setPixelRatio(Math.min(devicePixelRatio, Number(query.get("pixels") ?? (isSoftware ? 1 : 2))));
+const dome = new EyeDome(renderer, isSoftware ? 0 : 4);
 $("scene").append(renderer.domElement);
 const scene = new THREE.Scene();
 scene.add(new THREE.HemisphereLight("#ffffff", "#888888", 2.2));
@@ -28,7 +36,10 @@ const obstacles = new Obstacles(scene);
 const measured = line(new THREE.Color("#00b894"), 2);
 scene.add(measured);
 
-const state = { vehicles: [], chosen: 0, run: null, last: null, ruler: false, marks: [], keys: new Set(), frames: 0, cost: 0 };
+// without a GPU a few frames per second are what there is
+const budget = isSoftware ? new FrameBudget(100_000, 300, 150) : new FrameBudget(2_000_000, 45, 24);
+
+const state = { vehicles: [], chosen: 0, run: null, last: null, recording: null, ruler: false, marks: [], keys: new Set(), frames: 0, cost: 0 };
 
 function resize() {
   renderer.setSize(innerWidth, innerHeight);
@@ -52,17 +63,109 @@ const client = new Client(address, {
   close: () => ($("title").textContent = "the run has ended, or the connection is gone"),
   session: () => state.vehicles.forEach((v) => v.forget()),
   info: (info) => {
-    setPermission();
-    const seconds = (t) => t.sec + 1e-9 * t.nsec;
     $("line").style.display = info.dataEndTime ? "" : "none";
-    if (info.dataEndTime) $("line").max = seconds(info.dataEndTime) - seconds(info.dataStartTime);
+    setPermission();
+    if (!info.dataEndTime) return;
+    const ns = (t) => BigInt(t.sec) * 1_000_000_000n + BigInt(t.nsec);
+    state.start = ns(info.dataStartTime);
+    $("line").max = 1e-9 * Number(ns(info.dataEndTime) - state.start);
+  },
+  channels: (channels) => {
+    if (channels.length === 0) showMapAlone();
+    else if (!channels.some((c) => c.topic === "/pointflight/run")) playRecording(channels);
+  },
+  time: (time) => state.recording && showTime(1e-9 * Number(time - state.start)),
+  playback: (playback) => {
+    if (!state.recording) return;
+    if (playback.didSeek) state.recording.forget();
+    state.doing = playback.isPlaying ? "running" : "paused";
+    state.rate = playback.speed;
+    showTime(1e-9 * Number(playback.time - state.start));
   },
   status: (message) => say(message.message),
 });
 
+// Nothing flies there: what tells of flights is put away.
+function showMapAlone() {
+  $("title").textContent = "map";
+  $("hint").textContent = "? for keys";
+  for (const id of ["bar", "image"]) $(id).style.display = "none";
+  for (const id of ["vehicle", "scans", "keep", "path"]) $(id).parentElement.style.display = "none";
+  $("camera").parentElement.style.display = "none";
+}
+
+// ---- a recording: topics as they lie in a file ----
+
+const heights = {
+  uniform: map.uniforms.heights,
+  // of a cloud that is a place: between its 2nd and 98th percentile
+  include(positions) {
+    if (map.surfels) return;
+    const z = [];
+    const stride = 3 * Math.max(1, Math.floor(positions.length / 3 / 20000));
+    for (let i = 2; i < positions.length; i += stride) z.push(positions[i]);
+    z.sort((a, b) => a - b);
+    map.uniforms.heights.value.set(z[Math.floor(0.02 * z.length)] ?? 0, z[Math.floor(0.98 * z.length)] ?? 1);
+    setLegend();
+  },
+};
+
+function playRecording(channels) {
+  if (!state.recording) {
+    state.recording = new Recording(scene, $("tags"), client, heights, say);
+    state.recording.start = state.start;
+    state.recording.keep = Number($("keep").value);
+    state.vehicles = state.recording.vehicles;
+    state.recording.onScan = (vehicle, trail) => vehicle === chosen() && drawRange(trail.cloud, null);
+    state.recording.onVehicle = () => {
+      listVehicles();
+      if (!state.placed) $("camera").value = "follow";
+    };
+    $("title").textContent = "recording";
+    $("step").title = "to the next scan";
+  }
+  state.recording.adopt(channels);
+  $("topics").style.display = "block";
+  $("topics").replaceChildren(
+    Object.assign(document.createElement("h1"), { textContent: "topics" }),
+    ...state.recording.topics.map((topic) => {
+      const row = document.createElement("label");
+      const box = Object.assign(document.createElement("input"), { type: "checkbox", checked: topic.isDrawn && topic.isOn, disabled: !topic.isDrawn });
+      box.onchange = () => state.recording.show(topic, box.checked);
+      row.title = topic.isDrawn ? topic.kind : `${topic.kind || topic.channel.encoding}: not drawn`;
+      row.append(Object.assign(document.createElement("span"), { textContent: topic.channel.topic }), box);
+      if (!topic.isDrawn) row.className = "off";
+      return row;
+    }),
+  );
+}
+
+function showTime(t) {
+  state.last = { t, doing: state.doing ?? "running", rate: state.rate ?? 1 };
+  const first = state.vehicles[0];
+  if (first?.state?.p && !state.placed) {
+    state.placed = true;
+    controls.target.copy(first.group.position);
+    camera.position.copy(first.group.position).add(new THREE.Vector3(-8, -6, 6));
+  }
+  showClock();
+  showFigures();
+}
+
+function showClock() {
+  if (document.activeElement !== $("line")) $("line").value = state.last.t;
+  $("time").textContent = `${state.last.t.toFixed(1)} s`;
+  $("pause").textContent = state.last.doing === "paused" ? "go on" : "pause";
+}
+
+function listVehicles() {
+  $("vehicle").replaceChildren(...state.vehicles.map((v, i) => new Option(v.description.name, i)));
+}
+
 function setPermission() {
   for (const id of ["pause", "step", "reset", "rate", "line"]) $(id).disabled = !client.mayCommand;
-  $("hint").textContent = client.mayCommand ? "double click: fly there; ? for keys" : "watching only; ? for keys";
+  const isLive = $("line").style.display === "none";
+  $("hint").textContent = !client.mayCommand ? "watching only; ? for keys" : isLive ? "double click: fly there; ? for keys" : "space, time line; ? for keys";
 }
 
 client.want("/pointflight/run", (bytes) => {
@@ -71,16 +174,16 @@ client.want("/pointflight/run", (bytes) => {
   state.run = run;
   state.vehicles = run.vehicles.map((v, i) => new Vehicle(scene, $("tags"), v, i));
   $("title").textContent = run.vehicles.length > 1 ? `${run.vehicles.length} vehicles` : run.vehicles[0]?.name ?? "map";
-  $("vehicle").replaceChildren(...run.vehicles.map((v, i) => new Option(v.name, i)));
+  listVehicles();
   for (const vehicle of state.vehicles) {
     for (const lidar of vehicle.description.lidars) {
-      const cloud = new ScanCloud(scene);
-      cloud.material.uniforms.tint.value = vehicle.colour.clone().lerp(new THREE.Color("#ffd23f"), 0.7);
-      vehicle.scans.set(lidar.topic, cloud);
-      client.want(lidar.topic, (data) => {
+      const trail = new ScanTrail(scene, vehicle.colour.clone().lerp(new THREE.Color("#ffd23f"), 0.7), map.uniforms.heights);
+      trail.keep = Number($("keep").value);
+      vehicle.scans.set(lidar.topic, trail);
+      client.want(lidar.topic, (data, stamp) => {
         if (!$("scans").checked) return;
-        cloud.set(cloudOf(data));
-        if (vehicle === chosen()) drawRange(vehicle, cloud.cloud);
+        trail.add(cloudOf(data), 1e-9 * Number(stamp - BigInt(run.epoch)));
+        if (vehicle === chosen()) drawRange(trail.cloud, vehicle);
       });
     }
   }
@@ -91,11 +194,9 @@ client.want("/pointflight/state", (bytes) => {
   const now = json(bytes);
   if (state.last && now.t < state.last.t - 0.5) state.vehicles.forEach((v) => v.forget());
   state.last = now;
-  if (document.activeElement !== $("line")) $("line").value = now.t;
   now.vehicles.forEach((v, i) => state.vehicles[i]?.update(v, now.t));
   obstacles.update(now.obstacles);
-  $("time").textContent = `${now.t.toFixed(1)} s`;
-  $("pause").textContent = now.doing === "paused" ? "go on" : "pause";
+  showClock();
   showFigures();
 });
 
@@ -127,21 +228,20 @@ function say(words, hot = false) {
 }
 
 function showFigures() {
-  const v = chosen()?.state;
+  const v = chosen()?.state ?? {};
   const now = state.last;
-  if (!v?.p) return;
-  const rows = [
-    ["time", `${now.t.toFixed(2)} s`],
-    ["real-time factor", now.rate.toFixed(2)],
-    ["place", v.p.map((x) => x.toFixed(2)).join(", ")],
-    ["speed", `${Math.hypot(...v.v).toFixed(2)} m/s`],
-    ["clearance", v.nearest ? `${v.nearest.distance.toFixed(2)} m` : "over 10 m"],
-    ["command", v.command ?? ""],
-    ["scans", v.scans ?? 0],
-    ["collisions", v.collisions ?? 0],
-    ["drawn", `${(map.drawn / 1e6).toFixed(2)} of ${((map.surfels ?? 0) / 1e6).toFixed(2)} M surfels`],
-    ["frame", `${state.cost.toFixed(0)} ms`],
-  ];
+  const rows = [];
+  if (now) rows.push(["time", `${now.t.toFixed(2)} s`], [state.recording ? "pace" : "real-time factor", now.rate.toFixed(2)]);
+  if (v.p) rows.push(["place", `${v.p.map((x) => x.toFixed(2)).join(", ")} m`]);
+  if (v.v) rows.push(["speed", `${Math.hypot(...v.v).toFixed(2)} m/s`]);
+  if (v.p && !state.recording) {
+    rows.push(
+      ["clearance", v.nearest ? `${v.nearest.distance.toFixed(2)} m` : "over 10 m"],
+      ...["command", "scans", "collisions"].filter((name) => v[name] !== undefined).map((name) => [name, v[name]]),
+    );
+  }
+  if (map.surfels) rows.push(["surfels drawn", `${(map.drawn / 1e6).toFixed(2)} of ${(map.surfels / 1e6).toFixed(2)} M`]);
+  rows.push(["frame, script", `${budget.interval.toFixed(0)}, ${state.cost.toFixed(0)} ms`]);
   $("figures").replaceChildren(
     ...rows.map(([name, value]) => {
       const row = document.createElement("tr");
@@ -151,17 +251,17 @@ function showFigures() {
   );
 }
 
-// The scan as a picture over azimuth and elevation, as its sensor sees it.
-function drawRange(vehicle, cloud) {
-  const pose = vehicle.state;
-  if (!pose?.p) return;
+// The scan as a picture over azimuth and elevation, as its sensor sees it; of points in the world around a vehicle.
+function drawRange(cloud, vehicle) {
+  if (!cloud || (vehicle && !vehicle.state?.p)) return;
   const canvas = $("image");
   const context = canvas.getContext("2d");
   const image = context.createImageData(canvas.width, canvas.height);
-  const inverse = new THREE.Quaternion(pose.q[1], pose.q[2], pose.q[3], pose.q[0]).invert();
+  const inverse = vehicle?.group.quaternion.clone().invert();
   const p = new THREE.Vector3();
   for (let i = 0; i < cloud.count; ++i) {
-    p.fromArray(cloud.positions, 3 * i).sub(vehicle.group.position).applyQuaternion(inverse);
+    p.fromArray(cloud.positions, 3 * i);
+    if (vehicle) p.sub(vehicle.group.position).applyQuaternion(inverse);
     const range = p.length();
     const u = Math.floor((0.5 - Math.atan2(p.y, p.x) / (2 * Math.PI)) * canvas.width);
     const v = Math.floor((0.5 - Math.asin(p.z / range) / (Math.PI * 0.7)) * canvas.height);
@@ -261,9 +361,21 @@ $("ruler").onclick = () => {
 };
 $("keys").onclick = () => ($("help").style.display = $("help").style.display === "block" ? "none" : "block");
 $("theme").onchange = () => setTheme(!$("theme").checked);
-$("colour").onchange = () => (map.uniforms.colouring.value = ["height", "intensity", "planar"].indexOf($("colour").value));
-$("budget").onchange = () => (map.budget = Number($("budget").value));
-$("scans").onchange = () => state.vehicles.forEach((v) => v.scans.forEach((s) => (s.points.visible = $("scans").checked)));
+$("colour").onchange = () => {
+  map.uniforms.colouring.value = ["height", "intensity", "planar"].indexOf($("colour").value);
+  setLegend();
+};
+$("budget").onchange = () => setBudget($("budget").value);
+$("dome").onchange = () => (dome.isOn = $("dome").checked);
+$("keep").onchange = () => {
+  const seconds = Number($("keep").value);
+  state.recording?.setKeep(seconds);
+  for (const vehicle of state.vehicles) vehicle.scans.forEach((trail) => (trail.keep = seconds));
+};
+$("scans").onchange = () => {
+  for (const vehicle of state.vehicles) vehicle.scans.forEach((trail) => trail.show($("scans").checked));
+  state.recording?.trails.forEach((trail) => trail.byHeight || trail.show($("scans").checked && trail.topic.isOn));
+};
 $("path").onchange = () => state.vehicles.forEach((v) => (v.path.visible = $("path").checked));
 $("ceiling").oninput = () => {
   if (!map.bounds) return;
@@ -271,6 +383,17 @@ $("ceiling").oninput = () => {
   const share = Number($("ceiling").value);
   map.uniforms.clipHigh.value.z = share >= 1 ? 1e9 : min.z + share * (max.z - min.z);
 };
+
+// "auto", or a number of surfels.
+function setBudget(value) {
+  budget.isAutomatic = value === "auto";
+  if (!budget.isAutomatic) budget.surfels = Number(value);
+  map.budget = budget.surfels;
+}
+
+function setLegend() {
+  if (map.surfels || state.recording?.trails.some((trail) => trail.byHeight)) showLegend($("legend"), $("colour").value, map);
+}
 
 // A box around the chosen vehicle, 2 m to the map's size.
 function cutAround() {
@@ -335,11 +458,11 @@ function draw(dt) {
   for (const vehicle of state.vehicles) vehicle.animate(dt);
   cutAround();
   map.update(camera);
-  renderer.render(scene, camera);
+  dome.render(scene, camera);
   const place = new THREE.Vector3();
   for (const vehicle of state.vehicles) {
     place.copy(vehicle.group.position).project(camera);
-    const isSeen = vehicle.group.visible && place.z < 1 && $("camera").value !== "board";
+    const isSeen = vehicle.group.visible && Math.abs(place.z) < 1 && $("camera").value !== "board";
     vehicle.tag.style.display = isSeen ? "block" : "none";
     vehicle.tag.style.left = `${(0.5 + 0.5 * place.x) * innerWidth}px`;
     vehicle.tag.style.top = `${(0.5 - 0.5 * place.y) * innerHeight}px`;
@@ -352,17 +475,21 @@ function frame(now) {
   draw(Math.min(0.1, 1e-3 * (now - before)));
   before = now;
   ++state.frames;
+  if (budget.frame(now, map.drawn)) map.budget = budget.surfels;
+  if (!state.last && state.frames % 20 === 0) showFigures();
   state.cost = 0.9 * state.cost + 0.1 * (performance.now() - start);
   requestAnimationFrame(frame);
 }
 
 resize();
-map.budget = Number(query.get("budget") ?? 2e6);
+setBudget(query.get("budget") ?? "auto");
 map
   .load()
-  .then(() => {
+  .then((isThere) => {
+    if (!isThere) return;
+    setLegend();
     if (!map.hasIntensity) $("colour").querySelector("[value=intensity]").disabled = true;
-    if (!state.run) {
+    if (!state.run && !state.placed) {
       const middle = map.bounds.getCenter(new THREE.Vector3());
       controls.target.copy(middle);
       camera.position.copy(middle).add(new THREE.Vector3(-15, -15, 12));
@@ -372,4 +499,4 @@ map
 requestAnimationFrame(frame);
 
 // For tests and for those who script it.
-window.pointflight = { state, map, camera, controls, scene, client, flyTo, setCamera, THREE };
+window.pointflight = { state, map, budget, dome, camera, controls, scene, client, flyTo, setCamera, THREE };

@@ -1,14 +1,18 @@
 // The map: surfels as oriented discs, unpacked in the shader from the words that the simulator traces.
 import * as THREE from "three";
+import { FLAT_LEVEL, FLAT_STEEP, ROUGH, glsl, turbo } from "./colours.js";
 
 const ROW = 16; // bytes of a surfel, MapBlocks
+const WIDTH = 512; // of the textures that surfels lie in
 
 const vertex = `
 precision highp float;
 precision highp int;
-in vec2 corner;
-in uvec2 word;
-in vec4 leaf;   // origin of its leaf from the map's, m; intensity code
+const int WIDTH = ${WIDTH};
+precision highp usampler2D;
+precision highp sampler2D;
+uniform usampler2D words;
+uniform sampler2D leaves;  // origin of its leaf from the map's, m; intensity code
 uniform float resolution;
 uniform float grow;      // thinned surfels stand for their neighbours
 uniform vec3 clipLow, clipHigh;
@@ -16,19 +20,14 @@ uniform int colouring;
 uniform vec2 heights;
 out vec2 place;
 out vec3 shade;
-vec3 turbo(float x) {
-  x = clamp(x, 0.0, 1.0);
-  const vec4 r4 = vec4(0.13572138, 4.61539260, -42.66032258, 132.13108234);
-  const vec4 g4 = vec4(0.09140261, 2.19418839, 4.84296658, -14.18503333);
-  const vec4 b4 = vec4(0.10667330, 12.64194608, -60.58204836, 110.36276771);
-  const vec2 r2 = vec2(-152.94239396, 59.28637943);
-  const vec2 g2 = vec2(4.27729857, 2.82956604);
-  const vec2 b2 = vec2(-89.90310912, 27.34824973);
-  vec4 v4 = vec4(1.0, x, x * x, x * x * x);
-  vec2 v2 = v4.zw * v4.z;
-  return vec3(dot(v4, r4) + dot(v2, r2), dot(v4, g4) + dot(v2, g2), dot(v4, b4) + dot(v2, b2));
-}
+${turbo}
 void main() {
+  // four vertices for each surfel, which is fetched: instances of four cost several times as much
+  int surfel = gl_VertexID >> 2;
+  ivec2 texel = ivec2(surfel % WIDTH, surfel / WIDTH);
+  uvec2 word = texelFetch(words, texel, 0).xy;
+  vec4 leaf = texelFetch(leaves, texel, 0);
+  vec2 corner = vec2((gl_VertexID + 1 & 2) - 1, (gl_VertexID & 2) - 1);
   // SurfelWord: see pointflight/map/surfel.hpp
   uint lo = word.x, hi = word.y;
   vec3 centre = (vec3(float(lo & 1023u), float((lo >> 10) & 1023u), float((lo >> 20) & 1023u)) + 0.5) / 64.0;
@@ -50,11 +49,10 @@ void main() {
   vec3 sight = normalize(cameraPosition - world);
   float light = 0.55 + 0.45 * abs(dot(normal, normalize(sight + vec3(0.3, 0.2, 0.9))));
   vec3 colour;
-  if (colouring == 0) colour = turbo(0.08 + 0.84 * clamp((world.z - heights.x) / max(0.1, heights.y - heights.x), 0.0, 1.0));
+  if (colouring == 0) colour = turboOfHeight(world.z, heights);
   else if (colouring == 1) colour = vec3(0.15 + 0.85 * leaf.w / 255.0);
-  else colour = thickness == 0 ? mix(vec3(0.30, 0.55, 0.75), vec3(0.55, 0.75, 0.85), abs(normal.z))
-                               : vec3(0.85, 0.55, 0.25);
-  shade = colour * light;
+  else colour = thickness == 0 ? mix(${glsl(FLAT_STEEP)}, ${glsl(FLAT_LEVEL)}, abs(normal.z)) : ${glsl(ROUGH)};
+  shade = linear(colour * light);
 }`;
 
 const fragment = `
@@ -67,12 +65,16 @@ void main() {
   colour = vec4(shade, 1.0);
 }`;
 
+// For so many surfels, in whole rows of their textures.
+function room(count) {
+  const texels = WIDTH * Math.max(1, Math.ceil(count / WIDTH));
+  return { words: new Uint32Array(2 * texels), leaves: new Float32Array(4 * texels) };
+}
+
 export class SurfelMap {
   constructor(scene) {
     this.group = new THREE.Group();
     scene.add(this.group);
-    this.corners = new THREE.BufferAttribute(new Float32Array([-1, -1, 1, -1, 1, 1, -1, 1]), 2);
-    this.faces = new THREE.BufferAttribute(new Uint16Array([0, 1, 2, 0, 2, 3]), 1);
     this.budget = 2e6;
     this.blocks = [];
     this.loading = 0;
@@ -87,28 +89,25 @@ export class SurfelMap {
     this.materials = new Map(); // by how much discs grow
   }
 
-  material(grow) {
-    const key = grow.toFixed(2);
-    if (!this.materials.has(key)) {
-      this.materials.set(
-        key,
-        new THREE.ShaderMaterial({
-          glslVersion: THREE.GLSL3,
-          vertexShader: vertex,
-          fragmentShader: fragment,
-          side: THREE.DoubleSide,
-          uniforms: { ...this.uniforms, grow: { value: grow } },
-        }),
-      );
+  // Two triangles for each of `count` surfels; one buffer for all meshes, as long as the longest.
+  faces(count) {
+    if (!this.index || this.index.count < 6 * count) {
+      const faces = new Uint32Array(6 * Math.max(16384, count));
+      for (let i = 0; i < faces.length / 6; ++i) faces.set([4 * i, 4 * i + 1, 4 * i + 2, 4 * i, 4 * i + 2, 4 * i + 3], 6 * i);
+      this.index = new THREE.BufferAttribute(faces, 1);
     }
-    return this.materials.get(key);
+    return this.index;
   }
 
+  // False where there is no map.
   async load() {
-    const view = new DataView(await this.fetch("/map/index"));
+    const index = await this.fetch("/map/index");
+    if (index.byteLength === 0) return false;
+    const view = new DataView(index);
     const count = view.getUint32(4, true);
     this.surfels = view.getUint32(8, true);
     this.hasIntensity = view.getUint32(12, true) === 1;
+    this.intensity = { zero: view.getFloat32(48, true), step: view.getFloat32(52, true) };
     const origin = new THREE.Vector3(...[16, 24, 32].map((at) => view.getFloat64(at, true)));
     this.origin = origin;
     const resolution = view.getFloat64(40, true);
@@ -124,10 +123,11 @@ export class SurfelMap {
         new THREE.Vector3(f(3), f(4), f(5)).add(origin),
       );
       this.bounds.union(box);
-      this.blocks.push({ box, sphere: box.getBoundingSphere(new THREE.Sphere()), surfels: view.getUint32(at + 24, true), level: -1, wanted: -1, mesh: null });
+      this.blocks.push({ number: i, box, sphere: box.getBoundingSphere(new THREE.Sphere()), surfels: view.getUint32(at + 24, true), level: -1, wanted: -1, mesh: null });
     }
     this.setHeights();
     await this.loadOverview();
+    return true;
   }
 
   // Floors and roofs may be far off: colours are of what most surfels lie between.
@@ -152,8 +152,7 @@ export class SurfelMap {
     const count = view.getUint32(at, true);
     const low = [4, 8, 12].map((k) => view.getUint32(at + k, true));
     at += 16;
-    const words = new Uint32Array(2 * count);
-    const leaves = new Float32Array(4 * count);
+    const { words, leaves } = room(count);
     for (let i = 0; i < count; ++i, at += ROW) {
       words[2 * i] = view.getUint32(at, true);
       words[2 * i + 1] = view.getUint32(at + 4, true);
@@ -164,21 +163,43 @@ export class SurfelMap {
   }
 
   mesh(words, leaves, count, grow) {
-    const geometry = new THREE.InstancedBufferGeometry();
-    geometry.setAttribute("corner", this.corners);
-    geometry.setIndex(this.faces);
-    const word = new THREE.InstancedBufferAttribute(words, 2);
-    word.gpuType = THREE.IntType;
-    geometry.setAttribute("word", word);
-    geometry.setAttribute("leaf", new THREE.InstancedBufferAttribute(leaves, 4));
-    geometry.instanceCount = count;
-    const mesh = new THREE.Mesh(geometry, this.material(grow));
+    const geometry = new THREE.BufferGeometry();
+    geometry.setIndex(this.faces(count));
+    geometry.setDrawRange(0, 6 * count);
+    const height = leaves.length / 4 / WIDTH;
+    const textures = {
+      words: new THREE.DataTexture(words, WIDTH, height, THREE.RGIntegerFormat, THREE.UnsignedIntType),
+      leaves: new THREE.DataTexture(leaves, WIDTH, height, THREE.RGBAFormat, THREE.FloatType),
+    };
+    textures.words.internalFormat = "RG32UI";
+    for (const texture of Object.values(textures)) texture.needsUpdate = true;
+    const material = new THREE.ShaderMaterial({
+      glslVersion: THREE.GLSL3,
+      vertexShader: vertex,
+      fragmentShader: fragment,
+      side: THREE.DoubleSide,
+      uniforms: { ...this.uniforms, grow: { value: grow }, words: { value: textures.words }, leaves: { value: textures.leaves } },
+    });
+    const mesh = new THREE.Mesh(geometry, material);
     mesh.frustumCulled = false;
+    mesh.userData = { count, words, leaves };
+    this.group.add(mesh);
     return mesh;
   }
 
+  remove(mesh) {
+    this.group.remove(mesh);
+    mesh.material.uniforms.words.value.dispose();
+    mesh.material.uniforms.leaves.value.dispose();
+    mesh.material.dispose();
+    mesh.geometry.setIndex(null); // which others use
+    mesh.geometry.dispose();
+  }
+
   async loadOverview() {
-    const view = new DataView(await this.fetch(`/map/overview/${Math.min(this.budget, 200000)}`));
+    // half of the budget at most is for what is far
+    this.overviewMost = Math.round(Math.min(this.budget / 2, 200000));
+    const view = new DataView(await this.fetch(`/map/overview/${this.overviewMost}`));
     const stride = view.getUint32(0, true);
     const grow = Math.min(6, Math.sqrt(stride));
     for (let at = 4, i = 0; at < view.byteLength && i < this.blocks.length; ++i) {
@@ -190,27 +211,22 @@ export class SurfelMap {
     this.overviewGrow = grow;
     this.rebuildOverview();
     this.overviewReady = true;
-    if (stride === 1) for (const block of this.blocks) block.level = 0;
+    for (const block of this.blocks) block.isWhole = stride === 1;
   }
 
   // What is not there in detail, in one mesh.
   rebuildOverview() {
     const coarse = this.blocks.filter((b) => b.coarse && !b.mesh);
     const count = coarse.reduce((sum, b) => sum + b.coarse.count, 0);
-    const words = new Uint32Array(2 * count);
-    const leaves = new Float32Array(4 * count);
+    const { words, leaves } = room(count);
     let at = 0;
     for (const block of coarse) {
-      words.set(block.coarse.words, 2 * at);
-      leaves.set(block.coarse.leaves, 4 * at);
+      words.set(block.coarse.words.subarray(0, 2 * block.coarse.count), 2 * at);
+      leaves.set(block.coarse.leaves.subarray(0, 4 * block.coarse.count), 4 * at);
       at += block.coarse.count;
     }
-    if (this.overview) {
-      this.group.remove(this.overview);
-      this.overview.geometry.dispose();
-    }
+    if (this.overview) this.remove(this.overview);
     this.overview = this.mesh(words, leaves, count, this.overviewGrow);
-    this.group.add(this.overview);
     this.stale = false;
   }
 
@@ -218,6 +234,10 @@ export class SurfelMap {
   update(camera) {
     if (!this.overviewReady || performance.now() - (this.lastUpdate ?? 0) < 250) return;
     this.lastUpdate = performance.now();
+    const doesNotFit = this.overviewMost > this.budget || (this.overviewMost < 100000 && this.overviewMost < this.budget / 8);
+    if (doesNotFit && this.surfels > this.overviewMost && !this.reloading) {
+      this.reloading = this.loadOverview().finally(() => (this.reloading = null));
+    }
     const frustum = new THREE.Frustum().setFromProjectionMatrix(
       new THREE.Matrix4().multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse),
     );
@@ -228,11 +248,14 @@ export class SurfelMap {
         return { block, size: frustum.intersectsBox(block.box) ? size : 0.05 * size };
       })
       .sort((a, b) => b.size - a.size);
+    // near ones first: they hide what lies behind them
+    ranked.forEach(({ block }, i) => block.mesh && (block.mesh.renderOrder = i));
+    this.overview.renderOrder = ranked.length;
     let left = this.budget - this.blocks.reduce((sum, b) => sum + (b.coarse?.count ?? 0), 0);
     for (const { block, size } of ranked) {
       const level = size > 0.35 ? 0 : size > 0.12 ? 1 : size > 0.04 ? 2 : -1;
       const cost = level < 0 ? 0 : block.surfels / 4 ** level;
-      if (level >= 0 && cost <= left && !(block.level === 0 && !block.mesh)) {
+      if (level >= 0 && cost <= left && !block.isWhole) {
         block.wanted = level;
         left -= cost;
       } else {
@@ -250,8 +273,7 @@ export class SurfelMap {
   }
 
   drop(block) {
-    this.group.remove(block.mesh);
-    block.mesh.geometry.dispose();
+    this.remove(block.mesh);
     block.mesh = null;
     block.level = -1;
     this.stale = true;
@@ -261,22 +283,22 @@ export class SurfelMap {
     block.busy = true;
     ++this.loading;
     try {
-      const view = new DataView(await this.fetch(`/map/block/${this.blocks.indexOf(block)}/${level}`));
+      const view = new DataView(await this.fetch(`/map/block/${block.number}/${level}`));
       const { count, words, leaves } = this.decode(view, 0);
       if (block.mesh) this.drop(block);
       block.mesh = this.mesh(words, leaves, count, 2 ** level);
       block.level = level;
-      this.group.add(block.mesh);
       this.stale = true;
     } catch {
-      // the run has ended: what is there stays
+      // the run has ended: what is there stays, and is not asked for all the time
+      this.lastUpdate = performance.now() + 2000;
     }
     block.busy = false;
     --this.loading;
   }
 
   get drawn() {
-    return this.group.children.reduce((sum, mesh) => sum + mesh.geometry.instanceCount, 0);
+    return this.group.children.reduce((sum, mesh) => sum + mesh.userData.count, 0);
   }
 
   // The nearest surfel to a ray, by its centre: { place, distance } or null.
@@ -284,9 +306,8 @@ export class SurfelMap {
     let best = null;
     const place = new THREE.Vector3();
     for (const mesh of this.group.children) {
-      const words = mesh.geometry.getAttribute("word").array;
-      const leaves = mesh.geometry.getAttribute("leaf").array;
-      for (let i = 0; i < mesh.geometry.instanceCount; ++i) {
+      const { words, leaves, count } = mesh.userData;
+      for (let i = 0; i < count; ++i) {
         const lo = words[2 * i];
         place.set(
           this.origin.x + leaves[4 * i] + (this.resolution * ((lo & 1023) + 0.5)) / 64,

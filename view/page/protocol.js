@@ -3,7 +3,7 @@
 const OPCODE = { message: 1, time: 2, service: 3, playback: 5 };
 const text = new TextDecoder();
 
-// Calls handlers by topic; connects again when the run ends and another begins.
+// Calls handlers by topic, with a message's bytes and its time (ns, a BigInt); connects again when the run ends and another begins.
 export class Client {
   constructor(url, handlers) {
     this.url = url;
@@ -34,6 +34,16 @@ export class Client {
     for (const channel of this.channels.values()) this.subscribe(channel);
   }
 
+  leave(topic) {
+    this.wanted.delete(topic);
+    for (const channel of this.channels.values()) {
+      if (channel.topic !== topic || !channel.subscription) continue;
+      this.send({ op: "unsubscribe", subscriptionIds: [channel.subscription] });
+      this.topics.delete(channel.subscription);
+      channel.subscription = null;
+    }
+  }
+
   subscribe(channel) {
     if (!this.wanted.has(channel.topic) || channel.subscription) return;
     channel.subscription = this.next++;
@@ -59,6 +69,7 @@ export class Client {
         if (!this.channels.has(channel.id)) this.channels.set(channel.id, channel);
         this.subscribe(this.channels.get(channel.id));
       }
+      this.handlers.channels?.([...this.channels.values()]);
     } else if (message.op === "status") {
       this.handlers.status?.(message);
     }
@@ -66,9 +77,20 @@ export class Client {
 
   takeBinary(buffer) {
     const view = new DataView(buffer);
-    if (view.getUint8(0) !== OPCODE.message) return;
-    const topic = this.topics.get(view.getUint32(1, true));
-    if (topic) this.wanted.get(topic)(new Uint8Array(buffer, 13), view.getBigUint64(5, true));
+    const opcode = view.getUint8(0);
+    if (opcode === OPCODE.message) {
+      const topic = this.topics.get(view.getUint32(1, true));
+      this.wanted.get(topic)?.(new Uint8Array(buffer, 13), view.getBigUint64(5, true));
+    } else if (opcode === OPCODE.time) {
+      this.handlers.time?.(view.getBigUint64(1, true));
+    } else if (opcode === OPCODE.playback) {
+      this.handlers.playback?.({
+        isPlaying: view.getUint8(1) === 0,
+        time: view.getBigUint64(2, true),
+        speed: view.getFloat32(10, true),
+        didSeek: view.getUint8(14) !== 0,
+      });
+    }
   }
 
   send(value) {
@@ -91,48 +113,3 @@ export class Client {
 }
 
 export const json = (bytes) => JSON.parse(text.decode(bytes));
-
-// sensor_msgs/PointCloud2 in CDR, little endian: its fields as typed arrays.
-export function cloudOf(bytes) {
-  const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
-  let at = 4;
-  const align = (size) => (at = 4 + Math.ceil((at - 4) / size) * size);
-  const u32 = () => (align(4), (at += 4), view.getUint32(at - 4, true));
-  const string = () => {
-    const size = u32();
-    const value = text.decode(bytes.subarray(at, at + size - 1));
-    at += size;
-    return value;
-  };
-  u32(); // stamp
-  u32();
-  string();
-  const height = u32();
-  const width = u32();
-  const fields = new Map();
-  for (let left = u32(); left > 0; --left) {
-    const name = string();
-    const offset = u32();
-    const type = view.getUint8(at++);
-    u32();
-    fields.set(name, { offset, type });
-  }
-  at += 1;
-  const step = u32();
-  u32();
-  const size = u32();
-  const count = Math.min(width * height, Math.floor(size / step));
-  const positions = new Float32Array(3 * count);
-  const intensities = new Float32Array(count);
-  const times = new Float32Array(count); // s after the first
-  const t = fields.get("t");
-  for (let i = 0; i < count; ++i) {
-    const row = at + i * step;
-    positions[3 * i] = view.getFloat32(row + fields.get("x").offset, true);
-    positions[3 * i + 1] = view.getFloat32(row + fields.get("y").offset, true);
-    positions[3 * i + 2] = view.getFloat32(row + fields.get("z").offset, true);
-    intensities[i] = view.getFloat32(row + fields.get("intensity").offset, true);
-    if (t) times[i] = 1e-9 * view.getUint32(row + t.offset, true);
-  }
-  return { count, positions, intensities, times };
-}

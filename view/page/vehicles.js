@@ -1,4 +1,4 @@
-// Vehicles, obstacles, scans and paths as the run's messages say.
+// Vehicles, obstacles and paths as the run's messages say.
 import * as THREE from "three";
 
 export const COLOURS = ["#e4572e", "#2e86ab", "#6a994e", "#b07bac", "#f2a541", "#3d5a80", "#bc4749", "#52796f"];
@@ -53,7 +53,7 @@ export class Vehicle {
     this.goal = new THREE.Mesh(new THREE.SphereGeometry(0.08, 12, 8), new THREE.MeshBasicMaterial({ color: this.colour }));
     this.clearance = line(new THREE.Color("#d00"), 2);
     scene.add(this.path, this.mission, this.clearance, this.goal);
-    append(this.mission, description.start);
+    if (description.start) append(this.mission, description.start);
     for (const waypoint of description.mission) append(this.mission, waypoint);
     this.mission.computeLineDistances();
     this.tag = document.createElement("div");
@@ -74,7 +74,8 @@ export class Vehicle {
       append(this.path, state.p);
       this.lastPath = state.p;
     }
-    this.goal.position.set(...state.goal);
+    this.goal.visible = Boolean(state.goal);
+    if (state.goal) this.goal.position.set(...state.goal);
     this.clearance.visible = Boolean(state.nearest);
     if (state.nearest) {
       this.clearance.geometry.setDrawRange(0, 0);
@@ -94,6 +95,10 @@ export class Vehicle {
     });
   }
 
+  show(isVisible) {
+    for (const object of [this.group, this.path, this.mission, this.goal, this.clearance]) object.visible = isVisible;
+  }
+
   forget() {
     this.path.geometry.setDrawRange(0, 0);
     this.path.userData.count = 0;
@@ -102,7 +107,7 @@ export class Vehicle {
 
   remove(scene) {
     scene.remove(this.group, this.path, this.mission, this.clearance, this.goal);
-    for (const scan of this.scans.values()) scene.remove(scan.points);
+    for (const trail of this.scans.values()) trail.clear();
     this.tag.remove();
   }
 }
@@ -130,39 +135,6 @@ export function append(object, p) {
   attribute.setXYZ(object.userData.count++, ...p);
   attribute.needsUpdate = true;
   object.geometry.setDrawRange(0, object.userData.count);
-}
-
-// The last scan, brighter the younger a point is.
-export class ScanCloud {
-  constructor(scene) {
-    this.geometry = new THREE.BufferGeometry();
-    this.material = new THREE.ShaderMaterial({
-      glslVersion: THREE.GLSL3,
-      transparent: true,
-      depthWrite: false,
-      uniforms: { size: { value: 3 }, tint: { value: new THREE.Color("#ffd23f") } },
-      vertexShader: `in float age; uniform float size; out float fade;
-        void main() { fade = 1.0 - 0.7 * age;
-        // a little nearer on the same sight line: points lie on what they measured and would sink into it
-        gl_Position = projectionMatrix * vec4(0.98 * (modelViewMatrix * vec4(position, 1.0)).xyz, 1.0);
-        gl_PointSize = size; }`,
-      fragmentShader: `precision highp float; in float fade; uniform vec3 tint; out vec4 colour;
-        void main() { if (length(gl_PointCoord - 0.5) > 0.5) discard; colour = vec4(tint, fade); }`,
-    });
-    this.points = new THREE.Points(this.geometry, this.material);
-    this.points.frustumCulled = false;
-    scene.add(this.points);
-  }
-
-  set(cloud) {
-    const last = cloud.times[cloud.count - 1] || 1;
-    const ages = Float32Array.from(cloud.times, (t) => 1 - t / last);
-    this.geometry.dispose();
-    this.geometry.setAttribute("position", new THREE.BufferAttribute(cloud.positions, 3));
-    this.geometry.setAttribute("age", new THREE.BufferAttribute(ages, 1));
-    this.geometry.setDrawRange(0, cloud.count);
-    this.cloud = cloud;
-  }
 }
 
 export class Obstacles {

@@ -1,0 +1,221 @@
+// A recording read from any time on: beside the plain reader, of files cut anywhere, with chunks
+// that overlap or with none.
+#include "recording/mcap_timeline.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "recording/mcap_format.hpp"
+#include "recording/mcap_reader.hpp"
+#include "recording/mcap_writer.hpp"
+#include "ros_common/description.hpp"
+#include "tests/support.hpp"
+
+namespace pointflight {
+namespace {
+
+using mcap::Opcode;
+using mcap::RecordWriter;
+using testing::error_of;
+using testing::expect_contains;
+using testing::read_file;
+using testing::TemporaryFolder;
+
+Bytes clock_bytes(int i) {
+  return std::make_shared<const std::vector<std::byte>>(encode<Wire::kCdr>(msg::Clock{{i, 0}}));
+}
+
+/// Messages at 1000, 1010, ...: three of /a to one of the latched /b.
+void record(const std::string& path, int count, const std::string& compression = "zstd") {
+  McapWriter writer(path, {compression, 900});
+  const int a = writer.advertise({"/a", message_type<msg::Clock>()});
+  const int b = writer.advertise({"/b", message_type<msg::Clock>(), true, 1});
+  for (int i = 0; i < count; ++i) writer.send(i % 4 == 0 ? b : a, clock_bytes(i), 1000 + 10 * i);
+  writer.close();
+}
+
+/// Times of the messages that come from here on.
+std::vector<std::int64_t> times_of(TimedRecording& recording) {
+  std::vector<std::int64_t> times;
+  TimedMessage message;
+  while (recording.next(message)) times.push_back(message.time);
+  return times;
+}
+
+/// A file without a summary, record by record.
+class RawFile {
+ public:
+  RawFile() {
+    const auto magic = std::as_bytes(std::span(mcap::kMagic));
+    bytes_.assign(magic.begin(), magic.end());
+    add(Opcode::kHeader, RecordWriter().text("").text("test"));
+  }
+  RawFile& add(Opcode opcode, const RecordWriter& content) {
+    append(bytes_, opcode, content);
+    return *this;
+  }
+  RawFile& describe(std::uint16_t id, const std::string& topic) {
+    return add(Opcode::kSchema, schema(id)).add(Opcode::kChannel, channel(id, topic));
+  }
+  /// A chunk of messages of a channel, not packed.
+  RawFile& chunk(std::uint16_t id, const std::vector<std::uint64_t>& times) {
+    std::vector<std::byte> records;
+    for (const std::uint64_t time : times) append(records, Opcode::kMessage, message(id, time));
+    const auto [low, high] = std::minmax_element(times.begin(), times.end());
+    RecordWriter content;
+    content.number(*low).number(*high);
+    content.number<std::uint64_t>(records.size()).number<std::uint32_t>(0).text("");
+    content.number<std::uint64_t>(records.size()).raw(records);
+    return add(Opcode::kChunk, content);
+  }
+  static RecordWriter message(std::uint16_t id, std::uint64_t time) {
+    RecordWriter content;
+    content.number(id).number<std::uint32_t>(0).number(time).number(time).raw({});
+    return content;
+  }
+  static RecordWriter schema(std::uint16_t id, const std::string& text = "int32 x") {
+    RecordWriter content;
+    content.number(id).text("a/msg/B").text("ros2msg").text(text);
+    return content;
+  }
+  static RecordWriter channel(std::uint16_t id, const std::string& topic) {
+    RecordWriter content;
+    content.number(id).number(id).text(topic).text("cdr").map({});
+    return content;
+  }
+  [[nodiscard]] const std::vector<std::byte>& bytes() const { return bytes_; }
+
+ private:
+  static void append(std::vector<std::byte>& to, Opcode opcode, const RecordWriter& content) {
+    to.push_back(static_cast<std::byte>(opcode));
+    RecordWriter length;
+    length.number<std::uint64_t>(content.bytes().size());
+    to.insert(to.end(), length.bytes().begin(), length.bytes().end());
+    to.insert(to.end(), content.bytes().begin(), content.bytes().end());
+  }
+  std::vector<std::byte> bytes_;
+};
+
+TEST(McapTimeline, GivesWhatThePlainReaderGives) {
+  const TemporaryFolder folder;
+  record(folder / "a.mcap", 200);
+  const auto recording = open_timed_mcap(folder / "a.mcap");
+  ASSERT_EQ(recording->channels().size(), 2u);
+  const RecordedChannel& a = recording->channels()[0];
+  EXPECT_EQ(a.topic, "/a");
+  EXPECT_EQ(a.encoding, "cdr");
+  EXPECT_EQ(a.schema_name, "rosgraph_msgs/msg/Clock");
+  EXPECT_EQ(a.schema_encoding, "ros2msg");
+  expect_contains(a.schema, "builtin_interfaces/Time clock");
+  EXPECT_FALSE(a.latched);
+  EXPECT_TRUE(recording->channels()[1].latched);
+  EXPECT_EQ(recording->range(), std::pair(std::int64_t{1000}, std::int64_t{2990}));
+  TimedMessage message;
+  const RecordingInfo info = read_mcap(folder / "a.mcap", [&](const RecordedMessage& m) {
+    ASSERT_TRUE(recording->next(message));
+    EXPECT_EQ(recording->channels()[message.channel].topic, m.topic);
+    EXPECT_EQ(message.time, m.time);
+    EXPECT_TRUE(std::ranges::equal(message.data, m.data));
+  });
+  EXPECT_EQ(info.messages, 200u);
+  EXPECT_GT(info.chunks, 5u);
+  EXPECT_FALSE(recording->next(message));
+}
+
+TEST(McapTimeline, IsReadFromAnyTimeOn) {
+  const TemporaryFolder folder;
+  record(folder / "a.mcap", 100);
+  const auto recording = open_timed_mcap(folder / "a.mcap");
+  for (const std::int64_t time : {0, 1000, 1001, 1500, 1555, 1990, 1991, 1200}) {
+    recording->seek(time);
+    const auto times = times_of(*recording);
+    const auto skipped =
+        static_cast<std::size_t>(std::clamp<std::int64_t>((time - 991) / 10, 0, 100));
+    ASSERT_EQ(times.size(), 100 - skipped) << "from " << time;
+    if (!times.empty()) {
+      EXPECT_GE(times.front(), time);
+    }
+    EXPECT_TRUE(std::is_sorted(times.begin(), times.end()));
+    // what the latched topic, every fourth message, held then
+    std::vector<std::int64_t> held;
+    recording->latched_before(time, [&](const TimedMessage& m) {
+      EXPECT_EQ(m.channel, 1u);
+      held.push_back(m.time);
+    });
+    ASSERT_EQ(held.size(), time > 1000 ? 1u : 0u) << time;
+    if (time > 1000) {
+      EXPECT_EQ(held[0], 1000 + (std::min<std::int64_t>(time, 1991) - 1001) / 40 * 40);
+    }
+  }
+}
+
+TEST(McapTimeline, CutAtAnyByteItGivesAllWholeChunks) {
+  const TemporaryFolder folder;
+  record(folder / "a.mcap", 60, "none");
+  const std::string bytes = read_file(folder / "a.mcap");
+  const auto all = std::as_bytes(std::span(bytes));
+  std::size_t most = 0;
+  for (std::size_t cut = 0; cut <= all.size(); ++cut) {
+    const auto part = all.first(cut);
+    std::uint64_t expected = 0;
+    if (cut >= 8) expected = read_mcap_bytes(part, "a").messages;
+    if (expected == 0) {
+      EXPECT_NE(error_of([&] { timed_mcap(part, "a"); }), "");
+      continue;
+    }
+    const auto times = times_of(*timed_mcap(part, "a"));
+    ASSERT_EQ(times.size(), expected) << "cut at " << cut;
+    most = times.size();
+  }
+  EXPECT_EQ(most, 60u);
+}
+
+TEST(McapTimeline, MergesChunksThatOverlap) {
+  RawFile file;
+  file.describe(1, "/a").describe(2, "/b");
+  file.chunk(2, {50, 70, 90}).chunk(1, {10, 60, 80, 40}).chunk(1, {85, 200});
+  const auto recording = timed_mcap(file.bytes(), "raw");
+  EXPECT_EQ(times_of(*recording), (std::vector<std::int64_t>{10, 40, 50, 60, 70, 80, 85, 90, 200}));
+  recording->seek(75);
+  EXPECT_EQ(times_of(*recording), (std::vector<std::int64_t>{80, 85, 90, 200}));
+}
+
+TEST(McapTimeline, TakesMessagesBesideChunks) {
+  RawFile file;
+  file.describe(1, "/a");
+  file.add(Opcode::kMessage, RawFile::message(1, 30))
+      .add(Opcode::kMessage, RawFile::message(1, 20));
+  file.chunk(1, {25, 40});
+  file.add(Opcode::kMessage, RawFile::message(7, 35));  // of a channel that nobody described
+  file.add(Opcode::kMessage, RawFile::message(1, 50));
+  const auto recording = timed_mcap(file.bytes(), "raw");
+  EXPECT_EQ(times_of(*recording), (std::vector<std::int64_t>{20, 25, 30, 40, 50}));
+}
+
+TEST(McapTimeline, RefusesWhatIsNone) {
+  const std::vector<std::byte> nothing(20);
+  expect_contains(error_of([&] { timed_mcap(nothing, "x.mcap"); }), "x.mcap: is not an MCAP file");
+  const RawFile empty;
+  expect_contains(error_of([&] { timed_mcap(empty.bytes(), "x.mcap"); }), "holds no message");
+  RawFile bomb;  // a type of 1 MB, named by a hundred channels
+  bomb.add(Opcode::kSchema, RawFile::schema(1, std::string(std::size_t{1} << 20, 'x')));
+  for (std::uint16_t id = 1; id < 100; ++id) {
+    RecordWriter channel;
+    channel.number(id).number<std::uint16_t>(1).text("/t").text("cdr").map({});
+    bomb.add(Opcode::kChannel, channel);
+  }
+  expect_contains(error_of([&] { timed_mcap(bomb.bytes(), "x.mcap"); }), "longer than 64 MiB");
+}
+
+TEST(McapTimeline, LeavesOutTimesThatNoClockShows) {
+  RawFile file;
+  file.describe(1, "/a").chunk(1, {10, ~std::uint64_t{0}}).chunk(1, {20, 30});
+  file.add(Opcode::kMessage, RawFile::message(1, ~std::uint64_t{0} - 5));
+  const auto recording = timed_mcap(file.bytes(), "raw");
+  EXPECT_EQ(recording->range(), std::pair(std::int64_t{20}, std::int64_t{30}));
+  EXPECT_EQ(times_of(*recording), (std::vector<std::int64_t>{20, 30}));
+}
+
+}  // namespace
+}  // namespace pointflight
