@@ -75,15 +75,28 @@ class LiveServer::Impl::HttpSession : public std::enable_shared_from_this<HttpSe
     client->start(request, chosen);
   }
 
+  /// Made beside the server's thread: a large map's overview takes a while, and viewers' frames go on.
   void serve(const Request& request) {
-    std::string_view target = as_view(request.target());
-    const std::string path(target.substr(0, target.find('?')));
-    std::optional<WebContent> content;
-    try {
-      if (server_.options_.content) content = server_.options_.content(path);
-    } catch (const std::exception& error) {
-      return refuse(http::status::internal_server_error, error.what());
-    }
+    const std::string_view target = as_view(request.target());
+    net::post(server_.makers_,
+              [self = shared_from_this(), path = std::string(target.substr(0, target.find('?')))] {
+                std::optional<WebContent> content;
+                std::string failure;
+                try {
+                  if (self->server_.options_.content) content = self->server_.options_.content(path);
+                } catch (const std::exception& error) {
+                  failure = error.what();
+                }
+                net::post(self->server_.io_,
+                          [self, content = std::move(content), failure = std::move(failure)] {
+                            self->send(content, failure);
+                          });
+              });
+  }
+
+  void send(const std::optional<WebContent>& content, const std::string& failure) {
+    const Request& request = parser_->get();
+    if (!failure.empty()) return refuse(http::status::internal_server_error, failure);
     if (!content) return refuse(http::status::not_found, "there is nothing here");
     content_ = content->bytes;
     const std::size_t size = content_->size();

@@ -103,6 +103,7 @@ class LiveServer::Impl {
   std::string address_;
   std::uint16_t port_ = 0;
   net::io_context io_{1};
+  net::thread_pool makers_{1};  ///< Of what HTTP serves.
   tcp::acceptor acceptor_{io_};
   std::set<std::shared_ptr<Client>> clients_;
   std::size_t connections_ = 0;

@@ -52,6 +52,8 @@ void LiveServer::Impl::close() {
   while (client_count_ > 0 && Clock::now() < until) {
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
+  makers_.stop();
+  makers_.join();
   io_.stop();
   thread_.join();
   clients_.clear();

@@ -70,7 +70,8 @@ std::function<std::optional<WebContent>(const std::string& path)> page_content(
   return [folder, map = std::move(map)](const std::string& path) -> std::optional<WebContent> {
     constexpr const char* kMap = "/map/";
     if (map && path.starts_with(kMap)) return map_content(*map, path.substr(5));
-    if (path == "/map/index") return content_of({}, "application/octet-stream");  // there is none
+    // there is none, which is no error: recordings may come without
+    if (path.starts_with(kMap)) return content_of({}, "application/octet-stream");
     for (const PageFile& file : kFiles) {
       if (path != file.path || folder.empty()) continue;
       const MappedFile bytes((fs::path(folder) / file.name).string());

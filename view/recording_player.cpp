@@ -52,7 +52,7 @@ void RecordingPlayer::play(const std::function<bool()>& interrupted) {
   while (!interrupted()) {
     take_orders();
     welcome();
-    const bool has_begun = subscriptions_ > 0 || time_ > SimTime{};
+    const bool has_begun = welcomed_ > 0 || time_ > SimTime{};
     if (playing_ && has_begun) {
       play_on();
     } else {
@@ -99,10 +99,12 @@ void RecordingPlayer::welcome() {
   for (const std::uint32_t channel : channels_) {
     subscriptions += server_->subscriber_count(channel);
   }
-  // once all topics that a client wants have come in
+  // once a client has asked for all that it wants
   const bool is_steady = subscriptions == std::exchange(subscriptions_, subscriptions);
   if (!is_steady) return;
-  if (subscriptions > std::exchange(welcomed_, subscriptions) && !playing_) jump(time_);
+  if (subscriptions <= std::exchange(welcomed_, subscriptions)) return;
+  if (playing_) return say(false);
+  jump(time_);
 }
 
 void RecordingPlayer::take_orders() {

@@ -1,5 +1,6 @@
-// The page in the distribution's Chromium with software GL: a live flight, then the same one finished. Map, drone and scan are where the
-// truth projects to, the drone moves, a double click flies it to a goal, keys pause and go on; nothing on the
+// The page in the distribution's Chromium with software GL: a live flight, the same one finished, its recording,
+// and one of ROS 1. Map, drone and scan are where the truth projects to, the drone moves, a double click flies it
+// to a goal, keys pause and go on; nothing on the
 // console. Arguments: program, folder of node_modules, folder to work in, and a picture to write, if any.
 import assert from "node:assert/strict";
 import { spawn } from "node:child_process";
@@ -53,17 +54,93 @@ async function serve(...args) {
   return { child, address, ended };
 }
 const out = path.join(folder, "run");
-const flight = await serve("fly", path.join(folder, "s.yaml"), "-o", out, "--force", "--view", "127.0.0.1:0");
+const recording = path.join(folder, "run.mcap");
+const flight = await serve("fly", path.join(folder, "s.yaml"), "-o", out, "--force", "--record", recording, "--view", "127.0.0.1:0");
 const { child: run, address } = flight;
 const flags = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"];
 const browser = await chromium.launch({ executablePath: CHROMIUM, args: ["--headless=new", ...flags] });
-try {
+const wrong = []; // of all pages
+
+// Another page of a program that serves.
+async function open(at) {
   const page = await browser.newPage({ viewport: { width: 900, height: 600 } });
-  const wrong = [];
-  page.on("console", (m) => m.type() === "error" && wrong.push(m.text()));
   page.on("pageerror", (e) => wrong.push(e.message));
+  page.on("console", (m) => m.type() === "error" && wrong.push(m.text()));
+  await page.goto(`${at}&budget=30000&pixels=1`);
+  const wait = (what, condition, argument) => page.waitForFunction(condition, argument, { timeout: 60000, polling: 100 }).catch(() => assert.fail(`${what}: not within a minute`));
+  return { page, wait };
+}
+
+const trajectory = (run) => fs.readFileSync(path.join(run, "trajectory.csv"), "utf8").trim().split("\n").slice(1).map((l) => l.split(",").map(Number));
+
+// Odometry of a vehicle that stands at (5, 0, 1) and looks along y, and clouds of two points in its LiDAR's
+// frame, by others' libraries.
+async function writeRos1(file) {
+  const { McapWriter } = require("@mcap/core");
+  const { MessageWriter } = require("@foxglove/rosmsg-serialization");
+  const { parse } = require("@foxglove/rosmsg");
+  const header = "================================================================================\nMSG: std_msgs/Header\nuint32 seq\ntime stamp\nstring frame_id\n";
+  const vectors = ["Point", "Vector3"].map((n) => `================================================================================\nMSG: geometry_msgs/${n}\nfloat64 x\nfloat64 y\nfloat64 z\n`).join("");
+  const rest = `${header}${vectors}================================================================================
+MSG: geometry_msgs/Quaternion
+float64 x
+float64 y
+float64 z
+float64 w
+================================================================================
+MSG: geometry_msgs/Pose
+geometry_msgs/Point position
+geometry_msgs/Quaternion orientation
+================================================================================
+MSG: geometry_msgs/PoseWithCovariance
+geometry_msgs/Pose pose
+float64[36] covariance
+================================================================================
+MSG: geometry_msgs/Twist
+geometry_msgs/Vector3 linear
+geometry_msgs/Vector3 angular
+================================================================================
+MSG: geometry_msgs/TwistWithCovariance
+geometry_msgs/Twist twist
+float64[36] covariance
+`;
+  const types = {
+    "nav_msgs/Odometry": `Header header\nstring child_frame_id\ngeometry_msgs/PoseWithCovariance pose\ngeometry_msgs/TwistWithCovariance twist\n${rest}`,
+    "sensor_msgs/PointCloud2": `Header header\nuint32 height\nuint32 width\nsensor_msgs/PointField[] fields\nbool is_bigendian\nuint32 point_step\nuint32 row_step\nuint8[] data\nbool is_dense\n${header}================================================================================\nMSG: sensor_msgs/PointField\nuint8 INT8=1\nuint8 FLOAT32=7\nstring name\nuint32 offset\nuint8 datatype\nuint32 count\n`,
+  };
+  const out = fs.openSync(file, "w");
+  let size = 0n;
+  const writer = new McapWriter({ writable: { position: () => size, write: async (bytes) => ((size += BigInt(bytes.length)), void fs.writeSync(out, bytes)) } });
+  await writer.start({ profile: "ros1", library: "test" });
+  const channels = {};
+  for (const [name, text] of Object.entries(types)) {
+    const schemaId = await writer.registerSchema({ name, encoding: "ros1msg", data: Buffer.from(text) });
+    const topic = name === "nav_msgs/Odometry" ? "/odom" : "/velodyne_points";
+    channels[name] = { id: await writer.registerChannel({ topic, schemaId, messageEncoding: "ros1", metadata: new Map() }), writer: new MessageWriter(parse(text)) };
+  }
+  const data = Buffer.alloc(24);
+  [2, 0, 0, 3, 1, 0].forEach((v, i) => data.writeFloatLE(v, 4 * i));
+  for (let i = 0; i < 50; ++i) {
+    const time = 1_700_000_000_000_000_000n + 100_000_000n * BigInt(i);
+    const head = (frame_id) => ({ seq: i, stamp: { sec: Number(time / 1_000_000_000n), nsec: Number(time % 1_000_000_000n) }, frame_id });
+    const pose = { position: { x: 5, y: 0, z: 1 }, orientation: { x: 0, y: 0, z: Math.SQRT1_2, w: Math.SQRT1_2 } };
+    const twist = { linear: { x: 0, y: 0, z: 0 }, angular: { x: 0, y: 0, z: 0 } };
+    const covariance = new Float64Array(36);
+    const messages = {
+      "nav_msgs/Odometry": { header: head("odom"), child_frame_id: "base_link", pose: { pose, covariance }, twist: { twist, covariance } },
+      "sensor_msgs/PointCloud2": { header: head("lidar"), height: 1, width: 2, fields: ["x", "y", "z"].map((name, k) => ({ name, offset: 4 * k, datatype: 7, count: 1 })), is_bigendian: false, point_step: 12, row_step: 24, data, is_dense: true },
+    };
+    for (const [name, message] of Object.entries(messages)) {
+      await writer.addMessage({ channelId: channels[name].id, sequence: i, logTime: time, publishTime: time, data: channels[name].writer.writeMessage(message) });
+    }
+  }
+  await writer.end();
+  fs.closeSync(out);
+}
+
+try {
   const opened = Date.now();
-  await page.goto(`${address}&budget=30000&pixels=1`);
+  const { page } = await open(address);
   const until = (what, condition) => page.waitForFunction(condition, null, { timeout: 60000, polling: 100 }).catch(() => assert.fail(`${what}: not within a minute`));
   await until("the map", () => window.pointflight?.map.overviewReady);
   console.log(`first picture of the map after ${Date.now() - opened} ms`);
@@ -178,13 +255,9 @@ try {
   // the finished run: its time line goes to where it was
   const finished = await serve("view", out, "--at", "127.0.0.1:0");
   try {
-    const again = await browser.newPage({ viewport: { width: 900, height: 600 } });
-    again.on("pageerror", (e) => wrong.push(e.message));
-    again.on("console", (m) => m.type() === "error" && wrong.push(m.text()));
-    await again.goto(`${finished.address}&budget=30000&pixels=1`);
-    const wait = (what, condition, argument) => again.waitForFunction(condition, argument, { timeout: 60000, polling: 100 }).catch(() => assert.fail(`${what}: not within a minute`));
+    const { page: again, wait } = await open(finished.address);
     await wait("a state", () => window.pointflight?.state.last?.vehicles[0]?.p && window.pointflight.map.overviewReady);
-    const table = fs.readFileSync(path.join(out, "trajectory.csv"), "utf8").trim().split("\n").slice(1).map((l) => l.split(",").map(Number));
+    const table = trajectory(out);
     const length = table.at(-1)[0];
     assert.ok(Math.abs(Number(await again.locator("#line").getAttribute("max")) - length) < 1, "the time line is as long as the run");
     await again.evaluate(() => window.pointflight.client.order({ pause: true }));
@@ -197,9 +270,68 @@ try {
       q.forEach((v, i) => assert.ok(Math.abs(v - row[1 + i]) < 0.1, `at ${to} s ${q}, it was at ${row.slice(1, 4)}`));
     }
     assert.deepEqual(wrong, [], "errors on the console");
+    await again.close();
   } finally {
     finished.child.kill("SIGINT");
     await finished.ended;
+  }
+
+  // its recording: the place by /map, the vehicle by its odometry, at the same time of the time line
+  const replayed = await serve("view", recording, "--at", "127.0.0.1:0");
+  try {
+    const { page: film, wait } = await open(replayed.address);
+    await wait("a pose", () => window.pointflight?.state.vehicles[0]?.state?.p);
+    await wait("the place", () => window.pointflight.state.recording.trails.some((t) => t.byHeight && t.cloud.count > 2000));
+    const table = trajectory(out);
+    // when it stands still and does not turn: points are each in the frame of their own time
+    const moved = (i) => Math.hypot(...[1, 2, 3, 4, 5, 6, 7].map((k) => table[i][k] - table[i - 60][k]));
+    const still = table.map((_, i) => i).filter((i) => i > 0.5 * table.length).reduce((best, i) => (moved(i) < moved(best) ? i : best));
+    const to = table[still][0];
+    await film.evaluate((t) => (window.pointflight.client.order({ pause: true }), window.pointflight.client.order({ seek: t })), to);
+    await wait("where it was then", (t) => Math.abs(window.pointflight.state.last.t - t) < 0.02, to);
+    await film.waitForTimeout(500);
+    const { p: q } = await film.evaluate(() => window.pointflight.state.vehicles[0].state);
+    const row = table.reduce((best, r) => (Math.abs(r[0] - to) < Math.abs(best[0] - to) ? r : best));
+    q.forEach((v, i) => assert.ok(Math.abs(v - row[1 + i]) < 0.1, `at ${to} s ${q}, it was at ${row.slice(1, 4)}`));
+    // scans lie in the world where the walls are
+    const world = await film.evaluate(() => {
+      const { THREE, state } = window.pointflight;
+      const trail = state.recording.trails.find((t) => !t.byHeight && t.scans.length > 0);
+      const { points } = trail.scans.at(-1);
+      const list = [];
+      for (let i = 0; i < trail.cloud.count; i += 7) list.push(new THREE.Vector3().fromArray(trail.cloud.positions, 3 * i).applyMatrix4(points.matrix).toArray());
+      return list;
+    });
+    const on = world.filter((w) => Math.abs(w[2]) < 0.2 || Math.abs(w[0] - 6) < 0.2 || Math.hypot(w[0] - 2, w[1] + 3) < 0.45 || (Math.abs(w[0] - 3) < 0.7 && Math.abs(w[1] - 3) < 0.7));
+    assert.ok(world.length > 100 && on.length > 0.97 * world.length, `${on.length} of ${world.length} points lie on what is there`);
+    if (picture) await film.screenshot({ path: picture.replace(".png", "_recording.png"), timeout: 60000 });
+    assert.deepEqual(wrong, [], "errors on the console");
+    await film.close();
+  } finally {
+    replayed.child.kill("SIGINT");
+    await replayed.ended;
+  }
+
+  // one of ROS 1 without a word of how its LiDAR is mounted: drawn at the odometry's pose
+  const foreign = path.join(folder, "ros1.mcap");
+  await writeRos1(foreign);
+  const shown = await serve("view", foreign, "--at", "127.0.0.1:0");
+  try {
+    const { page: film, wait } = await open(shown.address);
+    await wait("a cloud", () => window.pointflight?.state.recording?.trails[0]?.cloud);
+    const middle = await film.evaluate(() => {
+      const { THREE, state } = window.pointflight;
+      const [trail] = state.recording.trails;
+      return new THREE.Vector3().fromArray(trail.cloud.positions).applyMatrix4(trail.scans.at(-1).points.matrix).toArray();
+    });
+    // ahead by 2, of a vehicle at (5, 0, 1) that looks along y
+    assert.ok(Math.hypot(middle[0] - 5, middle[1] - 2, middle[2] - 1) < 1e-5, `the first point is at ${middle}`);
+    await wait("what is assumed is said", () => document.getElementById("log").textContent.includes("nothing says where lidar is mounted"));
+    assert.deepEqual(wrong, [], "errors on the console");
+    await film.close();
+  } finally {
+    shown.child.kill("SIGINT");
+    await shown.ended;
   }
 } finally {
   await browser.close();

@@ -197,8 +197,9 @@ export class SurfelMap {
   }
 
   async loadOverview() {
-    // half of the budget at most is for what is far
-    this.overviewMost = Math.round(Math.min(this.budget / 2, 200000));
+    // half of the budget at most is for what is far; first of all, what index.html has asked for already
+    const most = this.overviewReady ? 200000 : 50000;
+    this.overviewMost = Math.round(Math.min(this.budget / 2, most));
     const view = new DataView(await this.fetch(`/map/overview/${this.overviewMost}`));
     const stride = view.getUint32(0, true);
     const grow = Math.min(6, Math.sqrt(stride));

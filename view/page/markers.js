@@ -1,6 +1,6 @@
 // visualization_msgs/Marker: what recordings draw with.
 import * as THREE from "three";
-import { matrixOf } from "./frames.js";
+import { matrixOf, secondsOf } from "./frames.js";
 
 const KIND = { ARROW: 0, CUBE: 1, SPHERE: 2, CYLINDER: 3, LINE_STRIP: 4, LINE_LIST: 5, CUBE_LIST: 6, SPHERE_LIST: 7, POINTS: 8, TRIANGLE_LIST: 11 };
 const ACTION = { DELETE: 2, DELETE_ALL: 3 };
@@ -66,7 +66,7 @@ export class Markers {
       if (!object) continue;
       object.frustumCulled = false;
       object.matrixAutoUpdate = false;
-      object.matrix.multiplyMatrices(frames.toRoot(marker.header.frame_id), matrixOf(marker.pose.position, marker.pose.orientation));
+      object.matrix.multiplyMatrices(frames.toRoot(marker.header.frame_id, secondsOf(marker.header.stamp)), matrixOf(marker.pose.position, marker.pose.orientation));
       this.known.set(key, object);
       this.group.add(object);
     }

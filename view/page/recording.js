@@ -1,13 +1,13 @@
 // A recording: its topics as they lie there, those of the usual types drawn.
 import * as THREE from "three";
 import { ScanTrail, cloudOfLivox, cloudOfMessage } from "./clouds.js";
-import { Frames, matrixOf, plainFrame } from "./frames.js";
+import { Frames, matrixOf, plainFrame, secondsOf } from "./frames.js";
 import { Markers } from "./markers.js";
 import { decoderOf, plainName } from "./messages.js";
 import { Vehicle, append, colourOf, line } from "./vehicles.js";
 
 const CLOUDS = { "sensor_msgs/PointCloud2": cloudOfMessage, "livox_ros_driver2/CustomMsg": cloudOfLivox, "livox_ros_driver/CustomMsg": cloudOfLivox };
-const FAST = 100_000; // bytes per message from which on a topic is a large one
+const LARGE = 20_000; // bytes of a cloud that may be a place
 
 // What is known of a vehicle that only its odometry tells of.
 const bodyOf = (name) => ({
@@ -87,7 +87,7 @@ export class Recording {
 
   takeTransforms(transforms) {
     for (const { header, child_frame_id, transform } of transforms) {
-      this.frames.set(header.frame_id, child_frame_id, matrixOf(transform.translation, transform.rotation), true);
+      this.frames.set(header.frame_id, child_frame_id, secondsOf(header.stamp), matrixOf(transform.translation, transform.rotation), true);
     }
   }
 
@@ -103,8 +103,9 @@ export class Recording {
         this.onVehicle?.(vehicle);
       }
       const { position, orientation } = poseOf(message);
-      this.frames.set(message.header.frame_id, child, matrixOf(position, orientation), false);
-      const world = this.frames.toRoot(message.header.frame_id).multiply(matrixOf(position, orientation));
+      const stamp = secondsOf(message.header.stamp);
+      this.frames.set(message.header.frame_id, child, stamp, matrixOf(position, orientation), false);
+      const world = this.frames.toRoot(message.header.frame_id, stamp).multiply(matrixOf(position, orientation));
       const p = new THREE.Vector3();
       const q = new THREE.Quaternion();
       world.decompose(p, q, new THREE.Vector3());
@@ -127,7 +128,7 @@ export class Recording {
         path.geometry.dispose();
       }
       path = line(new THREE.Color("#8a8f98"), Math.max(2, message.poses.length));
-      const toRoot = this.frames.toRoot(message.header.frame_id);
+      const toRoot = this.frames.toRoot(message.header.frame_id, secondsOf(message.header.stamp));
       for (const { pose } of message.poses) {
         const { x, y, z } = pose.position;
         append(path, new THREE.Vector3(x, y, z).applyMatrix4(toRoot).toArray());
@@ -150,22 +151,22 @@ export class Recording {
       const frame = message.header.frame_id;
       // a place rather than a scan: large, without times, in a frame that stays, and always the same one
       trail.first ??= t;
-      trail.byHeight = !cloud.hasTimes && t === trail.first && bytes > FAST && !this.frames.has(frame);
+      trail.byHeight = !cloud.hasTimes && t === trail.first && bytes > LARGE && !this.frames.has(frame);
       if (trail.byHeight) this.heights.include(cloud.positions);
-      trail.add(cloud, t, this.placeOf(topic, frame));
+      trail.add(cloud, t, this.placeOf(topic, frame, secondsOf(message.header.stamp)));
       const vehicle = this.vehicles.find((v) => topic.channel.topic.startsWith(`/${v.description.name}/`)) ?? this.vehicles[0];
       if (vehicle && !trail.byHeight) this.onScan?.(vehicle, trail);
     };
   }
 
   // From a cloud's frame to the world; where nothing says how its sensor is mounted, at the vehicle.
-  placeOf(topic, frame) {
-    if (this.frames.has(frame) || this.vehicles.length !== 1) return this.frames.toRoot(frame);
+  placeOf(topic, frame, stamp) {
+    if (this.frames.has(frame) || this.vehicles.length !== 1) return this.frames.toRoot(frame, stamp);
     const [vehicle] = this.vehicles;
     const roots = this.vehicles.map((v) => this.frames.rootOf(v.frame));
-    if (!vehicle.frame || roots.includes(plainFrame(frame))) return this.frames.toRoot(frame);
+    if (!vehicle.frame || roots.includes(plainFrame(frame))) return this.frames.toRoot(frame, stamp);
     this.warn(`${topic.channel.topic}: nothing says where ${frame} is mounted: drawn at ${vehicle.description.name}`);
-    return this.frames.toRoot(vehicle.frame);
+    return this.frames.toRoot(vehicle.frame, stamp);
   }
 
   markerDrawer(topic) {
