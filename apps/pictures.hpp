@@ -17,10 +17,18 @@ namespace pointflight::apps {
 /// top view.
 void draw_map(const SurfelMap& map, const std::string& title, const std::string& path);
 
-/// Range over azimuth and elevation, one mark a beam; beams without a return stay dark.
+/// Where a scan was taken.
+struct PlaceOfScan {
+  const SurfelMap& map;
+  Pose T_world_sensor;  ///< For all of the scan.
+};
+
+/// Range over azimuth and elevation, one mark for each beam; beams without a return stay dark. And
+/// the points in the map, in perspective.
 void draw_scan(const std::vector<Beam>& beams,
                const Scan& scan,
                const LidarSettings& lidar,
+               const PlaceOfScan& place,
                const std::string& path);
 
 /// Top and side view of map, flown paths, obstacles, waypoints and what the LiDARs saw. The map

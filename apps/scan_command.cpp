@@ -117,7 +117,7 @@ void take_scan(const ScanFlags& flags) {
   if (!flags.output.empty()) write_scan_pcd(flags.output, scan);
   if (!flags.png.empty()) {
     const std::uint64_t index = lidar.pattern_scan(flags.index, flags.seed);
-    draw_scan(lidar.beams(index, executor), scan, settings, flags.png);
+    draw_scan(lidar.beams(index, executor), scan, settings, {*map, pose}, flags.png);
   }
   print_scan(scan, flags);
 }

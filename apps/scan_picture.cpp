@@ -1,10 +1,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <functional>
 
 #include "apps/canvas.hpp"
 #include "apps/lidar_picture.hpp"
+#include "apps/map_layers.hpp"
+#include "apps/perspective.hpp"
 #include "apps/pictures.hpp"
 #include "apps/plot.hpp"
 #include "apps/scan_statistics.hpp"
@@ -72,10 +76,6 @@ void draw_pattern(Canvas& canvas,
   draw_axes(canvas, plot);
 }
 
-}  // namespace
-
-namespace {
-
 /// The ranges that occur, m, but for the hundredth that is nearest or farthest.
 std::pair<double, double> colored_ranges(const Scan& scan) {
   if (scan.points.empty()) return {1.0, 10.0};
@@ -88,11 +88,54 @@ std::pair<double, double> colored_ranges(const Scan& scan) {
   return {near_range, std::max(1.1 * near_range, farthest)};
 }
 
+/// Where most of what the sensor sees lies, and itself; world, m.
+Aabb seen_box(const Scan& scan, const Pose& T_world_sensor) {
+  constexpr double kRoom = 1.0;  // m
+  Aabb box;
+  box.add(T_world_sensor.translation);
+  const double most = 0.8 * colored_ranges(scan).second;
+  for (const ScanPoint& point : scan.points) {
+    if (static_cast<double>(point.range) > most) continue;
+    box.add(T_world_sensor * point.position_sensor.cast<double>());
+  }
+  box.min -= Vector3d::Constant(kRoom);
+  box.max += Vector3d::Constant(kRoom);
+  return box;
+}
+
+/// The place around the sensor from the south west and above, with the scan's points as the sensor
+/// measured them, and the sensor's axes.
+void draw_in_place(Canvas& canvas,
+                   const Frame& frame,
+                   const Scan& scan,
+                   const PlaceOfScan& place,
+                   const std::function<Color(double range)>& color_of) {
+  constexpr double kAxis = 0.06;  // of the picture's depth
+  constexpr std::array<Color, 3> kAxes = {{{0.8, 0.1, 0.1}, {0.1, 0.55, 0.1}, {0.1, 0.25, 0.85}}};
+  const Aabb box = seen_box(scan, place.T_world_sensor);
+  const double cut = ceiling_cut(MapLayers(place.map));
+  const Perspective perspective(place.map, box, cut, frame);
+  perspective.paint(canvas, [](double /*z*/) { return Color{0.86, 0.87, 0.89}; });
+  canvas.begin_clip(frame.left, frame.top, frame.width, frame.height);
+  for (const ScanPoint& point : scan.points) {
+    const Vector3d p = place.T_world_sensor * point.position_sensor.cast<double>();
+    const auto at = p.z() < cut ? perspective.visible(p) : std::nullopt;
+    if (at) canvas.dot(at->first, at->second, 1.3, color_of(static_cast<double>(point.range)));
+  }
+  canvas.end_clip();
+  const Vector3d origin = place.T_world_sensor.translation;
+  for (int axis = 0; axis < 3; ++axis) {
+    const Vector3d tip = place.T_world_sensor * (kAxis * box.size().norm() * Vector3d::Unit(axis));
+    perspective.draw_way(canvas, {origin, tip}, kAxes[static_cast<std::size_t>(axis)]);
+  }
+}
+
 }  // namespace
 
 void draw_scan(const std::vector<Beam>& beams,
                const Scan& scan,
                const LidarSettings& lidar,
+               const PlaceOfScan& place,
                const std::string& path) {
   constexpr double kHeader = 72.0;
   AngleRange range;
@@ -102,9 +145,14 @@ void draw_scan(const std::vector<Beam>& beams,
   }
   range = range.with_room();
   const Plot plot = angle_plot(range, kLeftRoom + 6.0, kHeader, 1080.0, 720.0, 260.0);
+  constexpr double kCaption = 24.0;  // over the perspective
   const double width = std::max(460.0, plot.width);
-  Canvas canvas(static_cast<int>(plot.left + width + kBarRoom + 14.0),
-                static_cast<int>(plot.bottom() + kBottomRoom + 10.0),
+  const Frame view{plot.left,
+                   plot.bottom() + kBottomRoom + kCaption,
+                   width + kBarRoom,
+                   std::round(0.55 * (width + kBarRoom))};
+  Canvas canvas(static_cast<int>(view.left + view.width + 14.0),
+                static_cast<int>(view.top + view.height + 12.0),
                 kPaper);
   canvas.box(plot.left, plot.top, plot.width, plot.height, kNight);
   const double area =
@@ -116,10 +164,11 @@ void draw_scan(const std::vector<Beam>& beams,
   // logarithmic: near things matter more
   const double span = std::log(ranges.second / near_range);
   const auto color_at = [](double share) { return ramp(1.0 - share); };
+  const auto color_of = [&](double range) { return color_at(std::log(range / near_range) / span); };
   const auto mark = [&](const ScanPoint& point, const auto& draw) {
     const auto [azimuth, elevation] = angles_deg(beams[point.beam]);
     const auto [x, y] = plot.at(azimuth, elevation);
-    draw(x, y, color_at(std::log(static_cast<double>(point.range) / near_range) / span));
+    draw(x, y, color_of(static_cast<double>(point.range)));
   };
   if (size < 1.6) {  // whole pixels: sharper, and a smaller file
     const int side = static_cast<int>(std::ceil(2.0 * size + 0.75));  // no gaps between rows
@@ -156,6 +205,20 @@ void draw_scan(const std::vector<Beam>& beams,
       kLabelText,
       width,
       kInk);
+  draw_in_place(canvas, view, scan, place, color_of);
+  const Vector3d& p = place.T_world_sensor.translation;
+  canvas.text_within(
+      view.left,
+      view.top - 7.0,
+      fmt::format(
+          "its points in the map, from the south west (-x, -y); the sensor, with its axes x "
+          "red, y green, z blue, is at ({:.4g}, {:.4g}, {:.4g}) m",
+          p.x(),
+          p.y(),
+          p.z()),
+      kTickText,
+      view.width,
+      kDim);
   canvas.save(path);
 }
 

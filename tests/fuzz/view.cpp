@@ -39,8 +39,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         static_cast<void>(chosen_subprotocol(text));
         break;
       }
-      default:
-        if (content(std::string(text))) __builtin_trap();
+      default: {
+        const auto found = content(std::string(text));  // without a page and a map nothing is there
+        if (found && !found->bytes->empty()) __builtin_trap();
+      }
     }
   } catch (const InputError& error) {
     if (std::string(error.what()).find('\n') != std::string::npos) __builtin_trap();

@@ -5,8 +5,10 @@ import { ScanTrail, cloudOf } from "./clouds.js";
 import { showLegend } from "./legend.js";
 import { SurfelMap } from "./map.js";
 import { Client, json } from "./protocol.js";
+import { drawRange } from "./range_image.js";
 import { Recording } from "./recording.js";
 import { EyeDome } from "./shading.js";
+import { showTopics } from "./topics.js";
 import { Obstacles, Vehicle, append, line } from "./vehicles.js";
 
 const $ = (id) => document.getElementById(id);
@@ -116,7 +118,7 @@ function playRecording(channels) {
     state.recording.start = state.start;
     state.recording.keep = Number($("keep").value);
     state.vehicles = state.recording.vehicles;
-    state.recording.onScan = (vehicle, trail) => vehicle === chosen() && drawRange(trail.cloud, null);
+    state.recording.onScan = (vehicle, trail) => vehicle === chosen() && drawRange($("image"), trail.cloud, null);
     state.recording.onVehicle = () => {
       listVehicles();
       if (!state.placed) $("camera").value = "follow";
@@ -126,18 +128,7 @@ function playRecording(channels) {
   }
   state.recording.adopt(channels);
   $("topics").style.display = "block";
-  $("topics").replaceChildren(
-    Object.assign(document.createElement("h1"), { textContent: "topics" }),
-    ...state.recording.topics.map((topic) => {
-      const row = document.createElement("label");
-      const box = Object.assign(document.createElement("input"), { type: "checkbox", checked: topic.isDrawn && topic.isOn, disabled: !topic.isDrawn });
-      box.onchange = () => state.recording.show(topic, box.checked);
-      row.title = topic.isDrawn ? topic.kind : `${topic.kind || topic.channel.encoding}: not drawn`;
-      row.append(Object.assign(document.createElement("span"), { textContent: topic.channel.topic }), box);
-      if (!topic.isDrawn) row.className = "off";
-      return row;
-    }),
-  );
+  showTopics($("topics"), state.recording);
 }
 
 function showTime(t) {
@@ -183,14 +174,14 @@ client.want("/pointflight/run", (bytes) => {
       client.want(lidar.topic, (data, stamp) => {
         if (!$("scans").checked) return;
         trail.add(cloudOf(data), 1e-9 * Number(stamp - BigInt(run.epoch)));
-        if (vehicle === chosen()) drawRange(trail.cloud, vehicle);
-      });
+        if (vehicle === chosen()) drawRange($("image"), trail.cloud, vehicle);
+      }, { latest: true });
     }
   }
   lookAtStart();
 });
 
-client.want("/pointflight/state", (bytes) => {
+function showState(bytes) {
   const now = json(bytes);
   if (state.last && now.t < state.last.t - 0.5) state.vehicles.forEach((v) => v.forget());
   state.last = now;
@@ -198,7 +189,8 @@ client.want("/pointflight/state", (bytes) => {
   obstacles.update(now.obstacles);
   showClock();
   showFigures();
-});
+}
+client.want("/pointflight/state", showState, { latest: true });
 
 client.want("/pointflight/events", (bytes) => {
   const event = json(bytes);
@@ -227,6 +219,8 @@ function say(words, hot = false) {
   );
 }
 
+const large = (n) => (n < 1e6 ? `${(n / 1e3).toFixed(n < 1e4 ? 1 : 0)} k` : `${(n / 1e6).toFixed(2)} M`);
+
 function showFigures() {
   const v = chosen()?.state ?? {};
   const now = state.last;
@@ -240,7 +234,7 @@ function showFigures() {
       ...["command", "scans", "collisions"].filter((name) => v[name] !== undefined).map((name) => [name, v[name]]),
     );
   }
-  if (map.surfels) rows.push(["surfels drawn", `${(map.drawn / 1e6).toFixed(2)} of ${(map.surfels / 1e6).toFixed(2)} M`]);
+  if (map.surfels) rows.push(["surfels drawn", `${large(map.drawn)} of ${large(map.surfels)}`]);
   rows.push(["frame, script", `${budget.interval.toFixed(0)}, ${state.cost.toFixed(0)} ms`]);
   $("figures").replaceChildren(
     ...rows.map(([name, value]) => {
@@ -249,27 +243,6 @@ function showFigures() {
       return row;
     }),
   );
-}
-
-// The scan as a picture over azimuth and elevation, as its sensor sees it; of points in the world around a vehicle.
-function drawRange(cloud, vehicle) {
-  if (!cloud || (vehicle && !vehicle.state?.p)) return;
-  const canvas = $("image");
-  const context = canvas.getContext("2d");
-  const image = context.createImageData(canvas.width, canvas.height);
-  const inverse = vehicle?.group.quaternion.clone().invert();
-  const p = new THREE.Vector3();
-  for (let i = 0; i < cloud.count; ++i) {
-    p.fromArray(cloud.positions, 3 * i);
-    if (vehicle) p.sub(vehicle.group.position).applyQuaternion(inverse);
-    const range = p.length();
-    const u = Math.floor((0.5 - Math.atan2(p.y, p.x) / (2 * Math.PI)) * canvas.width);
-    const v = Math.floor((0.5 - Math.asin(p.z / range) / (Math.PI * 0.7)) * canvas.height);
-    if (u < 0 || v < 0 || u >= canvas.width || v >= canvas.height) continue;
-    const near = Math.exp(-range / 12);
-    image.data.set([255 * near, 200 * (1 - Math.abs(near - 0.5)), 255 * (1 - near), 255], 4 * (v * canvas.width + u));
-  }
-  context.putImageData(image, 0, 0);
 }
 
 // ---- cameras ----
@@ -453,6 +426,7 @@ setInterval(() => {
 // ---- frames ----
 
 function draw(dt) {
+  client.deliver();
   moveCamera();
   if (controls.enabled) controls.update();
   for (const vehicle of state.vehicles) vehicle.animate(dt);

@@ -125,18 +125,18 @@ export class SurfelMap {
       this.bounds.union(box);
       this.blocks.push({ number: i, box, sphere: box.getBoundingSphere(new THREE.Sphere()), surfels: view.getUint32(at + 24, true), level: -1, wanted: -1, mesh: null });
     }
-    this.setHeights();
     await this.loadOverview();
     return true;
   }
 
-  // Floors and roofs may be far off: colours are of what most surfels lie between.
-  setHeights() {
-    const sorted = (values) => values.sort((a, b) => a - b);
-    const low = sorted(this.blocks.map((b) => b.box.min.z));
-    const high = sorted(this.blocks.map((b) => b.box.max.z));
-    const at = (z, share) => z[Math.min(z.length - 1, Math.floor(share * z.length))] ?? 0;
-    this.uniforms.heights.value.set(at(low, 0.05), at(high, 0.95));
+  // Colours are of what nearly all surfels lie between: some are far off.
+  setHeights(words, leaves, count) {
+    const z = new Float32Array(count);
+    for (let i = 0; i < count; ++i) {
+      z[i] = this.origin.z + leaves[4 * i + 2] + (this.resolution * (((words[2 * i] >>> 20) & 1023) + 0.5)) / 64;
+    }
+    z.sort();
+    this.uniforms.heights.value.set(z[Math.floor(0.01 * count)] ?? 0, z[Math.floor(0.99 * count)] ?? 1);
   }
 
   async fetch(path) {
@@ -211,6 +211,10 @@ export class SurfelMap {
     }
     this.overviewGrow = grow;
     this.rebuildOverview();
+    if (!this.overviewReady) {
+      const { words, leaves, count } = this.overview.userData;
+      this.setHeights(words, leaves, count);
+    }
     this.overviewReady = true;
     for (const block of this.blocks) block.isWhole = stride === 1;
   }

@@ -15,6 +15,7 @@ export class Client {
     this.channels = new Map(); // by id
     this.topics = new Map(); // subscription id -> topic
     this.wanted ??= new Map(); // topic -> handler
+    this.waiting = new Map(); // topic -> what is left to be done with its last message
     this.next = 1;
     this.capabilities = [];
     this.orders = null;
@@ -29,13 +30,23 @@ export class Client {
       typeof event.data === "string" ? this.take(JSON.parse(event.data)) : this.takeBinary(event.data);
   }
 
-  want(topic, handler) {
-    this.wanted.set(topic, handler);
+  // With `latest`, of messages that come faster than frames only the last one counts: it waits for `deliver`.
+  want(topic, handler, { latest = false } = {}) {
+    const keep = (...message) => this.waiting.set(topic, () => handler(...message));
+    this.wanted.set(topic, latest ? keep : handler);
     for (const channel of this.channels.values()) this.subscribe(channel);
+  }
+
+  // Once per frame: a machine that draws slowly does not fall behind the run.
+  deliver() {
+    const waiting = [...this.waiting.values()];
+    this.waiting.clear();
+    for (const handle of waiting) handle();
   }
 
   leave(topic) {
     this.wanted.delete(topic);
+    this.waiting.delete(topic);
     for (const channel of this.channels.values()) {
       if (channel.topic !== topic || !channel.subscription) continue;
       this.send({ op: "unsubscribe", subscriptionIds: [channel.subscription] });
@@ -84,6 +95,7 @@ export class Client {
     } else if (opcode === OPCODE.time) {
       this.handlers.time?.(view.getBigUint64(1, true));
     } else if (opcode === OPCODE.playback) {
+      this.deliver(); // in order
       this.handlers.playback?.({
         isPlaying: view.getUint8(1) === 0,
         time: view.getBigUint64(2, true),

@@ -62,7 +62,9 @@ export class Recording {
 
   show(topic, isOn) {
     topic.isOn = isOn;
-    if (isOn) this.client.want(topic.channel.topic, topic.handler);
+    // poses are all taken: clouds lie where their sensors were then
+    const latest = Boolean(CLOUDS[topic.kind]) || topic.kind === "nav_msgs/Path";
+    if (isOn) this.client.want(topic.channel.topic, topic.handler, { latest });
     else this.client.leave(topic.channel.topic);
     topic.toggle?.(isOn);
   }
