@@ -32,7 +32,7 @@ allowed() {
 for folder in core geometry io map render lidar vehicle world fit fidelity sim run ros_common recording view ros1 ros2; do
   where=pointflight/$folder
   [ -d "$where" ] || where=$folder
-  for used in $(grep -rhoE '#include "(pointflight/[a-z_]+|apps|tests|examples|ros_common|recording|ros1|ros2)/' "$where" |
+  for used in $(grep -rhoE '#include "(pointflight/[a-z_]+|apps|tests|examples|ros_common|recording|view|ros1|ros2)/' "$where" |
                 sed 's/.*"//; s/^pointflight\///; s/\/$//' | sort -u); do
     case " $(allowed "$folder") " in
       *" $used "*) ;;
@@ -60,12 +60,12 @@ found=$(grep -rnE 'system_clock|steady_clock|time\(nullptr|std::(cout|cerr)|fmt:
 [ -z "$found" ] || { echo "wall clock or printing in the library:"; breach "$found"; }
 
 # Public headers: std and Eigen only, so that a user needs no other headers.
-found=$(grep -rnE '#include <(fmt|yaml-cpp|nlohmann|tbb|oneapi|nanoflann|xxhash|lzf|liblzf|assimp|Random123|hwy|lzma)' \
-        pointflight ros_common recording --include='*.hpp' | grep -vE 'io/byte_cursor.hpp|-inl.hpp')
+found=$(grep -rnE '#include <(fmt|yaml-cpp|nlohmann|tbb|oneapi|nanoflann|xxhash|lzf|liblzf|assimp|Random123|hwy|lzma|boost)' \
+        pointflight ros_common recording view --include='*.hpp' | grep -vE 'io/byte_cursor.hpp|-inl.hpp')
 [ -z "$found" ] || { echo "third-party headers in public headers:"; breach "$found"; }
 
 # Each source includes its own header first, so that headers compile alone.
-for source in $(git ls-files 'pointflight/*.cpp' 'apps/*.cpp' 'ros_common/*.cpp' 'recording/*.cpp' 'ros1/*.cpp' 'ros2/*.cpp'); do
+for source in $(git ls-files 'pointflight/*.cpp' 'apps/*.cpp' 'ros_common/*.cpp' 'recording/*.cpp' 'view/*.cpp' 'ros1/*.cpp' 'ros2/*.cpp'); do
   [ -f "${source%.cpp}.hpp" ] || continue
   case $(grep -m1 '^#include' "$source") in
     "#include \"${source%.cpp}.hpp\"") ;;
