@@ -70,6 +70,18 @@ class LiveServer::Impl::Client : public std::enable_shared_from_this<Client> {
 
   [[nodiscard]] bool may_command() const { return may_command_; }
 
+  /// Tells of channels; of those that it knows already not again: clients would subscribe twice.
+  void advertise(std::span<const foxglove::Channel> channels) {
+    while (!channels.empty() && channels.front().id <= last_advertised_) {
+      channels = channels.subspan(1);
+    }
+    if (channels.empty()) return;
+    last_advertised_ = channels.back().id;
+    send_text(foxglove::advertise_text(channels));
+  }
+  /// It is to forget what it knew: another session begins.
+  void forget_channels() { last_advertised_ = 0; }
+
   void end() {
     if (ended_) return;
     ended_ = true;
@@ -298,6 +310,7 @@ class LiveServer::Impl::Client : public std::enable_shared_from_this<Client> {
   Impl& server_;
   websocket::stream<beast::tcp_stream> socket_;
   beast::flat_buffer buffer_;
+  std::uint32_t last_advertised_ = 0;  ///< Ids only grow.
   bool may_command_;
   std::map<std::uint32_t, std::vector<std::uint32_t>> subscriptions_;  ///< By channel.
   std::size_t subscription_count_ = 0;

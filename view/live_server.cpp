@@ -99,7 +99,9 @@ void LiveServer::Impl::greet(Client& client) {
   info.encodings = {"cdr", "json"};
   info.range = options_.range;
   client.send_text(foxglove::server_info_text(info));
-  client.send_text(foxglove::advertise_text(channels));
+  client.forget_channels();
+  if (channels.empty()) client.send_text(foxglove::advertise_text({}));  // that there are none
+  client.advertise(channels);
   if (client.may_command() && !services.empty()) {
     client.send_text(foxglove::advertise_services_text(services));
   }
@@ -139,7 +141,7 @@ std::uint32_t LiveServer::add_channel(foxglove::Channel channel, bool latched) {
     known.latched = latched;
   }
   net::post(impl_->io_, [impl = impl_.get(), channel = std::move(channel)] {
-    impl->to_all({foxglove::advertise_text({&channel, 1}), {}, {}, false});
+    for (const auto& client : impl->clients_) client->advertise({&channel, 1});
   });
   return id;
 }

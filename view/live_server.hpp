@@ -31,7 +31,7 @@ struct LiveServerOptions {
   std::vector<std::string> capabilities;  ///< Beside those that channels and services need.
   /// First and last time of what can be played back, ns.
   std::optional<std::pair<std::int64_t, std::int64_t>> range;
-  std::size_t queue_bytes = std::size_t{32} << 20;  ///< Of data that waits for one client.
+  std::size_t queue_bytes = std::size_t{16} << 20;  ///< Of data that waits for one client.
   /// What lies under a path ("/", "/page.js", "/map/info"); nothing: 404. From a thread of the
   /// server's.
   std::function<std::optional<WebContent>(const std::string& path)> content;

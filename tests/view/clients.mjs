@@ -48,6 +48,7 @@ class Watcher {
     this.times = 0;
   }
   add(channel) {
+    assert.ok(!this.channels.has(channel.id), `${channel.topic} is advertised once`);
     this.channels.set(channel.id, channel);
     if (channel.encoding === "cdr") {
       assert.equal(channel.schemaEncoding ?? "ros2msg", "ros2msg");
