@@ -1,5 +1,6 @@
 #include "apps/canvas.hpp"
 
+#include <cairo-svg.h>
 #include <cairo.h>
 #include <fmt/format.h>
 
@@ -38,6 +39,18 @@ cairo_status_t append(void* target, const unsigned char* data, unsigned length) 
   }
 }
 
+cairo_surface_t* recording_surface(int width, int height) {
+  const cairo_rectangle_t all{0.0, 0.0, static_cast<double>(width), static_cast<double>(height)};
+  return cairo_recording_surface_create(CAIRO_CONTENT_COLOR, &all);
+}
+
+void replay(cairo_surface_t* from, cairo_surface_t* to) {
+  cairo_t* cr = cairo_create(to);
+  cairo_set_source_surface(cr, from, 0.0, 0.0);
+  cairo_paint(cr);
+  cairo_destroy(cr);
+}
+
 }  // namespace
 
 Color ramp(double share) {
@@ -54,8 +67,11 @@ Color ramp(double share) {
   return {a.r + f * (b.r - a.r), a.g + f * (b.g - a.g), a.b + f * (b.b - a.b)};
 }
 
-Canvas::Canvas(int width, int height, Color background)
-    : surface_(cairo_image_surface_create(CAIRO_FORMAT_RGB24, width, height)),
+Canvas::Canvas(int width, int height, Color background, bool keeps_strokes)
+    : width_(width),
+      height_(height),
+      surface_(keeps_strokes ? recording_surface(width, height)
+                             : cairo_image_surface_create(CAIRO_FORMAT_RGB24, width, height)),
       cr_(cairo_create(surface_)) {
   color(background);
   cairo_paint(cr_);
@@ -68,13 +84,6 @@ Canvas::~Canvas() {
 
 void Canvas::color(Color c, double alpha) {
   cairo_set_source_rgba(cr_, c.r, c.g, c.b, alpha);
-}
-
-int Canvas::width() const {
-  return cairo_image_surface_get_width(surface_);
-}
-int Canvas::height() const {
-  return cairo_image_surface_get_height(surface_);
 }
 
 double Canvas::text_width(const std::string& words, double size) const {
@@ -175,12 +184,31 @@ void Canvas::line(const std::vector<std::pair<double, double>>& points,
 void Canvas::save(const std::string& path) {
   cairo_surface_flush(surface_);
   PngTarget png{OutputFile(path), nullptr};
-  const auto status = cairo_surface_write_to_png_stream(surface_, append, &png);
+  cairo_surface_t* image = surface_;
+  if (cairo_surface_get_type(surface_) == CAIRO_SURFACE_TYPE_RECORDING) {
+    image = cairo_image_surface_create(CAIRO_FORMAT_RGB24, width_, height_);
+    replay(surface_, image);
+  }
+  const auto status = cairo_surface_write_to_png_stream(image, append, &png);
+  if (image != surface_) cairo_surface_destroy(image);
   if (png.error) std::rethrow_exception(png.error);
   if (status != CAIRO_STATUS_SUCCESS) {
     throw InputError(fmt::format("{}: cannot draw: {}", path, cairo_status_to_string(status)));
   }
   png.file.commit();
+}
+
+std::string Canvas::svg() const {
+  std::string text;
+  const auto take = [](void* to, const unsigned char* data, unsigned length) {
+    static_cast<std::string*>(to)->append(reinterpret_cast<const char*>(data), length);
+    return CAIRO_STATUS_SUCCESS;
+  };
+  cairo_surface_t* surface = cairo_svg_surface_create_for_stream(take, &text, width_, height_);
+  replay(surface_, surface);
+  cairo_surface_finish(surface);
+  cairo_surface_destroy(surface);
+  return text;
 }
 
 void Canvas::begin_pixels() {

@@ -33,13 +33,14 @@ class Canvas {
     std::string words;
   };
 
-  Canvas(int width, int height, Color background);
+  /// With `keeps_strokes` it can be saved as SVG too, and has no pixels to `put`.
+  Canvas(int width, int height, Color background, bool keeps_strokes = false);
   ~Canvas();
   Canvas(const Canvas&) = delete;
   Canvas& operator=(const Canvas&) = delete;
 
-  [[nodiscard]] int width() const;
-  [[nodiscard]] int height() const;
+  [[nodiscard]] int width() const { return width_; }
+  [[nodiscard]] int height() const { return height_; }
   [[nodiscard]] double text_width(const std::string& words, double size) const;
   /// All words so far: none may lie over another or be cut off.
   [[nodiscard]] const std::vector<TextBox>& texts() const { return texts_; }
@@ -76,10 +77,13 @@ class Canvas {
 
   /// Writes a PNG. Throws InputError.
   void save(const std::string& path);
+  /// As SVG, of a canvas that keeps strokes; letters are outlines.
+  [[nodiscard]] std::string svg() const;
 
  private:
   void color(Color c, double alpha = 1.0);
 
+  int width_, height_;
   cairo_surface_t* surface_;
   cairo_t* cr_;
   std::vector<TextBox> texts_;

@@ -67,6 +67,7 @@ int run(int argc, char** argv) {
   add_compare_command(app, exit_code);
   add_fidelity_command(app, exit_code);
   add_view_command(app, exit_code);
+  add_campaign_command(app, exit_code);
   add_shell_commands(app);
   const std::vector<std::string> words = command_words(argc, argv);
   try {

@@ -63,4 +63,9 @@ const Ros2Module& ros2_module() {
   return module;
 }
 
+const MpiModule& mpi_module() {
+  static const MpiModule& module = load<MpiModule>("pointflight_mpi", "MPI", "libopenmpi-dev");
+  return module;
+}
+
 }  // namespace pointflight::apps

@@ -2,11 +2,13 @@
 
 #include <string>
 
+#include "campaign/mpi_module.hpp"
 #include "ros_common/wire.hpp"
 
 namespace pointflight::apps {
 
-/// True where this build came with a module ("pointflight_ros1", "pointflight_ros2").
+/// True where this build came with a module ("pointflight_ros1", "pointflight_ros2",
+/// "pointflight_mpi").
 bool has_module(const std::string& name);
 
 /// The library that speaks ROS 1, loaded when first asked for. Throws InputError that says what to
@@ -14,5 +16,7 @@ bool has_module(const std::string& name);
 const Ros1Module& ros1_module();
 /// The same for ROS 2.
 const Ros2Module& ros2_module();
+/// The same for MPI.
+const MpiModule& mpi_module();
 
 }  // namespace pointflight::apps

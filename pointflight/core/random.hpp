@@ -37,6 +37,7 @@ enum class StreamId : std::uint32_t {
   kOdometry = 27,         ///< entity: vehicle, index: report * 9 + draw
   kNavigation = 28,       ///< entity: vehicle << 8 | sensor, index: measurement * 12 + draw
   kStereo = 29,           ///< of windows; entity: vehicle << 8 | lidar, index: scan << 32 | node
+  kStudy = 30,            ///< values drawn for a campaign; entity: key, index: draw
   kTest = 1000,           ///< inputs of tests and benchmarks
 };
 

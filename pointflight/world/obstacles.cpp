@@ -129,7 +129,7 @@ void describe_motion(SettingsVisitor& v, ObstacleSettings& s) {
               w.value({"speed", "m/s", "along its way", 0, 100}, s.speed);
             });
   v.only_if(s.motion == ObstacleMotion::kRandom, "motion: random", [&](SettingsVisitor& w) {
-    w.value({"count", "", "so many alike", 1, 50000}, s.count);
+    w.value({"count", "", "so many alike; 0: none", 0, 50000}, s.count);
     w.value({"speed_max", "m/s", "above speed: each is drawn between the two", 0, 100},
             s.speed_max);
     w.choice({"directions", "", "of flight"}, s.directions, kDirections);

@@ -1,0 +1,358 @@
+#include <fmt/format.h>
+
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <sstream>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "apps/campaign_report.hpp"
+#include "apps/commands.hpp"
+#include "apps/modules.hpp"
+#include "apps/settings_json.hpp"
+#include "apps/terminal.hpp"
+#include "campaign/campaign.hpp"
+#include "campaign/engines.hpp"
+#include "campaign/mpi_module.hpp"
+#include "campaign/statistics.hpp"
+#include "pointflight/core/input_error.hpp"
+#include "pointflight/core/locked_file.hpp"
+#include "pointflight/core/output_file.hpp"
+
+namespace pointflight::apps {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct CampaignFlags {
+  std::string study;
+  std::string folder;
+  std::string engine = "local";
+  int jobs = 0;
+  std::string share;
+  std::size_t tasks = 0;
+  std::vector<std::string> slurm;
+  std::vector<std::string> fail_if;
+  bool retry = false;
+  bool json = false;
+};
+
+std::string own_program() {
+  std::error_code error;
+  return fs::read_symlink("/proc/self/exe", error).string();
+}
+
+int jobs_of(const CampaignFlags& flags) {
+  if (flags.jobs > 0) return flags.jobs;
+  // a worker has what its batch system gave it
+  if (!flags.share.empty()) return 1;
+  return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+}
+
+/// Sets `stop` once a signal came, as long as it lives.
+class StopWatch {
+ public:
+  StopWatch() {
+    catch_interrupts();
+    thread_ = std::thread([this] {
+      while (!over_) {
+        if (interrupted()) stop_ = true;
+        std::this_thread::sleep_for(std::chrono::milliseconds(50));
+      }
+    });
+  }
+  ~StopWatch() {
+    over_ = true;
+    thread_.join();
+  }
+  StopWatch(const StopWatch&) = delete;
+  StopWatch& operator=(const StopWatch&) = delete;
+  [[nodiscard]] const std::atomic<bool>& stop() const { return stop_; }
+
+ private:
+  std::atomic<bool> stop_ = false;
+  std::atomic<bool> over_ = false;
+  std::thread thread_;
+};
+
+/// Says how far it is: done before, and now.
+FlightDone teller(const Campaign& campaign, std::size_t missing) {
+  struct Count {
+    std::size_t done, failed = 0;
+    Progress progress = terminal_progress();
+  };
+  const std::size_t all = campaign.plan().runs.size();
+  auto count = std::make_shared<Count>();
+  count->done = all - missing;
+  return [count, all](std::size_t /*number*/, const RunRecord& record) {
+    ++count->done;
+    count->failed += record.status == RunStatus::kFailed ? 1 : 0;
+    const std::string what =
+        count->failed == 0 ? "flying" : fmt::format("flying, {} failed", count->failed);
+    report(count->progress, what, static_cast<double>(count->done) / static_cast<double>(all));
+  };
+}
+
+Results results_of(const Campaign& campaign) {
+  Results results;
+  for (const PlannedRun& run : campaign.plan().runs) {
+    if (auto record = campaign.result(run.number)) results.emplace(run.number, std::move(*record));
+  }
+  return results;
+}
+
+void write_file(const Campaign& campaign, const std::string& name, const std::string& text) {
+  OutputFile file((fs::path(campaign.folder()) / name).string());
+  file.write(text);
+  file.commit();
+}
+
+/// "plot_mission_speed": a key as a file's name.
+std::string plot_name(const std::string& key) {
+  std::string name = "plot_";
+  for (const char c : key) {
+    const bool is_plain =
+        (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
+    if (is_plain || c == '_') {
+      name += c;
+    } else if (name.back() != '_') {
+      name += '_';
+    }
+  }
+  while (name.back() == '_') name.pop_back();
+  return name;
+}
+
+std::vector<FailedRun> failed_of(const Campaign& campaign, const Results& results) {
+  std::vector<FailedRun> failed;
+  for (const auto& [number, run] : results) {
+    if (run.status != RunStatus::kFailed) continue;
+    failed.push_back({number,
+                      run.reason,
+                      campaign.run_folder(number) + "/log.txt",
+                      campaign.repeating_command(number)});
+  }
+  return failed;
+}
+
+void write_results(const Campaign& campaign, const Results& results) {
+  write_file(campaign, "runs.csv", runs_csv(campaign.plan(), results));
+  write_file(campaign, "runs_timing.csv", timing_csv(campaign.plan(), results));
+  write_file(campaign, "points.csv", points_csv(campaign.plan(), results));
+  const auto plots = campaign_plots(campaign.plan(), results);
+  for (const CampaignPlot& plot : plots) {
+    const std::string name = plot_name(plot.key);
+    plot.canvas->save((fs::path(campaign.folder()) / (name + ".png")).string());
+    write_file(campaign, name + ".svg", plot.canvas->svg());
+  }
+  write_file(campaign,
+             "report.html",
+             campaign_html(campaign, results, plots, failed_of(campaign, results)));
+}
+
+std::vector<const RunRecord*> all_of(const Results& results) {
+  std::vector<const RunRecord*> all;
+  for (const auto& [number, run] : results) all.push_back(&run);
+  return all;
+}
+
+nlohmann::ordered_json json_of(const Rate& rate) {
+  return {{"count", rate.count},
+          {"of", rate.of},
+          {"rate", rate.value},
+          {"low", rate.low},
+          {"high", rate.high}};
+}
+
+void print_results(const Campaign& campaign, const Results& results, bool json) {
+  const auto all = all_of(results);
+  const std::vector<FailedRun> failed = failed_of(campaign, results);
+  if (json) {
+    nlohmann::ordered_json value;
+    value["folder"] = campaign.folder();
+    value["flights"] = campaign.plan().runs.size();
+    value["done"] = results.size();
+    for (const Counted counted : {Counted::kCompleted, Counted::kCollision, Counted::kFailed}) {
+      value[std::string(name_of(counted))] = json_of(rate_of(all, counted));
+    }
+    print_json(value);
+    return;
+  }
+  const auto say_rate = [&](const char* name, Counted counted) {
+    const Rate rate = rate_of(all, counted);
+    if (rate.of == 0) return;
+    fmt::print("  {:<17} {} of {}: {:.1f} % (95 %: {:.1f} to {:.1f})\n",
+               name,
+               rate.count,
+               rate.of,
+               100.0 * rate.value,
+               100.0 * rate.low,
+               100.0 * rate.high);
+  };
+  fmt::print("{} of {} flights\n", results.size(), campaign.plan().runs.size());
+  say_rate("completed", Counted::kCompleted);
+  say_rate("with a collision", Counted::kCollision);
+  say_rate("failed", Counted::kFailed);
+  constexpr std::size_t kMost = 5;
+  for (std::size_t i = 0; i < std::min(kMost, failed.size()); ++i) {
+    fmt::print("  flight {} failed: {}; log: {}\n    again: {}\n",
+               failed[i].number,
+               failed[i].reason,
+               failed[i].log,
+               failed[i].command);
+  }
+  if (failed.size() > kMost) fmt::print("  {} more failed: report.html\n", failed.size() - kMost);
+  fmt::print("  results           {}/report.html\n", campaign.folder());
+}
+
+/// What came of all, and the exit code.
+int finish(const Campaign& campaign,
+           const CampaignFlags& flags,
+           const std::vector<Condition>& conditions,
+           bool was_stopped) {
+  const Results results = results_of(campaign);
+  end_progress();
+  write_results(campaign, results);
+  print_results(campaign, results, flags.json);
+  const std::size_t left = campaign.plan().runs.size() - results.size();
+  if (left > 0) {
+    log(fmt::format("{} flights are left ({}); the same command goes on",
+                    left,
+                    was_stopped ? "it was ended" : "they were killed from outside"));
+    return was_stopped ? kInterrupted : kWrongInput;
+  }
+  int code = kDone;
+  for (const Condition& condition : conditions) {
+    const double value = condition.value(all_of(results));
+    if (!condition.holds(all_of(results))) continue;
+    log(fmt::format("--fail-if {}: it is {:.6g}", condition.text(), value));
+    code = kRanButFailed;
+  }
+  return code;
+}
+
+/// A worker's part: no tables, and nobody is kept out.
+int fly_share(const Campaign& campaign, const CampaignFlags& flags) {
+  const StopWatch watch;
+  const auto own = share_of(campaign.missing(), parse_share(flags.share));
+  fly_here(campaign, own, jobs_of(flags), watch.stop(), teller(campaign, own.size()));
+  end_progress();
+  return watch.stop() ? kInterrupted : kDone;
+}
+
+/// With Slurm's or our own processes; one coordinator for a folder.
+int coordinate(Campaign& campaign,
+               const CampaignFlags& flags,
+               const std::vector<Condition>& conditions) {
+  const FolderLock lock(campaign.folder());
+  const StopWatch watch;
+  campaign.remove_leftovers();
+  if (flags.retry) campaign.forget_failed();
+  const std::vector<std::size_t> missing = campaign.missing();
+  if (!missing.empty() && flags.engine == "slurm") {
+    SlurmOptions options;
+    options.tasks = flags.tasks;
+    options.program = own_program();
+    for (const std::string& words : flags.slurm) {
+      std::istringstream split(words);
+      for (std::string word; split >> word;) options.words.push_back(word);
+    }
+    const std::string job =
+        fly_by_slurm(campaign, missing, options, watch.stop(), terminal_progress());
+    if (watch.stop()) {
+      end_progress();
+      log(fmt::format("{} goes on without this; the same command waits for it", job));
+      return kInterrupted;
+    }
+  } else if (!missing.empty()) {
+    fly_here(campaign, missing, jobs_of(flags), watch.stop(), teller(campaign, missing.size()));
+  }
+  return finish(campaign, flags, conditions, watch.stop());
+}
+
+/// All ranks fly what rank 0 deals out; it alone keeps the folder and gathers.
+int fly_by_mpi(const CampaignFlags& flags, const std::vector<Condition>& conditions) {
+  const MpiModule& mpi = mpi_module();
+  mpi.begin();
+  const bool is_first = mpi.rank() == 0;
+  std::optional<Campaign> campaign;
+  std::optional<FolderLock> lock;
+  if (is_first) {
+    campaign.emplace(load_study(flags.study), flags.folder, own_program());
+    lock.emplace(flags.folder);
+    campaign->remove_leftovers();
+    if (flags.retry) campaign->forget_failed();
+  }
+  mpi.meet();  // the folder is there
+  if (!is_first) campaign.emplace(load_study(flags.study), flags.folder, own_program());
+  const std::vector<std::size_t> missing = campaign->missing();
+  mpi.meet();  // nobody flies while others look what is missing
+  const StopWatch watch;
+  const FlightDone done = is_first ? teller(*campaign, missing.size()) : FlightDone();
+  for (std::size_t i = 0; !watch.stop() && (i = mpi.next()) < missing.size();) {
+    const auto record = campaign->fly(missing[i], watch.stop());
+    if (record && done) done(missing[i], *record);
+  }
+  mpi.meet();
+  const int code = is_first ? finish(*campaign, flags, conditions, watch.stop()) : int{kDone};
+  mpi.end();
+  return code;
+}
+
+int run_campaign(const CampaignFlags& flags) {
+  std::vector<Condition> conditions;
+  for (const std::string& text : flags.fail_if) conditions.emplace_back(text);
+  if (flags.engine == "mpi") return fly_by_mpi(flags, conditions);
+  Campaign campaign(load_study(flags.study), flags.folder, own_program());
+  return flags.share.empty() ? coordinate(campaign, flags, conditions) : fly_share(campaign, flags);
+}
+
+}  // namespace
+
+void add_campaign_command(CLI::App& parent, int& exit_code) {
+  auto* app = parent.add_subcommand(
+      "campaign",
+      "Fly a study: seeds and values of a scenario's keys, with a table, plots and a verdict");
+  auto flags = std::make_shared<CampaignFlags>();
+  app->add_option("study", flags->study, "STUDY.yaml: scenario, seeds, grid, draws, command")
+      ->required()
+      ->check(CLI::ExistingFile);
+  app->add_option("-o,--output",
+                  flags->folder,
+                  "Folder of its flights and results; one that is there already goes on")
+      ->required();
+  auto* engine =
+      app->add_option("--engine",
+                      flags->engine,
+                      "Who flies: local (processes here), slurm (a job array by sbatch), "
+                      "mpi (mpirun pointflight campaign ... --engine mpi)")
+          ->check(CLI::IsMember({"local", "slurm", "mpi"}));
+  app->add_option("--jobs", flags->jobs, "Flights at once on this machine; 0: as many as cores")
+      ->check(CLI::Range(0, 4096));
+  app->add_option("--share",
+                  flags->share,
+                  "K/N: only flights K, K + N, K + 2 N, ... and no tables: a worker of any other "
+                  "batch system")
+      ->excludes(engine);
+  app->add_option("--tasks", flags->tasks, "Of Slurm's job array; 0: one per flight, at most 100")
+      ->check(CLI::Range(0, 100000));
+  app->add_option(
+      "--slurm", flags->slurm, "Options for sbatch: --slurm \"--partition=short --time=60\"");
+  app->add_option("--fail-if",
+                  flags->fail_if,
+                  "Exit code 1 if it holds: \"collision_rate > 0.02\", \"min(closest_approach) < "
+                  "0.2\"; again for more");
+  app->add_flag("--retry-failed", flags->retry, "Fly those again that failed");
+  app->add_flag("--json", flags->json, "For programs");
+  app->callback([flags, &exit_code] { exit_code = run_campaign(*flags); });
+}
+
+}  // namespace pointflight::apps

@@ -1,0 +1,329 @@
+#include "campaign/campaign.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <csignal>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <utility>
+
+#include "campaign/process.hpp"
+#include "pointflight/core/hash.hpp"
+#include "pointflight/core/input_error.hpp"
+#include "pointflight/core/mapped_file.hpp"
+#include "pointflight/core/output_file.hpp"
+#include "pointflight/core/resources.hpp"
+#include "pointflight/core/version.hpp"
+#include "pointflight/sim/scenario.hpp"
+#include "pointflight/sim/scenario_copy.hpp"
+
+namespace pointflight {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kResult = "result.json";
+constexpr const char* kAttempt = ".attempt-";
+
+std::string text_of_file(const std::string& path) {
+  const MappedFile file(path);
+  const auto bytes = file.bytes();
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+void write_text(const fs::path& path, std::string_view text) {
+  OutputFile file(path.string());
+  file.write(text);
+  file.commit();
+}
+
+std::string host_name() {
+  std::array<char, 256> name{};
+  if (gethostname(name.data(), name.size() - 1) != 0) return "host";
+  return name.data();
+}
+
+/// A folder of this attempt's own: the name says whose it is.
+fs::path make_attempt(const fs::path& run) {
+  static std::atomic<int> count = 0;
+  const std::string name =
+      fmt::format("{}{}{}-{}-{}", run.string(), kAttempt, host_name(), getpid(), ++count);
+  std::error_code error;
+  fs::remove_all(name, error);
+  if (!fs::create_directories(name, error) && error) {
+    throw InputError(fmt::format("{}: {}", name, error.message()));
+  }
+  return name;
+}
+
+/// An attempt that ends without a result leaves nothing.
+class AttemptGuard {
+ public:
+  explicit AttemptGuard(fs::path folder) : folder_(std::move(folder)) {}
+  ~AttemptGuard() {
+    std::error_code ignored;
+    fs::remove_all(folder_, ignored);
+  }
+  AttemptGuard(const AttemptGuard&) = delete;
+  AttemptGuard& operator=(const AttemptGuard&) = delete;
+
+ private:
+  fs::path folder_;
+};
+
+void replace_all(std::string& text, std::string_view what, const std::string& by) {
+  for (std::size_t at = 0; (at = text.find(what, at)) != std::string::npos; at += by.size()) {
+    text.replace(at, what.size(), by);
+  }
+}
+
+std::string quoted(const std::string& word) {
+  constexpr const char* kPlain =
+      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_./=:,+@%";
+  if (!word.empty() && word.find_first_not_of(kPlain) == std::string::npos) return word;
+  std::string out = word;
+  replace_all(out, "'", "'\\''");
+  return "'" + out + "'";
+}
+
+void judge(const ProcessResult& ended, const Study& study, RunRecord& record) {
+  record.wall_seconds = ended.wall_seconds;
+  if (ended.timed_out) {
+    record.reason = fmt::format("took longer than {:g} s", study.time_limit);
+  } else if (ended.signal != 0) {
+    record.reason = fmt::format("signal {}", ended.signal);
+  } else if (ended.exit_code > 1) {
+    record.reason = fmt::format("exit code {}", ended.exit_code);
+  } else {
+    record.status = ended.exit_code == 0 ? RunStatus::kCompleted : RunStatus::kEnded;
+  }
+}
+
+}  // namespace
+
+Campaign::Campaign(Study study, std::string folder, std::string program)
+    : study_(std::move(study)),
+      folder_(std::move(folder)),
+      program_(std::move(program)),
+      plan_(plan_of(study_)),
+      scenario_path_(resolve_path(study_.scenario, fs::path(study_.path).parent_path().string())),
+      scenario_text_(text_of_file(scenario_path_)),
+      map_(load_scenario(scenario_path_).open_map()) {
+  check_values();
+  check_folder();
+}
+
+/// Each value of each axis, and a draw of each key, fits the scenario.
+void Campaign::check_values() const {
+  const auto check = [&](const std::string& key, const std::string& value, int line) {
+    try {
+      parse_scenario(edited_scenario(scenario_text_, {key}, {value}), scenario_path_);
+    } catch (const InputError& error) {
+      // lines are of the edited text, which nobody sees
+      std::string why = error.what();
+      if (why.starts_with(scenario_path_ + ":")) {
+        why.erase(0, std::min(why.find(": ") + 2, why.size()));
+      }
+      if (why.find(key) == std::string::npos) why.insert(0, key + ": ");
+      throw InputError(fmt::format("{}:{}: {}", study_.path, line, why));
+    }
+  };
+  constexpr std::size_t kMost = 50;  // of a long list
+  for (const StudyAxis& axis : study_.grid) {
+    const std::size_t stride = std::max<std::size_t>(1, axis.values.size() / kMost);
+    for (std::size_t i = 0; i < axis.values.size(); i += stride) {
+      check(axis.key, axis.values[i], axis.line);
+    }
+    check(axis.key, axis.values.back(), axis.line);
+  }
+  for (std::size_t k = 0; k < study_.draws.size(); ++k) {
+    check(study_.draws[k].key,
+          plan_.runs.front().values[study_.grid.size() + k],
+          study_.draws[k].line);
+  }
+}
+
+std::string Campaign::identity() const {
+  std::string all;
+  for (const PlannedRun& run : plan_.runs) {
+    all += fmt::format("{} {}", run.point, run.seed);
+    for (const std::string& value : run.values) all += "\t" + value;
+    all += '\n';
+  }
+  const auto hash = [](const std::string& text) {
+    return fmt::format("{:016x}", hash64(std::as_bytes(std::span(text))));
+  };
+  std::string command;
+  for (const std::string& word : study_.command) command += word + '\0';
+  const nlohmann::ordered_json identity = {{"pointflight", kVersion},
+                                           {"flights", plan_.runs.size()},
+                                           {"plan_hash", hash(all)},
+                                           {"scenario_hash", hash(scenario_text_)},
+                                           {"command_hash", hash(command)},
+                                           {"map_hash", map_->hash()}};
+  return identity.dump(1) + "\n";
+}
+
+/// Several processes may come at once: all write the same.
+void Campaign::check_folder() const {
+  std::error_code error;
+  fs::create_directories(fs::path(folder_) / "runs", error);
+  if (error) throw InputError(fmt::format("{}: {}", folder_, error.message()));
+  const std::string path = (fs::path(folder_) / "campaign.json").string();
+  if (fs::exists(path, error)) {
+    if (text_of_file(path) == identity()) return;
+    throw InputError(fmt::format(
+        "{}: is the campaign of another study, scenario, map or version; choose another folder",
+        folder_));
+  }
+  const std::string own = fmt::format("{}.{}-{}", path, host_name(), getpid());
+  write_text(own, identity());
+  fs::rename(own, path, error);
+  if (error) throw InputError(fmt::format("{}: {}", path, error.message()));
+}
+
+std::string Campaign::run_folder(std::size_t number) const {
+  return (fs::path(folder_) / "runs" / fmt::format("{:06}", number)).string();
+}
+
+std::vector<std::size_t> Campaign::missing() const {
+  std::set<std::string> there;
+  std::error_code error;
+  for (fs::directory_iterator at(fs::path(folder_) / "runs", error);
+       !error && at != fs::directory_iterator();
+       at.increment(error)) {
+    there.insert(at->path().filename().string());
+  }
+  std::vector<std::size_t> missing;
+  for (const PlannedRun& run : plan_.runs) {
+    if (!there.contains(fmt::format("{:06}", run.number))) missing.push_back(run.number);
+  }
+  return missing;
+}
+
+std::size_t Campaign::forget_failed() {
+  std::size_t count = 0;
+  for (const PlannedRun& run : plan_.runs) {
+    const auto record = result(run.number);
+    if (!record || record->status != RunStatus::kFailed) continue;
+    std::error_code error;
+    fs::remove_all(run_folder(run.number), error);
+    if (error) throw InputError(fmt::format("{}: {}", run_folder(run.number), error.message()));
+    ++count;
+  }
+  return count;
+}
+
+void Campaign::remove_leftovers() const {
+  const std::string ours = kAttempt + host_name() + "-";
+  std::error_code error;
+  for (fs::directory_iterator at(fs::path(folder_) / "runs", error);
+       !error && at != fs::directory_iterator();
+       at.increment(error)) {
+    const std::string name = at->path().filename().string();
+    const std::size_t found = name.find(ours);
+    if (found == std::string::npos) continue;
+    const long pid = std::strtol(name.c_str() + found + ours.size(), nullptr, 10);
+    if (pid <= 0 || pid == getpid()) continue;
+    std::error_code ignored;
+    if (kill(static_cast<pid_t>(pid), 0) != 0 && errno == ESRCH)
+      fs::remove_all(at->path(), ignored);
+  }
+}
+
+std::optional<RunRecord> Campaign::result(std::size_t number) const {
+  const fs::path path = fs::path(run_folder(number)) / kResult;
+  std::error_code ignored;
+  if (!fs::exists(path, ignored)) return std::nullopt;
+  return parse_record(text_of_file(path.string()), path.string());
+}
+
+Scenario Campaign::scenario_of(const PlannedRun& run) const {
+  std::vector<std::string> keys = plan_.keys;
+  std::vector<std::string> values = run.values;
+  keys.emplace_back("seed");
+  values.push_back(std::to_string(run.seed));
+  return parse_scenario(edited_scenario(scenario_text_, keys, values), scenario_path_);
+}
+
+std::vector<std::string> Campaign::command_of(const PlannedRun& run,
+                                              const std::string& scenario,
+                                              const std::string& output) const {
+  if (study_.command.empty()) {
+    // as many at once as there are cores: one thread each
+    return {program_, "fly", scenario, "-o", output, "--force", "--threads", "1"};
+  }
+  std::vector<std::string> command = study_.command;
+  for (std::string& word : command) {
+    replace_all(word, "{scenario}", scenario);
+    replace_all(word, "{seed}", std::to_string(run.seed));
+    replace_all(word, "{output}", output);
+  }
+  return command;
+}
+
+std::string Campaign::repeating_command(std::size_t number) const {
+  const fs::path folder = fs::absolute(run_folder(number));
+  std::string line;
+  for (const std::string& word :
+       command_of(plan_.runs[number], (folder / "scenario.yaml").string(), "again")) {
+    line += (line.empty() ? "" : " ") + quoted(word);
+  }
+  return line;
+}
+
+/// What a thousand runs need not keep.
+void Campaign::remove_bulk(const std::string& output) const {
+  if (study_.kept == KeptFiles::kAll) return;
+  const std::set<std::string> kept = {"summary.json", "timing.json", "events.csv", study_.figures};
+  std::error_code ignored;
+  std::vector<fs::path> others;
+  for (fs::directory_iterator at(output, ignored); !ignored && at != fs::directory_iterator();
+       at.increment(ignored)) {
+    if (!kept.contains(at->path().filename().string())) others.push_back(at->path());
+  }
+  for (const fs::path& path : others) fs::remove_all(path, ignored);
+}
+
+std::optional<RunRecord> Campaign::fly(std::size_t number, const std::atomic<bool>& stop) const {
+  const PlannedRun& run = plan_.runs[number];
+  const fs::path final_folder = run_folder(number);
+  const fs::path attempt = fs::absolute(make_attempt(final_folder));
+  const AttemptGuard guard(attempt);
+  write_scenario_copy(scenario_of(run), *map_, attempt.string(), final_folder.string());
+  const std::string output = (attempt / "output").string();
+  std::error_code error;
+  fs::create_directory(output, error);
+  ProcessRequest request;
+  request.command = command_of(run, (attempt / "scenario.yaml").string(), output);
+  request.log = (attempt / "log.txt").string();
+  request.folder = fs::path(study_.path).parent_path().string();
+  request.time_limit = study_.time_limit;
+  request.memory_limit = study_.memory_limit;
+  const ProcessResult ended = run_process(request, stop);
+  // killed from outside, as by an operator or a batch system: no result of the run's own
+  if (ended.interrupted || ended.signal == SIGKILL || ended.signal == SIGTERM) return std::nullopt;
+  RunRecord record;
+  judge(ended, study_, record);
+  try {
+    read_results(output, study_.figures, record);
+  } catch (const InputError& problem) {
+    record.status = RunStatus::kFailed;
+    record.reason = "results that cannot be read";
+    write_text(attempt / "results_error.txt", std::string(problem.what()) + "\n");
+  }
+  remove_bulk(output);
+  write_text(attempt / kResult, record_json(record));
+  fs::rename(attempt, final_folder, error);
+  if (error && !fs::exists(final_folder)) {  // else somebody else has flown it meanwhile: the same
+    throw InputError(fmt::format("{}: {}", final_folder.string(), error.message()));
+  }
+  return record;
+}
+
+}  // namespace pointflight

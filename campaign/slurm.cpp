@@ -1,0 +1,138 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <filesystem>
+#include <optional>
+#include <thread>
+
+#include "campaign/engines.hpp"
+#include "campaign/process.hpp"
+#include "pointflight/core/input_error.hpp"
+#include "pointflight/core/mapped_file.hpp"
+#include "pointflight/core/output_file.hpp"
+
+namespace pointflight {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kMostTasks = 100;
+constexpr auto kLook = std::chrono::seconds(2);
+
+struct Answer {
+  int exit_code = 0;
+  std::string text;
+};
+
+/// What a command of Slurm's says.
+Answer ask(const fs::path& folder, const std::vector<std::string>& command) {
+  ProcessRequest request;
+  request.command = command;
+  request.log = (folder / ("." + command.front() + ".txt")).string();
+  request.time_limit = 120.0;
+  const std::atomic<bool> never = false;
+  const ProcessResult ended = run_process(request, never);
+  Answer answer{ended.timed_out ? -1 : ended.exit_code, {}};
+  {
+    const MappedFile file(request.log);
+    const auto bytes = file.bytes();
+    answer.text.assign(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  }
+  std::error_code ignored;
+  fs::remove(request.log, ignored);
+  return answer;
+}
+
+std::string first_line(const std::string& text) {
+  return text.substr(0, text.find('\n'));
+}
+
+bool is_job(const std::string& text) {
+  return !text.empty() && text.find_first_not_of("0123456789") == std::string::npos;
+}
+
+/// True while some of its tasks wait or run. A job that Slurm has forgotten is over; a controller
+/// that does not answer for a while is asked again.
+bool is_there(const fs::path& folder, const std::string& job) {
+  for (int tries = 0;; ++tries) {
+    const Answer answer = ask(folder, {"squeue", "--noheader", "--format=%T", "--jobs=" + job});
+    if (answer.exit_code == 0) return !answer.text.empty();
+    if (answer.text.find("Invalid job id") != std::string::npos) return false;
+    constexpr int kMostTries = 30;
+    if (tries == kMostTries) {
+      throw InputError(fmt::format("squeue: {}", first_line(answer.text)));
+    }
+    std::this_thread::sleep_for(kLook);
+  }
+}
+
+std::string submit(const Campaign& campaign,
+                   const fs::path& folder,
+                   std::size_t count,
+                   const SlurmOptions& options) {
+  const std::size_t tasks =
+      std::min(count, options.tasks > 0 ? options.tasks : std::min(count, kMostTasks));
+  const auto quoted = [](const std::string& path) {
+    return "'" + fs::absolute(path).string() + "'";
+  };
+  std::vector<std::string> command = {
+      "sbatch",
+      "--parsable",
+      "--job-name=pointflight",
+      fmt::format("--array=0-{}", tasks - 1),
+      "--output=" + (folder / "task_%a.log").string(),
+      "--chdir=" + fs::absolute(fs::path(campaign.study().path).parent_path()).string()};
+  command.insert(command.end(), options.words.begin(), options.words.end());
+  command.push_back(fmt::format("--wrap=exec {} campaign {} -o {} --share $SLURM_ARRAY_TASK_ID/{}",
+                                quoted(options.program),
+                                quoted(campaign.study().path),
+                                quoted(campaign.folder()),
+                                tasks));
+  const Answer answer = ask(folder, command);
+  // "123" or "123;cluster"
+  const std::string job = first_line(answer.text).substr(0, answer.text.find_first_of(";\n"));
+  if (answer.exit_code != 0 || !is_job(job)) {
+    throw InputError(fmt::format("sbatch: {}", first_line(answer.text)));
+  }
+  return job;
+}
+
+std::optional<std::string> job_in(const fs::path& file) {
+  std::error_code ignored;
+  if (!fs::exists(file, ignored)) return std::nullopt;
+  const MappedFile mapped(file.string());
+  const auto bytes = mapped.bytes();
+  const std::string job = first_line({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+  return is_job(job) ? std::optional(job) : std::nullopt;
+}
+
+}  // namespace
+
+std::string fly_by_slurm(const Campaign& campaign,
+                         const std::vector<std::size_t>& numbers,
+                         const SlurmOptions& options,
+                         const std::atomic<bool>& stop,
+                         const Progress& progress) {
+  const fs::path folder = fs::absolute(fs::path(campaign.folder()) / "slurm");
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) throw InputError(fmt::format("{}: {}", folder.string(), error.message()));
+  const fs::path note = folder / "job";
+  std::optional<std::string> job = job_in(note);
+  if (!job || !is_there(folder, *job)) {
+    job = submit(campaign, folder, numbers.size(), options);
+    OutputFile file(note.string());
+    file.write(*job + "\n");
+    file.commit();
+  }
+  while (!stop && is_there(folder, *job)) {
+    const auto left = static_cast<double>(campaign.missing().size());
+    const auto all = static_cast<double>(campaign.plan().runs.size());
+    report(progress, fmt::format("Slurm's job {}", *job), 1.0 - left / all);
+    std::this_thread::sleep_for(kLook);
+  }
+  return fmt::format("job {}", *job);
+}
+
+}  // namespace pointflight
