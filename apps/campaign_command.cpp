@@ -83,8 +83,8 @@ class StopWatch {
   std::thread thread_;
 };
 
-/// Says how far it is: done before, and now.
-FlightDone teller(const Campaign& campaign, std::size_t missing) {
+/// Says how far it is, `missing` to be flown here; with `others` flying too, by the folder.
+FlightDone teller(const Campaign& campaign, std::size_t missing, bool others = false) {
   struct Count {
     std::size_t done, failed = 0;
     Progress progress = terminal_progress();
@@ -92,8 +92,9 @@ FlightDone teller(const Campaign& campaign, std::size_t missing) {
   const std::size_t all = campaign.plan().runs.size();
   auto count = std::make_shared<Count>();
   count->done = all - missing;
-  return [count, all](std::size_t /*number*/, const RunRecord& record) {
+  return [&campaign, count, all, others](std::size_t /*number*/, const RunRecord& record) {
     ++count->done;
+    if (others) count->done = all - campaign.missing().size();
     count->failed += record.status == RunStatus::kFailed ? 1 : 0;
     const std::string what =
         count->failed == 0 ? "flying" : fmt::format("flying, {} failed", count->failed);
@@ -296,7 +297,7 @@ int fly_by_mpi(const CampaignFlags& flags, const std::vector<Condition>& conditi
   const std::vector<std::size_t> missing = campaign->missing();
   mpi.meet();  // nobody flies while others look what is missing
   const StopWatch watch;
-  const FlightDone done = is_first ? teller(*campaign, missing.size()) : FlightDone();
+  const FlightDone done = is_first ? teller(*campaign, missing.size(), true) : FlightDone();
   for (std::size_t i = 0; !watch.stop() && (i = mpi.next()) < missing.size();) {
     const auto record = campaign->fly(missing[i], watch.stop());
     if (record && done) done(missing[i], *record);

@@ -307,7 +307,8 @@ std::optional<RunRecord> Campaign::fly(std::size_t number, const std::atomic<boo
   request.memory_limit = study_.memory_limit;
   const ProcessResult ended = run_process(request, stop);
   // killed from outside, as by an operator or a batch system: no result of the run's own
-  if (ended.interrupted || ended.signal == SIGKILL || ended.signal == SIGTERM) return std::nullopt;
+  const bool was_killed = ended.signal == SIGKILL || ended.signal == SIGTERM;
+  if (ended.interrupted || (was_killed && !ended.timed_out)) return std::nullopt;
   RunRecord record;
   judge(ended, study_, record);
   try {

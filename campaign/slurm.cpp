@@ -82,7 +82,7 @@ std::string submit(const Campaign& campaign,
       "--job-name=pointflight",
       fmt::format("--array=0-{}", tasks - 1),
       "--output=" + (folder / "task_%a.log").string(),
-      "--chdir=" + fs::absolute(fs::path(campaign.study().path).parent_path()).string()};
+      "--chdir=" + fs::absolute(campaign.study().path).parent_path().string()};
   command.insert(command.end(), options.words.begin(), options.words.end());
   command.push_back(fmt::format("--wrap=exec {} campaign {} -o {} --share $SLURM_ARRAY_TASK_ID/{}",
                                 quoted(options.program),

@@ -75,7 +75,8 @@ class LiveServer::Impl::HttpSession : public std::enable_shared_from_this<HttpSe
     client->start(request, chosen);
   }
 
-  /// Made beside the server's thread: a large map's overview takes a while, and viewers' frames go on.
+  /// Made beside the server's thread: a large map's overview takes a while, and viewers' frames go
+  /// on.
   void serve(const Request& request) {
     const std::string_view target = as_view(request.target());
     net::post(server_.makers_,
@@ -83,7 +84,8 @@ class LiveServer::Impl::HttpSession : public std::enable_shared_from_this<HttpSe
                 std::optional<WebContent> content;
                 std::string failure;
                 try {
-                  if (self->server_.options_.content) content = self->server_.options_.content(path);
+                  if (self->server_.options_.content)
+                    content = self->server_.options_.content(path);
                 } catch (const std::exception& error) {
                   failure = error.what();
                 }

@@ -2,6 +2,10 @@
 // folder in the loop with the simulation, through the public interface only.
 //
 //   fly_with_planner MAP.pfmap -o RUN [--seed N] [--seeds N] [--obstacles N] [--threads N]
+//   fly_with_planner SCENARIO.yaml -o RUN [--threads N]
+//
+// A scenario's first vehicle is flown to its last waypoint, with the scenario's own seed: as a
+// campaign's command (docs/campaigns.md).
 //
 // With --seeds N it flies the seeds 1 .. N and says for each how it went; a seed that fails prints
 // the command that replays it. Exit code 0: all arrived without a collision.
@@ -115,6 +119,19 @@ Scenario scenario_for(const Options& options, const SurfelMap& map, int seed, Ve
   return s;
 }
 
+/// A scenario of somebody else's, whose mission only says where to.
+Scenario scenario_from(const std::string& path, Vector3d& goal) {
+  Scenario s = load_scenario(path);
+  MissionSettings& mission = s.vehicles.front().mission;
+  if (mission.waypoints.empty()) {
+    throw InputError(path + ": mission.waypoints: names no place to fly to");
+  }
+  goal = mission.waypoints.back();
+  mission.waypoints.clear();
+  if (s.duration <= 0.0) s.duration = 120.0;
+  return s;
+}
+
 struct Outcome {
   bool arrived = false;
   std::uint64_t collisions = 0;
@@ -124,13 +141,11 @@ struct Outcome {
   double planning_ms = 0.0;  ///< The longest of all updates.
 };
 
-Outcome fly(const Options& options,
+Outcome fly(const Scenario& scenario,
+            const Vector3d& goal,
             const std::shared_ptr<const SurfelMap>& map,
-            int seed,
             const std::string& output,
             const Executor& executor) {
-  Vector3d goal;
-  const Scenario scenario = scenario_for(options, *map, seed, goal);
   Simulation simulation(scenario, map, executor);
   std::unique_ptr<FlightRecorder> recorder;
   if (!output.empty()) recorder = std::make_unique<FlightRecorder>(output, simulation);
@@ -207,11 +222,36 @@ Options parse(int argc, char** argv) {
   return options;
 }
 
+/// A line about it; true where it arrived without a collision.
+bool say(std::int64_t seed, const Outcome& o) {
+  std::printf(
+      "seed %lld: %s, %.1f m in %.1f s, closest %.2f m, %llu collision%s, a plan in %.0f ms at "
+      "most\n",
+      static_cast<long long>(seed),
+      o.arrived ? "arrived" : "did not arrive",
+      o.flown,
+      o.time,
+      o.closest,
+      static_cast<unsigned long long>(o.collisions),
+      o.collisions == 1 ? "" : "s",
+      o.planning_ms);
+  std::fflush(stdout);
+  return o.arrived && o.collisions == 0;
+}
+
+int fly_scenario(const Options& options, const Executor& executor) {
+  Vector3d goal;
+  const Scenario scenario = scenario_from(options.map, goal);
+  const Outcome outcome = fly(scenario, goal, scenario.open_map(), options.output, executor);
+  return say(scenario.seed, outcome) ? 0 : 1;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) try {
   const Options options = parse(argc, argv);
   const Executor executor(options.threads);
+  if (options.map.ends_with(".yaml")) return fly_scenario(options, executor);
   const auto map = SurfelMap::open(options.map);
   int failed = 0;
   const int first = options.seeds > 0 ? 1 : options.seed;
@@ -219,21 +259,9 @@ int main(int argc, char** argv) try {
   for (int seed = first; seed <= last; ++seed) {
     // of many seeds only those that fail are worth their files: replay them
     const std::string output = options.seeds > 0 ? std::string() : options.output;
-    const Outcome o = fly(options, map, seed, output, executor);
-    const bool fine = o.arrived && o.collisions == 0;
-    std::printf(
-        "seed %d: %s, %.1f m in %.1f s, closest %.2f m, %llu collision%s, a plan in %.0f ms at "
-        "most\n",
-        seed,
-        o.arrived ? "arrived" : "did not arrive",
-        o.flown,
-        o.time,
-        o.closest,
-        static_cast<unsigned long long>(o.collisions),
-        o.collisions == 1 ? "" : "s",
-        o.planning_ms);
-    std::fflush(stdout);
-    if (fine) continue;
+    Vector3d goal;
+    const Scenario scenario = scenario_for(options, *map, seed, goal);
+    if (say(seed, fly(scenario, goal, map, output, executor))) continue;
     ++failed;
     std::printf("  replay: %s %s -o replay_%d --seed %d --obstacles %d\n",
                 argv[0],

@@ -1,0 +1,151 @@
+// Studies as files, the flights that they mean, and scenarios with other values.
+#include "campaign/study.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <set>
+
+#include "tests/support.hpp"
+
+namespace pointflight {
+namespace {
+
+using testing::error_of;
+using testing::expect_contains;
+
+TEST(Study, IsReadWithAllItsKeys) {
+  const Study study = parse_study(R"(scenario: forest.yaml
+seeds: {from: 3, to: 5}
+grid:
+  mission.speed: [1, 2.5]
+  obstacles[0].count: {from: 0, to: 100, n: 6}
+  vehicle.start: [[0, 0, 1], [1, 2, 3]]
+draws:
+  count: 2
+  seed: 9
+  air.wind.mean: {uniform: [0, 5]}
+command: [./planner, --scenario, "{scenario}", -o, "{output}"]
+limits: {time: 60, memory: 2e9}
+figures: figures.json
+keep: all
+)",
+                                  "s.yaml");
+  EXPECT_EQ(study.scenario, "forest.yaml");
+  EXPECT_EQ(study.seeds, (std::vector<std::int64_t>{3, 4, 5}));
+  ASSERT_EQ(study.grid.size(), 3u);
+  EXPECT_EQ(study.grid[0].values, (std::vector<std::string>{"1", "2.5"}));
+  EXPECT_EQ(study.grid[1].values, (std::vector<std::string>{"0", "20", "40", "60", "80", "100"}));
+  EXPECT_EQ(study.grid[2].values, (std::vector<std::string>{"[0, 0, 1]", "[1, 2, 3]"}));
+  EXPECT_EQ(study.grid[1].line, 5);
+  EXPECT_EQ(study.draw_count, 2u);
+  EXPECT_EQ(study.time_limit, 60.0);
+  EXPECT_EQ(study.memory_limit, 2e9);
+  EXPECT_EQ(study.kept, KeptFiles::kAll);
+  const Plan plan = plan_of(study);
+  EXPECT_EQ(plan.runs.size(), 2u * 6 * 2 * 2 * 3);
+  EXPECT_EQ(plan.point_values.size(), 24u);
+  EXPECT_EQ(plan.grid_keys, 3u);
+  EXPECT_EQ(plan.keys.back(), "air.wind.mean");
+}
+
+TEST(Study, MistakesAreSaidWithTheirLine) {
+  const auto error = [](const std::string& text) {
+    return error_of([&] { parse_study(text, "s.yaml"); });
+  };
+  expect_contains(error("seeds: 3\n"), "s.yaml:1: scenario: is missing");
+  expect_contains(error("scenario: a\nseed: 3\n"),
+                  "s.yaml:2: seed: unknown key; did you mean 'seeds'?");
+  expect_contains(error("scenario: a\nseeds: [1, 1]\n"), "has one twice");
+  expect_contains(error("scenario: a\nseeds: {from: 3}\n"), "wants `from` and `to`");
+  expect_contains(error("scenario: a\nseeds: 1.5\n"), "whole number");
+  expect_contains(error("scenario: a\ngrid:\n  x: {from: 0, to: 1}\n"), "s.yaml:3: x: wants");
+  expect_contains(error("scenario: a\ngrid:\n  x: []\n"), "has no value");
+  expect_contains(error("scenario: a\ngrid:\n  x: 3\n"), "is to be a list");
+  expect_contains(error("scenario: a\ngrid: {seed: [1]}\n"), "is given by `seeds`");
+  expect_contains(error("scenario: a\ndraws: {count: 1}\n"), "names no key");
+  expect_contains(error("scenario: a\ndraws: {x: {uniform: [0, 1]}}\n"), "wants `count`");
+  expect_contains(error("scenario: a\ndraws: {count: 1, x: {uniform: [2, 1]}}\n"), "number from 2");
+  expect_contains(error("scenario: a\ndraws: {count: 1, x: {log_uniform: [0, 1]}}\n"), "above 0");
+  expect_contains(error("scenario: a\ncommand: [planner]\n"), "{scenario}");
+  expect_contains(error("scenario: a\nkeep: some\n"), "`results` or `all`");
+  expect_contains(error("scenario: [a\n"), "s.yaml:");
+  expect_contains(error("- a\n"), "no study");
+  Study many;
+  many.seeds.resize(1000);
+  many.grid = {{"a", std::vector<std::string>(1000, "1"), 1}, {"b", {100, "1"}, 2}};
+  expect_contains(error_of([&] { plan_of(many); }), "1e+08 flights");
+}
+
+TEST(Plan, GoesThroughSeedsThenDrawsThenTheLastAxis) {
+  Study study;
+  study.seeds = {7, 8};
+  study.grid = {{"a", {"1", "2"}, 0}, {"b", {"x", "y"}, 0}};
+  const Plan plan = plan_of(study);
+  ASSERT_EQ(plan.runs.size(), 8u);
+  EXPECT_EQ(plan.runs[0].seed, 7);
+  EXPECT_EQ(plan.runs[1].seed, 8);
+  EXPECT_EQ(plan.runs[2].values, (std::vector<std::string>{"1", "y"}));
+  EXPECT_EQ(plan.runs[5].values, (std::vector<std::string>{"2", "x"}));
+  EXPECT_EQ(plan.runs[5].point, 2u);
+  for (std::size_t i = 0; i < 8; ++i) EXPECT_EQ(plan.runs[i].number, i);
+}
+
+TEST(Plan, DrawsAreOfTheirDistributionAndTheSameAtEachPoint) {
+  Study study;
+  study.seeds = {1};
+  study.grid = {{"a", {"1", "2"}, 0}};
+  study.draw_count = 4000;
+  StudyDraw uniform{"u", 2.0, 6.0, false, false, {}, 0};
+  StudyDraw logarithmic{"l", 0.01, 100.0, true, false, {}, 0};
+  StudyDraw whole{"w", 1.0, 3.0, false, true, {}, 0};
+  StudyDraw choice{"c", 0.0, 0.0, false, false, {"p", "q"}, 0};
+  study.draws = {uniform, logarithmic, whole, choice};
+  const Plan plan = plan_of(study);
+  ASSERT_EQ(plan.runs.size(), 8000u);
+  double sum = 0.0;
+  double logs = 0.0;
+  int twos = 0;
+  int ps = 0;
+  for (std::size_t i = 0; i < 4000; ++i) {
+    const PlannedRun& run = plan.runs[i];
+    const double u = std::stod(run.values[1]);
+    const double l = std::stod(run.values[2]);
+    EXPECT_TRUE(u >= 2.0 && u <= 6.0 && l >= 0.01 && l <= 100.0);
+    sum += u;
+    logs += std::log10(l);
+    twos += run.values[3] == "2" ? 1 : 0;
+    ps += run.values[4] == "p" ? 1 : 0;
+    for (std::size_t k = 1; k < 5; ++k) EXPECT_EQ(run.values[k], plan.runs[i + 4000].values[k]);
+  }
+  // within four deviations
+  EXPECT_NEAR(sum / 4000, 4.0, 4.0 * 4.0 / std::sqrt(12.0 * 4000));
+  EXPECT_NEAR(logs / 4000, 0.0, 4.0 * 4.0 / std::sqrt(12.0 * 4000));
+  EXPECT_NEAR(twos, 4000.0 / 3.0, 4.0 * std::sqrt(4000.0 * 2.0 / 9.0));
+  EXPECT_NEAR(ps, 2000.0, 4.0 * std::sqrt(1000.0));
+}
+
+TEST(EditedScenario, HasOtherValuesAndKeepsTheRest) {
+  const std::string text = "map: m.pfmap\nmission:\n  speed: 2\nobstacles:\n  - {count: 3}\n";
+  const std::string edited =
+      edited_scenario(text,
+                      {"mission.speed", "obstacles[0].count", "air.wind.mean", "vehicle.start"},
+                      {"4", "7", "[1, 0, 0]", "[0, 0, 2]"});
+  expect_contains(edited, "map: m.pfmap");
+  expect_contains(edited, "speed: 4");
+  expect_contains(edited, "count: 7");
+  expect_contains(edited, "mean: [1, 0, 0]");
+  expect_contains(edited, "start: [0, 0, 2]");
+  const auto error = [&](const std::string& key) {
+    return error_of([&] { edited_scenario(text, {key}, {"1"}); });
+  };
+  expect_contains(error("obstacles[1].count"), "the scenario has 1 of these");
+  expect_contains(error("lidars[0].model"), "the scenario has 0 of these");
+  expect_contains(error("map.x"), "has no keys");
+  for (const char* key : {"", ".", "a.", "a..b", "[0]", "a[", "a[x]", "a[-1]", "a[0]b", "a[1.5]"}) {
+    EXPECT_NE(error(key), "") << key;
+  }
+}
+
+}  // namespace
+}  // namespace pointflight
