@@ -17,12 +17,12 @@
 namespace pointflight::apps {
 namespace {
 
-constexpr double kWidth = 520.0;  // of a panel's plot, pixels
-constexpr double kHeight = 190.0;
-constexpr double kTop = 76.0;
-constexpr double kGap = 74.0;
-constexpr double kMargin = 24.0;
-constexpr std::size_t kMostLines = 8;
+constexpr double kRatesWidth = 520.0;  // of a panel's plot, pixels
+constexpr double kRatesHeight = 190.0;
+constexpr double kRatesTop = 76.0;
+constexpr double kRatesGap = 74.0;
+constexpr double kRatesMargin = 24.0;
+constexpr std::size_t kMostPlotLines = 8;
 
 using Runs = std::vector<const RunRecord*>;
 
@@ -48,7 +48,7 @@ std::vector<Line> lines_over(const Plan& plan, const std::vector<Runs>& points, 
     if (found == lines.end()) found = lines.insert(lines.end(), Line{name, {}});
     found->by_value[x] = points[point];
   }
-  if (lines.size() > kMostLines) lines.resize(kMostLines);
+  if (lines.size() > kMostPlotLines) lines.resize(kMostPlotLines);
   return lines;
 }
 
@@ -151,15 +151,15 @@ std::unique_ptr<Canvas> plot_of(const Plan& plan,
   }
   const double left = kLeftRoom + 6.0;
   const double legend_height =
-      legend.empty() ? 0.0 : kLegendRow * legend_rows(legend, kWidth) + 8.0;
-  const double top = kTop + legend_height;
+      legend.empty() ? 0.0 : kLegendRow * legend_rows(legend, kRatesWidth) + 8.0;
+  const double top = kRatesTop + legend_height;
   auto canvas = std::make_unique<Canvas>(
-      static_cast<int>(left + kWidth + kMargin),
-      static_cast<int>(top + static_cast<double>(panels.size()) * (kHeight + kGap)),
+      static_cast<int>(left + kRatesWidth + kRatesMargin),
+      static_cast<int>(top + static_cast<double>(panels.size()) * (kRatesHeight + kRatesGap)),
       kPaper,
       true);
-  canvas->text_within(left, 30.0, plan.keys[axis], kTitleText, kWidth, kInk);
-  if (!legend.empty()) draw_legend(*canvas, legend, left, 52.0, kWidth);
+  canvas->text_within(left, 30.0, plan.keys[axis], kTitleText, kRatesWidth, kInk);
+  if (!legend.empty()) draw_legend(*canvas, legend, left, 52.0, kRatesWidth);
   double low_x = lines[0].by_value.begin()->first;
   double high_x = low_x;
   for (const Line& line : lines) {
@@ -172,9 +172,9 @@ std::unique_ptr<Canvas> plot_of(const Plan& plan,
     const double high =
         panel.is_rate ? 100.0 : std::max(0.1, 1.05 * highest(lines, panel.estimate));
     const Plot plot{left,
-                    top + static_cast<double>(i) * (kHeight + kGap),
-                    kWidth,
-                    kHeight,
+                    top + static_cast<double>(i) * (kRatesHeight + kRatesGap),
+                    kRatesWidth,
+                    kRatesHeight,
                     {low_x - room, high_x + room, plan.keys[axis], Steps::kDecimal},
                     {0.0, high, panel.label, Steps::kDecimal}};
     canvas->text(left, plot.top - 9.0, panel.caption, kTickText, kDim);

@@ -48,6 +48,7 @@ struct FlyFlags {
   bool force = false;
   bool snapshot = false;
   bool no_scans = false;
+  bool no_picture = false;
   bool json = false;
   RosFlags ros;
   ViewFlags view;
@@ -215,7 +216,7 @@ void print_result(const FlyFlags& flags, const Simulation& simulation, double wa
              reason.empty() ? "" : ": " + reason);
   for (std::size_t v = 0; v < simulation.vehicle_count(); ++v) print_vehicle(simulation, v);
   fmt::print("  real-time factor  {:.1f}\n", to_seconds(simulation.time()) / wall);
-  if (flags.output.empty()) return;
+  if (flags.output.empty() || flags.no_picture) return;
   fmt::print("  picture           {}\n", (fs::path(flags.output) / "overview.png").string());
 }
 
@@ -271,7 +272,10 @@ int fly(const FlyFlags& flags) {
   std::optional<FolderLink> folder;
   if (!flags.output.empty()) {
     const Existing existing = flags.force ? Existing::kReplace : Existing::kRefuse;
-    folder.emplace(flags.output, simulation, loop, executor.threads(), existing);
+    folder.emplace(FolderOptions{flags.output, existing, !flags.no_picture},
+                   simulation,
+                   loop,
+                   executor.threads());
     loop.add(*folder);
   }
   TerminalLink terminal(simulation);
@@ -330,6 +334,7 @@ void add_fly_command(CLI::App& parent, int& exit_code) {
                 "Write into a folder that is not empty: an earlier run's files go, others stay; "
                 "and over recordings");
   app->add_flag("--no-scans", flags->no_scans, "Do not write scans as PCD");
+  app->add_flag("--no-picture", flags->no_picture, "Do not draw overview.png; `picture` can later");
   app->add_flag("--json", flags->json, "summary.json on stdout, with the real-time factor");
   app->add_flag(
       "--snapshot", flags->snapshot, "All beams of a scan from one pose, as in the paper");

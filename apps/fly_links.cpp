@@ -45,20 +45,20 @@ void TerminalLink::say(const VehicleEvent& event) {
                                        event.words));
 }
 
-FolderLink::FolderLink(const std::string& folder,
+FolderLink::FolderLink(const FolderOptions& options,
                        const Simulation& simulation,
                        const RunLoop& loop,
-                       int threads,
-                       Existing existing)
+                       int threads)
     : simulation_(simulation),
       loop_(loop),
       threads_(threads),
-      recorder_(folder, simulation, existing) {}
+      draws_(options.draws),
+      recorder_(options.folder, simulation, options.existing) {}
 
 void FolderLink::on_sample(const Sample& sample) {
   if (ended_) return;
   recorder_.on_sample(sample);
-  picture_.on_sample(sample);
+  if (draws_) picture_.on_sample(sample);
 }
 
 void FolderLink::on_reset(SimTime /*reached*/) {
@@ -68,8 +68,10 @@ void FolderLink::on_reset(SimTime /*reached*/) {
 void FolderLink::close() {
   if (ended_) return;
   ended_ = true;
-  describe_run(simulation_, picture_);
-  draw_overview(simulation_.map(), picture_, recorder_.path_for("overview.png"));
+  if (draws_) {
+    describe_run(simulation_, picture_);
+    draw_overview(simulation_.map(), picture_, recorder_.path_for("overview.png"));
+  }
   write_timing();
   recorder_.finish(simulation_);
 }

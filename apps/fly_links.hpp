@@ -27,15 +27,21 @@ class TerminalLink : public Link {
   int events_ = 0;
 };
 
+/// What a run leaves.
+struct FolderOptions {
+  std::string folder;
+  Existing existing;
+  bool draws = true;  ///< overview.png
+};
+
 /// Files and picture of a run. A run that starts again ends its files.
 class FolderLink : public Link {
  public:
   /// All must outlive it; `loop` knows how long the run took, on `threads`.
-  FolderLink(const std::string& folder,
+  FolderLink(const FolderOptions& options,
              const Simulation& simulation,
              const RunLoop& loop,
-             int threads,
-             Existing existing);
+             int threads);
   void on_sample(const Sample& sample) override;
   void on_reset(SimTime reached) override;
   void close() override;
@@ -46,6 +52,7 @@ class FolderLink : public Link {
   const Simulation& simulation_;
   const RunLoop& loop_;
   int threads_;
+  bool draws_;
   FlightRecorder recorder_;
   RunPicture picture_;
   bool ended_ = false;

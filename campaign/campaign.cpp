@@ -256,7 +256,7 @@ std::vector<std::string> Campaign::command_of(const PlannedRun& run,
                                               const std::string& output) const {
   if (study_.command.empty()) {
     // as many at once as there are cores: one thread each
-    return {program_, "fly", scenario, "-o", output, "--force", "--threads", "1"};
+    return {program_, "fly", scenario, "-o", output, "--force", "--threads", "1", "--no-picture"};
   }
   std::vector<std::string> command = study_.command;
   for (std::string& word : command) {

@@ -101,8 +101,9 @@ pid_t start_process(const ProcessRequest& request) {
   for (const std::string& word : request.command)
     arguments.push_back(const_cast<char*>(word.c_str()));
   arguments.push_back(nullptr);
-  const Descriptor log(open(request.log.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
-  if (log.get() < 0) throw InputError(fmt::format("{}: {}", request.log, reason(errno)));
+  const Descriptor log_file(
+      open(request.log.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
+  if (log_file.get() < 0) throw InputError(fmt::format("{}: {}", request.log, reason(errno)));
   const Descriptor null(open("/dev/null", O_RDONLY | O_CLOEXEC));
   std::array<int, 2> ends = {-1, -1};
   if (pipe2(ends.data(), O_CLOEXEC) != 0) {
@@ -113,7 +114,7 @@ pid_t start_process(const ProcessRequest& request) {
   const Start start{program.c_str(),
                     arguments.data(),
                     request.folder.c_str(),
-                    log.get(),
+                    log_file.get(),
                     null.get(),
                     ends[1],
                     request.memory_limit,

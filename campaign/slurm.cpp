@@ -18,7 +18,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kMostTasks = 100;
-constexpr auto kLook = std::chrono::seconds(2);
+constexpr auto kAskBetween = std::chrono::seconds(2);
 
 struct Answer {
   int exit_code = 0;
@@ -63,7 +63,7 @@ bool is_there(const fs::path& folder, const std::string& job) {
     if (tries == kMostTries) {
       throw InputError(fmt::format("squeue: {}", first_line(answer.text)));
     }
-    std::this_thread::sleep_for(kLook);
+    std::this_thread::sleep_for(kAskBetween);
   }
 }
 
@@ -130,7 +130,7 @@ std::string fly_by_slurm(const Campaign& campaign,
     const auto left = static_cast<double>(campaign.missing().size());
     const auto all = static_cast<double>(campaign.plan().runs.size());
     report(progress, fmt::format("Slurm's job {}", *job), 1.0 - left / all);
-    std::this_thread::sleep_for(kLook);
+    std::this_thread::sleep_for(kAskBetween);
   }
   return fmt::format("job {}", *job);
 }
