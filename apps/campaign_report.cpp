@@ -7,7 +7,7 @@
 #include <functional>
 #include <map>
 #include <optional>
-#include <set>
+#include <string_view>
 #include <utility>
 
 #include "apps/pictures.hpp"
@@ -108,7 +108,7 @@ struct Panel {
   bool is_rate = true;
 };
 
-std::vector<Panel> panels_for(const Plan& plan, const Results& results) {
+std::vector<Panel> panels_for(const Results& results) {
   std::vector<Panel> panels = {
       {"completed: share and its 95 % interval", "completed (%)", rate(Counted::kCompleted)}};
   Runs all;
@@ -124,25 +124,29 @@ std::vector<Panel> panels_for(const Plan& plan, const Results& results) {
                       closest_approach,
                       false});
   }
-  static_cast<void>(plan);
   return panels;
 }
 
-double highest(const std::vector<Line>& lines, const Estimator& estimate) {
-  double high = 0.0;
+/// What holds all intervals, and zero.
+std::pair<double, double> extent(const std::vector<Line>& lines, const Estimator& estimate) {
+  std::pair<double, double> all = {0.0, 0.0};
   for (const Line& line : lines) {
     for (const auto& [x, runs] : line.by_value) {
-      if (const auto e = estimate(runs)) high = std::max(high, e->high);
+      const auto e = estimate(runs);
+      if (!e) continue;
+      all.first = std::min(all.first, e->low);
+      all.second = std::max(all.second, e->high);
     }
   }
-  return high;
+  const double room = std::max(0.1, 0.05 * (all.second - all.first));
+  return {all.first < 0.0 ? all.first - room : 0.0, all.second + room};
 }
 
 std::unique_ptr<Canvas> plot_of(const Plan& plan,
                                 const Results& results,
                                 std::size_t axis,
                                 const std::vector<Line>& lines) {
-  const std::vector<Panel> panels = panels_for(plan, results);
+  const std::vector<Panel> panels = panels_for(results);
   std::vector<LegendEntry> legend;
   for (std::size_t i = 0; i < lines.size() && lines.size() > 1; ++i) {
     legend.push_back({lines[i].name, 14.0, [i](Canvas& c, double x, double y) {
@@ -169,14 +173,13 @@ std::unique_ptr<Canvas> plot_of(const Plan& plan,
   const double room = 0.04 * (high_x - low_x);
   for (std::size_t i = 0; i < panels.size(); ++i) {
     const Panel& panel = panels[i];
-    const double high =
-        panel.is_rate ? 100.0 : std::max(0.1, 1.05 * highest(lines, panel.estimate));
+    const auto [low, high] = panel.is_rate ? std::pair(0.0, 100.0) : extent(lines, panel.estimate);
     const Plot plot{left,
                     top + static_cast<double>(i) * (kRatesHeight + kRatesGap),
                     kRatesWidth,
                     kRatesHeight,
                     {low_x - room, high_x + room, plan.keys[axis], Steps::kDecimal},
-                    {0.0, high, panel.label, Steps::kDecimal}};
+                    {low, high, panel.label, Steps::kDecimal}};
     canvas->text(left, plot.top - 9.0, panel.caption, kTickText, kDim);
     draw_estimates(*canvas, plot, lines, panel.estimate);
   }
@@ -197,6 +200,18 @@ std::string escaped(const std::string& text) {
     }
   }
   return out;
+}
+
+/// A picture as part of a page, where names are the page's: each picture's get a word in front.
+std::string inlined(std::string svg, const std::string& prefix) {
+  svg.erase(0, std::min(svg.find("<svg"), svg.size()));
+  for (const std::string_view before : {"id=\"", "href=\"#", "url(#"}) {
+    for (std::size_t at = 0; (at = svg.find(before, at)) != std::string::npos;) {
+      at += before.size();
+      svg.insert(at, prefix);
+    }
+  }
+  return svg;
 }
 
 std::string row(const std::vector<std::string>& cells, const char* tag = "td") {
@@ -278,25 +293,26 @@ std::string campaign_html(const Campaign& campaign,
       "0 "
       "1em; color: #26262e; }\n"
       "table { border-collapse: collapse; margin: 1em 0; font-variant-numeric: tabular-nums; }\n"
-      "td, th { border-bottom: 1px solid #ddd; padding: 3px 12px 3px 0; text-align: left; }\n"
+      "td, th { border-bottom: 1px solid #ddd; padding: 3px 12px 3px 0; text-align: left; "
+      "white-space: nowrap; }\n"
       "svg { max-width: 100%; height: auto; display: block; margin: 1em 0; }\n"
       "code, pre { background: #f3f3f5; padding: 1px 4px; border-radius: 3px; }\n"
       "pre { padding: 8px; overflow-x: auto; }\n</style></head><body>\n";
   html += fmt::format(
       "<h1>{} flights of {}</h1>\n", results.size(), escaped(campaign.study().scenario));
+  const std::size_t draws = campaign.study().draw_count;
   html += fmt::format(
-      "<p>{} planned: {} points, {} draws, {} seeds. Completed {}; failed {}. "
+      "<p>{} planned: {} points of the grid, {}{} seeds. Completed {}; failed {}. "
       "Rates with their 95 % intervals by Wilson.</p>\n",
       plan.runs.size(),
       plan.point_values.size(),
-      campaign.study().draw_count,
+      draws > 1 ? fmt::format("{} draws, ", draws) : "",
       campaign.study().seeds.size(),
       percent(rate_of(all, Counted::kCompleted)),
       percent(rate_of(all, Counted::kFailed)));
   html += points_table(plan, by_point(plan, results));
-  for (const CampaignPlot& plot : plots) {
-    const std::string svg = plot.canvas->svg();
-    html += svg.substr(std::min(svg.find("<svg"), svg.size())) + "\n";
+  for (std::size_t i = 0; i < plots.size(); ++i) {
+    html += inlined(plots[i].canvas->svg(), fmt::format("plot{}-", i)) + "\n";
   }
   html += "<h2>All flights</h2>\n" + spreads_table(all);
   if (!failed.empty()) {
