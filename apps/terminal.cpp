@@ -3,15 +3,15 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <atomic>
-#include <cctype>
 #include <chrono>
 #include <cmath>
 #include <csignal>
 #include <cstdio>
 #include <fstream>
 #include <memory>
+
+#include "pointflight/core/shell_words.hpp"
 
 namespace pointflight::apps {
 namespace {
@@ -71,14 +71,7 @@ std::string command_line() {
   std::ifstream file("/proc/self/cmdline");
   std::string line;
   for (std::string word; std::getline(file, word, '\0');) {
-    const bool plain = !word.empty() && std::all_of(word.begin(), word.end(), [](unsigned char c) {
-      return std::isalnum(c) != 0 ||
-             std::string_view("/._-=,:+@%").find(static_cast<char>(c)) != std::string_view::npos;
-    });
-    std::string quoted;
-    for (const char c : word) quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
-    if (!line.empty()) line += ' ';
-    line += plain ? word : '\'' + quoted + '\'';
+    line += (line.empty() ? "" : " ") + shell_word(word);
   }
   return line;
 }

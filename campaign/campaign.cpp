@@ -18,6 +18,7 @@
 #include "pointflight/core/mapped_file.hpp"
 #include "pointflight/core/output_file.hpp"
 #include "pointflight/core/resources.hpp"
+#include "pointflight/core/shell_words.hpp"
 #include "pointflight/core/version.hpp"
 #include "pointflight/sim/scenario.hpp"
 #include "pointflight/sim/scenario_copy.hpp"
@@ -80,15 +81,6 @@ void replace_all(std::string& text, std::string_view what, const std::string& by
   for (std::size_t at = 0; (at = text.find(what, at)) != std::string::npos; at += by.size()) {
     text.replace(at, what.size(), by);
   }
-}
-
-std::string quoted(const std::string& word) {
-  constexpr const char* kPlain =
-      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_./=:,+@%";
-  if (!word.empty() && word.find_first_not_of(kPlain) == std::string::npos) return word;
-  std::string out = word;
-  replace_all(out, "'", "'\\''");
-  return "'" + out + "'";
 }
 
 void judge(const ProcessResult& ended, const Study& study, RunRecord& record) {
@@ -272,7 +264,7 @@ std::string Campaign::repeating_command(std::size_t number) const {
   std::string line;
   for (const std::string& word :
        command_of(plan_.runs[number], (folder / "scenario.yaml").string(), "again")) {
-    line += (line.empty() ? "" : " ") + quoted(word);
+    line += (line.empty() ? "" : " ") + shell_word(word);
   }
   return line;
 }

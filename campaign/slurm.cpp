@@ -11,6 +11,7 @@
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/core/mapped_file.hpp"
 #include "pointflight/core/output_file.hpp"
+#include "pointflight/core/shell_words.hpp"
 
 namespace pointflight {
 namespace {
@@ -73,9 +74,7 @@ std::string submit(const Campaign& campaign,
                    const SlurmOptions& options) {
   const std::size_t tasks =
       std::min(count, options.tasks > 0 ? options.tasks : std::min(count, kMostTasks));
-  const auto quoted = [](const std::string& path) {
-    return "'" + fs::absolute(path).string() + "'";
-  };
+  const auto word = [](const std::string& path) { return shell_word(fs::absolute(path).string()); };
   std::vector<std::string> command = {
       "sbatch",
       "--parsable",
@@ -85,9 +84,9 @@ std::string submit(const Campaign& campaign,
       "--chdir=" + fs::absolute(campaign.study().path).parent_path().string()};
   command.insert(command.end(), options.words.begin(), options.words.end());
   command.push_back(fmt::format("--wrap=exec {} campaign {} -o {} --share $SLURM_ARRAY_TASK_ID/{}",
-                                quoted(options.program),
-                                quoted(campaign.study().path),
-                                quoted(campaign.folder()),
+                                word(options.program),
+                                word(campaign.study().path),
+                                word(campaign.folder()),
                                 tasks));
   const Answer answer = ask(folder, command);
   // "123" or "123;cluster"
