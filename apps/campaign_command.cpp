@@ -86,7 +86,7 @@ class StopWatch {
 /// Says how far it is, `missing` to be flown here; with `others` flying too, by the folder.
 FlightDone teller(const Campaign& campaign, std::size_t missing, bool others = false) {
   struct Count {
-    std::size_t done, failed = 0;
+    std::size_t done = 0, failed = 0;
     Progress progress = terminal_progress();
   };
   const std::size_t all = campaign.plan().runs.size();

@@ -3,20 +3,11 @@
 #include <cstdint>
 #include <string>
 
-#include "pointflight/core/input_error.hpp"
 #include "recording/mcap_reader.hpp"
 #include "recording/mcap_timeline.hpp"
+#include "tests/fuzz/one_line.hpp"
 
 namespace {
-
-template <class Action>
-void expect_one_line(const Action& action) {
-  try {
-    action();
-  } catch (const pointflight::InputError& error) {
-    if (std::string(error.what()).find('\n') != std::string::npos) __builtin_trap();
-  }
-}
 
 void read_from_any_time(std::span<const std::byte> bytes) {
   const auto recording = pointflight::timed_mcap(bytes, "input.mcap");
@@ -38,11 +29,11 @@ void read_from_any_time(std::span<const std::byte> bytes) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const auto bytes = std::as_bytes(std::span(data, size));
-  expect_one_line([&] {
+  pointflight::expect_one_line([&] {
     std::size_t sum = 0;
     pointflight::read_mcap_bytes(
         bytes, "input.mcap", [&](const pointflight::RecordedMessage& m) { sum += m.data.size(); });
   });
-  expect_one_line([&] { read_from_any_time(bytes); });
+  pointflight::expect_one_line([&] { read_from_any_time(bytes); });
   return 0;
 }

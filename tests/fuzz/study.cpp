@@ -6,18 +6,9 @@
 #include <string>
 
 #include "campaign/run_record.hpp"
-#include "pointflight/core/input_error.hpp"
+#include "tests/fuzz/one_line.hpp"
 
 namespace {
-
-template <class Action>
-void expect_one_line(const Action& action) {
-  try {
-    action();
-  } catch (const pointflight::InputError& error) {
-    if (std::string(error.what()).find('\n') != std::string::npos) __builtin_trap();
-  }
-}
 
 void plan(std::string_view text) {
   const pointflight::Study study = pointflight::parse_study(text, "study.yaml");
@@ -36,7 +27,7 @@ void plan(std::string_view text) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::string_view text(reinterpret_cast<const char*>(data), size);
-  expect_one_line([&] { plan(text); });
-  expect_one_line([&] { pointflight::parse_record(text, "result.json"); });
+  pointflight::expect_one_line([&] { plan(text); });
+  pointflight::expect_one_line([&] { pointflight::parse_record(text, "result.json"); });
   return 0;
 }
