@@ -45,37 +45,58 @@ def table(folder):
     return "\n".join(sorted((work / folder / "runs.csv").read_text().splitlines()))
 
 
-def fly_and_kill():
+def fly_and_kill(words, most, longest, **options):
     """Killed at random moments, by the hardest signal; each time the same command goes on."""
     rng = random.Random(1)
     count = 0
-    while count < kills:
-        child = subprocess.Popen(command("killed"), cwd=work, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        time.sleep(rng.uniform(0.05, 1.5))
-        if child.poll() is not None:
-            assert child.returncode == 0
+    while count < most:
+        child = subprocess.Popen(words, cwd=work, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, **options)
+        try:
+            child.wait(rng.uniform(0.05, longest))
+        except subprocess.TimeoutExpired:
+            child.send_signal(signal.SIGKILL)
+            child.wait()
+            count += 1
+            continue
+        said = child.stderr.read()
+        if child.returncode == 0:
             break
-        child.send_signal(signal.SIGKILL)
-        child.wait()
-        count += 1
-    run(command("killed"))
-    return count
+        # what was killed may hold the folder for a moment more
+        assert "in use" in said or "another" in said, said[-2000:]
+    for _ in range(100):
+        result = subprocess.run(words, cwd=work, text=True, capture_output=True, **options)
+        if result.returncode == 0:
+            return count
+        assert "in use" in result.stderr or "another" in result.stderr, result.stderr[-2000:]
+        time.sleep(0.2)
+    raise AssertionError("the folder stays taken: " + result.stderr[-500:])
 
 
 def command(folder, *more):
     return [program, "campaign", "study.yaml", "-o", folder, *more]
 
 
+# as root in a container, more ranks than cores: Open MPI asks to be told
+MPI = dict(os.environ, OMPI_ALLOW_RUN_AS_ROOT="1", OMPI_ALLOW_RUN_AS_ROOT_CONFIRM="1",
+           OMPI_MCA_rmaps_base_oversubscribe="1")
+
+
+def mpi_words(folder):
+    return ["mpirun", "-np", "3", *command(folder, "--engine", "mpi")]
+
+
 def mpi():
     if not shutil.which("mpirun"):
         return None
-    # as root in a container, more ranks than cores: Open MPI asks to be told
-    environment = dict(os.environ, OMPI_ALLOW_RUN_AS_ROOT="1", OMPI_ALLOW_RUN_AS_ROOT_CONFIRM="1",
-                       OMPI_MCA_rmaps_base_oversubscribe="1")
-    result = subprocess.run(["mpirun", "-np", "3", *command("mpi", "--engine", "mpi")], cwd=work, text=True,
-                            capture_output=True, env=environment)
-    assert result.returncode == 0, result.stderr[-2000:]
+    run(mpi_words("mpi"), env=MPI)
     return "mpi"
+
+
+def mpi_killed():
+    if not shutil.which("mpirun"):
+        return None
+    fly_and_kill(mpi_words("mpi_killed"), kills, 3.0, env=MPI)
+    return "mpi_killed"
 
 
 def slurm():
@@ -114,10 +135,10 @@ try:
     wanted = table("local")
     assert wanted.count("\n") == flights // 10 * 10, wanted.count("\n")
     print(f"local: {flights // 10 * 10} flights in {time.time() - begin:.0f} s")
-    done = fly_and_kill()
+    done = fly_and_kill(command("killed"), kills, 1.5)
     assert table("killed") == wanted, "the table of the campaign that was killed"
     print(f"killed {done} times and gone on: the same table")
-    for engine in (mpi, slurm, slurm_whose_coordinator_dies):
+    for engine in (mpi, mpi_killed, slurm, slurm_whose_coordinator_dies):
         begin = time.time()
         folder = engine()
         if folder is None:
