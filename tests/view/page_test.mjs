@@ -67,7 +67,7 @@ async function open(at) {
   page.on("pageerror", (e) => wrong.push(e.message));
   page.on("console", (m) => m.type() === "error" && wrong.push(m.text()));
   await page.goto(`${at}&budget=30000&pixels=1`);
-  const wait = (what, condition, argument) => page.waitForFunction(condition, argument, { timeout: 60000, polling: 100 }).catch(() => assert.fail(`${what}: not within a minute`));
+  const wait = (what, condition, argument) => page.waitForFunction(condition, argument, { timeout: 300000, polling: 100 }).catch(() => assert.fail(`${what}: not within five minutes`));
   return { page, wait };
 }
 
@@ -141,7 +141,7 @@ float64[36] covariance
 try {
   const opened = Date.now();
   const { page } = await open(address);
-  const until = (what, condition) => page.waitForFunction(condition, null, { timeout: 60000, polling: 100 }).catch(() => assert.fail(`${what}: not within a minute`));
+  const until = (what, condition) => page.waitForFunction(condition, null, { timeout: 300000, polling: 100 }).catch(() => assert.fail(`${what}: not within five minutes`));
   await until("the map", () => window.pointflight?.map.overviewReady);
   console.log(`first picture of the map after ${Date.now() - opened} ms`);
   await until("a state", () => window.pointflight.state.last?.vehicles[0]?.p);
@@ -194,7 +194,7 @@ try {
   const beside = (await colours(nothing)).filter((c) => c.seen);
   assert.ok(onMap.length > 100 && beside.length > 10);
   const covered = onMap.filter((c) => !isPaper(c)).length / onMap.length;
-  if (covered <= 0.97) { if (picture) await page.screenshot({ path: picture, timeout: 60000 }); console.log(JSON.stringify(onMap.filter(isPaper).slice(0, 12)), JSON.stringify(there.length)); }
+  if (covered <= 0.97) { if (picture) await page.screenshot({ path: picture, timeout: 300000 }); console.log(JSON.stringify(onMap.filter(isPaper).slice(0, 12)), JSON.stringify(there.length)); }
   assert.ok(covered > 0.97, `${covered} of the map's places are drawn`);
   assert.ok(beside.every(isPaper), "nothing is drawn where nothing is");
   // heights have their colours: the wall is redder above than below
@@ -227,7 +227,7 @@ try {
   const on = cloud.filter((q) => Math.abs(q[2]) < 0.15 || Math.abs(q[0] - 6) < 0.15 || Math.hypot(q[0] - 2, q[1] + 3) < 0.4 || (Math.abs(q[0] - 3) < 0.65 && Math.abs(q[1] - 3) < 0.65));
   // noise, and mixed pixels between post and wall
   assert.ok(on.length > 0.95 * cloud.length, `${on.length} of ${cloud.length} points lie on what is there`);
-  if (picture) await page.screenshot({ path: picture, timeout: 60000 });
+  if (picture) await page.screenshot({ path: picture, timeout: 300000 });
 
   // a double click on the floor flies it there
   await page.evaluate(() => window.pointflight.client.order({ pause: false }));
@@ -237,12 +237,12 @@ try {
   const [pixel] = await colours([goal]);
   await page.mouse.dblclick(pixel.x, pixel.y);
   await page
-    .waitForFunction((g) => { const q = window.pointflight.state.last.vehicles[0].p; return Math.hypot(q[0] - g[0], q[1] - g[1]) < 0.4 && Math.abs(q[2] - 1.5) < 0.3; }, goal, { timeout: 60000, polling: 200 })
+    .waitForFunction((g) => { const q = window.pointflight.state.last.vehicles[0].p; return Math.hypot(q[0] - g[0], q[1] - g[1]) < 0.4 && Math.abs(q[2] - 1.5) < 0.3; }, goal, { timeout: 300000, polling: 200 })
     .catch(async () => assert.fail(`it did not fly there: ${JSON.stringify(await page.evaluate(() => window.pointflight.state.last.vehicles[0].p))}`));
   // and an arrow key moves it, while it is held
   const before = await page.evaluate(() => window.pointflight.state.last.vehicles[0].p[2]);
   await page.keyboard.down("PageUp");
-  await page.waitForFunction((z) => window.pointflight.state.last.vehicles[0].p[2] > z + 0.3, before, { timeout: 60000, polling: 100 });
+  await page.waitForFunction((z) => window.pointflight.state.last.vehicles[0].p[2] > z + 0.3, before, { timeout: 300000, polling: 100 });
   await page.keyboard.up("PageUp");
   const cost = await page.evaluate(() => window.pointflight.state.cost);
   console.log(`${onMap.length} places of the map, ${onScan.length} of a scan; ${cost.toFixed(0)} ms of script per frame`);
@@ -304,7 +304,7 @@ try {
     });
     const on = world.filter((w) => Math.abs(w[2]) < 0.2 || Math.abs(w[0] - 6) < 0.2 || Math.hypot(w[0] - 2, w[1] + 3) < 0.45 || (Math.abs(w[0] - 3) < 0.7 && Math.abs(w[1] - 3) < 0.7));
     assert.ok(world.length > 100 && on.length > 0.97 * world.length, `${on.length} of ${world.length} points lie on what is there`);
-    if (picture) await film.screenshot({ path: picture.replace(".png", "_recording.png"), timeout: 60000 });
+    if (picture) await film.screenshot({ path: picture.replace(".png", "_recording.png"), timeout: 300000 });
     assert.deepEqual(wrong, [], "errors on the console");
     await film.close();
   } finally {
