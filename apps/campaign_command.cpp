@@ -146,7 +146,7 @@ std::vector<FailedRun> failed_of(const Campaign& campaign, const Results& result
 
 void write_results(const Campaign& campaign, const Results& results) {
   write_file(campaign, "runs.csv", runs_csv(campaign.plan(), results));
-  write_file(campaign, "runs_timing.csv", timing_csv(campaign.plan(), results));
+  write_file(campaign, "runs_timing.csv", timing_csv(results));
   write_file(campaign, "points.csv", points_csv(campaign.plan(), results));
   const auto plots = campaign_plots(campaign.plan(), results);
   for (const CampaignPlot& plot : plots) {
@@ -308,7 +308,22 @@ int fly_by_mpi(const CampaignFlags& flags, const std::vector<Condition>& conditi
   return code;
 }
 
+/// Flags that would do nothing are mistakes.
+void check_flags(const CampaignFlags& flags) {
+  const bool is_worker = !flags.share.empty();
+  if (flags.engine != "slurm" && (flags.tasks > 0 || !flags.slurm.empty())) {
+    throw InputError("--tasks and --slurm go with --engine slurm");
+  }
+  if (flags.engine != "local" && flags.jobs > 0) {
+    throw InputError("--jobs is for flights on this machine: Slurm and mpirun have their own ways");
+  }
+  if (is_worker && (flags.retry || flags.json || !flags.fail_if.empty())) {
+    throw InputError("--share flies only; --fail-if, --retry-failed and --json go without it");
+  }
+}
+
 int run_campaign(const CampaignFlags& flags) {
+  check_flags(flags);
   std::vector<Condition> conditions;
   for (const std::string& text : flags.fail_if) conditions.emplace_back(text);
   if (flags.engine == "mpi") return fly_by_mpi(flags, conditions);

@@ -189,7 +189,7 @@ std::string runs_csv(const Plan& plan, const Results& results) {
   return csv;
 }
 
-std::string timing_csv(const Plan& /*plan*/, const Results& results) {
+std::string timing_csv(const Results& results) {
   std::string csv = "run,wall_seconds,real_time_factor\n";
   for (const auto& [number, run] : results) {
     csv += fmt::format("{},{:.3f},{}\n", number, run.wall_seconds, cell(run.real_time_factor));

@@ -54,7 +54,7 @@ using Results = std::map<std::size_t, RunRecord>;
 /// how it ended, figures. The same bytes however and wherever they were flown.
 std::string runs_csv(const Plan& plan, const Results& results);
 /// What clocks say of each: not the same twice.
-std::string timing_csv(const Plan& plan, const Results& results);
+std::string timing_csv(const Results& results);
 /// A row for each point of the grid: rates with their intervals, medians.
 std::string points_csv(const Plan& plan, const Results& results);
 /// Results of each point, by its number.

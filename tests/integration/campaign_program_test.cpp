@@ -151,6 +151,10 @@ TEST_F(Campaigns, MistakesAreSaidBeforeAnythingFlies) {
       run(fmt::format(
           "campaign {} -o {} --share 1/2 --engine slurm", here_ / "study.yaml", here_ / "c")),
       "--share");
+  for (const char* idle : {"--tasks 3", "--share 0/2 --json"}) {
+    expect_user_error(
+        run(fmt::format("campaign {} -o {} {}", here_ / "study.yaml", here_ / "c", idle)), "go");
+  }
 }
 
 }  // namespace
