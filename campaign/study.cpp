@@ -157,7 +157,7 @@ StudyDraw draw_of(const StudyReader& reader, const std::string& key, const YAML:
   draw.key = key;
   draw.line = StudyReader::line_of(node);
   const auto how = node.begin()->first.as<std::string>();
-  const YAML::Node& what = node.begin()->second;
+  const YAML::Node what = node.begin()->second;  // the iterator lends no reference
   if (!what.IsSequence()) reader.fail(what, fmt::format("{}.{}: is to be a list", key, how));
   if (how == "choice") {
     for (const auto& item : what) draw.choices.push_back(flow_text(item));
