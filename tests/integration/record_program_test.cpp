@@ -237,11 +237,16 @@ TEST_F(Program, ARecordingOfAKilledFlightIsReadable) {
     execv(POINTFLIGHT_PROGRAM, const_cast<char* const*>(arguments));
     _exit(127);
   }
-  // until at least one chunk lies there
-  for (int i = 0; i < 600; ++i) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(50));
-    std::error_code error;
-    if (std::filesystem::file_size(active, error) > 1000000 && !error) break;
+  // the map's chunk, and after it others of what is measured
+  std::uintmax_t size = 0;
+  std::uintmax_t wanted = 1000000;
+  for (int grown = 0; grown < 2; ++grown, wanted = size + 300000) {
+    for (int i = 0; i < 6000 && size <= wanted; ++i) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(50));
+      std::error_code error;
+      const std::uintmax_t now = std::filesystem::file_size(active, error);
+      if (!error) size = now;
+    }
   }
   kill(child, SIGKILL);
   int status = 0;
