@@ -7,7 +7,9 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cstdint>
+#include <cstdio>
 #include <cstring>
 #include <string>
 #include <string_view>
@@ -82,15 +84,22 @@ void talk(std::string_view bytes) {
   address.sin_port = htons(server().port());
   address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
   if (connect(socket, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) != 0) {
-    __builtin_trap();
+    const bool is_interrupted = errno == EINTR;  // by the fuzzer's own alarm
+    if (!is_interrupted) std::perror("connect");
+    close(socket);
+    if (!is_interrupted) __builtin_trap();
+    return;
   }
   send_all(socket, bytes);
   shutdown(socket, SHUT_WR);
   char answer[4096];
   ssize_t got = 0;
-  while ((got = recv(socket, answer, sizeof(answer), 0)) > 0) {
+  while ((got = recv(socket, answer, sizeof(answer), 0)) > 0 || (got < 0 && errno == EINTR)) {
   }
-  if (got < 0 && (errno == EAGAIN || errno == EWOULDBLOCK)) __builtin_trap();
+  if (got < 0 && (errno == EAGAIN || errno == EWOULDBLOCK)) {
+    std::perror("no answer");
+    __builtin_trap();
+  }
   close(socket);
 }
 
