@@ -14,7 +14,7 @@ export class FrameBudget {
   }
 
   // Once per frame, with when it began (ms). True where the budget changed.
-  frame(now, drawn) {
+  frame(now, map) {
     if (document.hidden || this.since === 0) {
       this.since = now;
       this.frames = 0;
@@ -27,6 +27,7 @@ export class FrameBudget {
     this.frames = 0;
     if (!this.isAutomatic) return false;
     const before = this.surfels;
+    const { drawn } = map;
     if (this.interval > this.slow) this.surfels = Math.max(LEAST, 0.7 * Math.min(this.surfels, drawn));
     else if (this.interval < this.fast && drawn > 0.7 * this.surfels) this.surfels = Math.min(MOST, 1.3 * this.surfels);
     return this.surfels !== before;

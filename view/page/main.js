@@ -73,8 +73,10 @@ const client = new Client(address, {
     $("line").max = 1e-9 * Number(ns(info.dataEndTime) - state.start);
   },
   channels: (channels) => {
-    if (channels.length === 0) showMapAlone();
-    else if (!channels.some((c) => c.topic === "/pointflight/run")) playRecording(channels);
+    // a server that begins has no channels yet, a run says at once that it is one
+    const isRun = channels.some((c) => c.topic === "/pointflight/run");
+    show(channels.length === 0 ? "map" : isRun || !state.start ? "run" : "recording");
+    if (state.kind === "recording") playRecording(channels);
   },
   time: (time) => state.recording && showTime(1e-9 * Number(time - state.start)),
   playback: (playback) => {
@@ -87,27 +89,25 @@ const client = new Client(address, {
   status: (message) => say(message.message),
 });
 
-// Nothing flies there: what tells of flights is put away.
-function showMapAlone() {
-  $("title").textContent = "map";
-  $("hint").textContent = "? for keys";
-  for (const id of ["bar", "image"]) $(id).style.display = "none";
-  for (const id of ["vehicle", "scans", "keep", "path"]) $(id).parentElement.style.display = "none";
-  $("camera").parentElement.style.display = "none";
+// "map": nothing flies there, and what tells of flights is put away (index.html); "run", "recording". Another
+// program may serve at the address of one that has ended.
+function show(kind) {
+  if (state.kind !== kind && [state.kind, kind].includes("recording") && state.kind) return location.reload();
+  state.kind = kind;
+  document.documentElement.dataset.shows = kind;
+  if (kind === "map") $("title").textContent = "map";
+  setPermission();
 }
 
 // ---- a recording: topics as they lie in a file ----
 
 const heights = {
   uniform: map.uniforms.heights,
-  // of a cloud that is a place: between its 2nd and 98th percentile
+  // of a cloud that is a place, where no map gives them
   include(positions) {
     if (map.surfels) return;
-    const z = [];
-    const stride = 3 * Math.max(1, Math.floor(positions.length / 3 / 20000));
-    for (let i = 2; i < positions.length; i += stride) z.push(positions[i]);
-    z.sort((a, b) => a - b);
-    map.uniforms.heights.value.set(z[Math.floor(0.02 * z.length)] ?? 0, z[Math.floor(0.98 * z.length)] ?? 1);
+    const stride = Math.max(1, Math.floor(positions.length / 3 / 20000));
+    map.setHeights(Float32Array.from({ length: Math.floor(positions.length / 3 / stride) }, (_, i) => positions[3 * i * stride + 2]));
     setLegend();
   },
 };
@@ -127,7 +127,6 @@ function playRecording(channels) {
     $("step").title = "to the next scan";
   }
   state.recording.adopt(channels);
-  $("topics").style.display = "block";
   showTopics($("topics"), state.recording);
 }
 
@@ -156,11 +155,13 @@ function listVehicles() {
 function setPermission() {
   for (const id of ["pause", "step", "reset", "rate", "line"]) $(id).disabled = !client.mayCommand;
   const isLive = $("line").style.display === "none";
-  $("hint").textContent = !client.mayCommand ? "watching only; ? for keys" : isLive ? "double click: fly there; ? for keys" : "space, time line; ? for keys";
+  const hint = !client.mayCommand ? "watching only; " : isLive ? "double click: fly there; " : "space, time line; ";
+  $("hint").textContent = `${state.kind === "map" ? "" : hint}? for keys`;
 }
 
 client.want("/pointflight/run", (bytes) => {
   const run = json(bytes);
+  if (state.run && JSON.stringify(run.map) !== JSON.stringify(state.run.map)) return location.reload(); // elsewhere
   state.vehicles.forEach((v) => v.remove(scene));
   state.run = run;
   state.vehicles = run.vehicles.map((v, i) => new Vehicle(scene, $("tags"), v, i));
@@ -449,7 +450,7 @@ function frame(now) {
   draw(Math.min(0.1, 1e-3 * (now - before)));
   before = now;
   ++state.frames;
-  if (budget.frame(now, map.drawn)) map.budget = budget.surfels;
+  if (budget.frame(now, map)) map.budget = budget.surfels;
   if (!state.last && state.frames % 20 === 0) showFigures();
   state.cost = 0.9 * state.cost + 0.1 * (performance.now() - start);
   requestAnimationFrame(frame);

@@ -86,7 +86,6 @@ export class SurfelMap {
       colouring: { value: 0 },
       heights: { value: new THREE.Vector2(0, 1) },
     };
-    this.materials = new Map(); // by how much discs grow
   }
 
   // Two triangles for each of `count` surfels; one buffer for all meshes, as long as the longest.
@@ -129,14 +128,10 @@ export class SurfelMap {
     return true;
   }
 
-  // Colours are of what nearly all surfels lie between: some are far off.
-  setHeights(words, leaves, count) {
-    const z = new Float32Array(count);
-    for (let i = 0; i < count; ++i) {
-      z[i] = this.origin.z + leaves[4 * i + 2] + (this.resolution * (((words[2 * i] >>> 20) & 1023) + 0.5)) / 64;
-    }
+  // Colours are of what nearly all heights lie between: some are far off.
+  setHeights(z) {
     z.sort();
-    this.uniforms.heights.value.set(z[Math.floor(0.01 * count)] ?? 0, z[Math.floor(0.99 * count)] ?? 1);
+    this.uniforms.heights.value.set(z[Math.floor(0.01 * z.length)] ?? 0, z[Math.floor(0.99 * z.length)] ?? 1);
   }
 
   async fetch(path) {
@@ -196,6 +191,13 @@ export class SurfelMap {
     mesh.geometry.dispose();
   }
 
+  // World, m.
+  centre({ words, leaves }, i) {
+    const lo = words[2 * i];
+    const at = (origin, k) => origin + leaves[4 * i + k] + (this.resolution * (((lo >>> (10 * k)) & 1023) + 0.5)) / 64;
+    return [at(this.origin.x, 0), at(this.origin.y, 1), at(this.origin.z, 2)];
+  }
+
   async loadOverview() {
     // half of the budget at most is for what is far; first of all, what index.html has asked for already
     const most = this.overviewReady ? 200000 : 50000;
@@ -212,8 +214,8 @@ export class SurfelMap {
     this.overviewGrow = grow;
     this.rebuildOverview();
     if (!this.overviewReady) {
-      const { words, leaves, count } = this.overview.userData;
-      this.setHeights(words, leaves, count);
+      const { userData } = this.overview;
+      this.setHeights(Float32Array.from({ length: userData.count }, (_, i) => this.centre(userData, i)[2]));
     }
     this.overviewReady = true;
     for (const block of this.blocks) block.isWhole = stride === 1;
@@ -310,17 +312,12 @@ export class SurfelMap {
   pick(ray) {
     let best = null;
     const place = new THREE.Vector3();
+    const from = new THREE.Vector3();
     for (const mesh of this.group.children) {
-      const { words, leaves, count } = mesh.userData;
-      for (let i = 0; i < count; ++i) {
-        const lo = words[2 * i];
-        place.set(
-          this.origin.x + leaves[4 * i] + (this.resolution * ((lo & 1023) + 0.5)) / 64,
-          this.origin.y + leaves[4 * i + 1] + (this.resolution * (((lo >>> 10) & 1023) + 0.5)) / 64,
-          this.origin.z + leaves[4 * i + 2] + (this.resolution * (((lo >>> 20) & 1023) + 0.5)) / 64,
-        );
+      for (let i = 0; i < mesh.userData.count; ++i) {
+        place.fromArray(this.centre(mesh.userData, i));
         if (place.z > this.uniforms.clipHigh.value.z) continue;
-        const along = place.clone().sub(ray.origin).dot(ray.direction);
+        const along = from.subVectors(place, ray.origin).dot(ray.direction);
         if (along < 0.1) continue;
         const off = ray.distanceToPoint(place);
         // within a disc, or a hundredth of a radian

@@ -11,6 +11,5 @@ function rowOf(topic, recording) {
 }
 
 export function showTopics(place, recording) {
-  place.style.display = "block";
   place.replaceChildren(make("h1", { textContent: "topics" }), ...recording.topics.map((topic) => rowOf(topic, recording)));
 }
