@@ -83,18 +83,23 @@ class StopWatch {
   std::thread thread_;
 };
 
-/// Says how far it is, `missing` to be flown here; with `others` flying too, by the folder.
-FlightDone teller(const Campaign& campaign, std::size_t missing, bool others = false) {
+/// Says how far it is: so many of `all` are done already. With `others` flying them too the folder
+/// is asked, now and then.
+FlightDone teller(const Campaign& campaign, std::size_t done, std::size_t all, bool others) {
+  using Clock = std::chrono::steady_clock;
   struct Count {
     std::size_t done = 0, failed = 0;
+    Clock::time_point asked{};
     Progress progress = terminal_progress();
   };
-  const std::size_t all = campaign.plan().runs.size();
   auto count = std::make_shared<Count>();
-  count->done = all - missing;
+  count->done = done;
   return [&campaign, count, all, others](std::size_t /*number*/, const RunRecord& record) {
     ++count->done;
-    if (others) count->done = all - campaign.missing().size();
+    if (others && Clock::now() - count->asked > std::chrono::seconds(2)) {
+      count->asked = Clock::now();
+      count->done = all - campaign.missing().size();
+    }
     count->failed += record.status == RunStatus::kFailed ? 1 : 0;
     const std::string what =
         count->failed == 0 ? "flying" : fmt::format("flying, {} failed", count->failed);
@@ -144,7 +149,9 @@ std::vector<FailedRun> failed_of(const Campaign& campaign, const Results& result
   return failed;
 }
 
-void write_results(const Campaign& campaign, const Results& results) {
+void write_results(const Campaign& campaign,
+                   const Results& results,
+                   const std::vector<FailedRun>& failed) {
   write_file(campaign, "runs.csv", runs_csv(campaign.plan(), results));
   write_file(campaign, "runs_timing.csv", timing_csv(results));
   write_file(campaign, "points.csv", points_csv(campaign.plan(), results));
@@ -154,9 +161,7 @@ void write_results(const Campaign& campaign, const Results& results) {
     plot.canvas->save((fs::path(campaign.folder()) / (name + ".png")).string());
     write_file(campaign, name + ".svg", plot.canvas->svg());
   }
-  write_file(campaign,
-             "report.html",
-             campaign_html(campaign, results, plots, failed_of(campaign, results)));
+  write_file(campaign, "report.html", campaign_html(campaign, results, plots, failed));
 }
 
 std::vector<const RunRecord*> all_of(const Results& results) {
@@ -173,9 +178,11 @@ nlohmann::ordered_json json_of(const Rate& rate) {
           {"high", rate.high}};
 }
 
-void print_results(const Campaign& campaign, const Results& results, bool json) {
+void print_results(const Campaign& campaign,
+                   const Results& results,
+                   const std::vector<FailedRun>& failed,
+                   bool json) {
   const auto all = all_of(results);
-  const std::vector<FailedRun> failed = failed_of(campaign, results);
   if (json) {
     nlohmann::ordered_json value;
     value["folder"] = campaign.folder();
@@ -221,8 +228,9 @@ int finish(const Campaign& campaign,
            bool was_stopped) {
   const Results results = results_of(campaign);
   end_progress();
-  write_results(campaign, results);
-  print_results(campaign, results, flags.json);
+  const std::vector<FailedRun> failed = failed_of(campaign, results);
+  write_results(campaign, results, failed);
+  print_results(campaign, results, failed, flags.json);
   const std::size_t left = campaign.plan().runs.size() - results.size();
   if (left > 0) {
     log(fmt::format("{} flights are left ({}); the same command goes on",
@@ -244,7 +252,7 @@ int finish(const Campaign& campaign,
 int fly_share(const Campaign& campaign, const CampaignFlags& flags) {
   const StopWatch watch;
   const auto own = share_of(campaign.missing(), parse_share(flags.share));
-  fly_here(campaign, own, jobs_of(flags), watch.stop(), teller(campaign, own.size()));
+  fly_here(campaign, own, jobs_of(flags), watch.stop(), teller(campaign, 0, own.size(), false));
   end_progress();
   return watch.stop() ? kInterrupted : kDone;
 }
@@ -274,7 +282,12 @@ int coordinate(Campaign& campaign,
       return kInterrupted;
     }
   } else if (!missing.empty()) {
-    fly_here(campaign, missing, jobs_of(flags), watch.stop(), teller(campaign, missing.size()));
+    const std::size_t all = campaign.plan().runs.size();
+    fly_here(campaign,
+             missing,
+             jobs_of(flags),
+             watch.stop(),
+             teller(campaign, all - missing.size(), all, false));
   }
   return finish(campaign, flags, conditions, watch.stop());
 }
@@ -297,7 +310,9 @@ int fly_by_mpi(const CampaignFlags& flags, const std::vector<Condition>& conditi
   const std::vector<std::size_t> missing = campaign->missing();
   mpi.meet();  // nobody flies while others look what is missing
   const StopWatch watch;
-  const FlightDone done = is_first ? teller(*campaign, missing.size(), true) : FlightDone();
+  const std::size_t all = campaign->plan().runs.size();
+  const FlightDone done =
+      is_first ? teller(*campaign, all - missing.size(), all, true) : FlightDone();
   for (std::size_t i = 0; !watch.stop() && (i = mpi.next()) < missing.size();) {
     const auto record = campaign->fly(missing[i], watch.stop());
     if (record && done) done(missing[i], *record);

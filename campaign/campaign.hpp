@@ -40,7 +40,8 @@ class Campaign {
   /// Takes away what attempts left that cannot go on: those of this machine whose process is gone.
   void remove_leftovers() const;
 
-  /// Flies one and puts its result into the folder; nothing where `stop` ended it. Callable from
+  /// Flies one and puts its result into the folder; nothing where `stop` or somebody outside
+  /// (SIGKILL, SIGTERM) ended it. Callable from
   /// several threads and processes. Throws InputError where it cannot be started or the folder
   /// cannot be written.
   std::optional<RunRecord> fly(std::size_t number, const std::atomic<bool>& stop) const;

@@ -384,6 +384,12 @@ Plan plan_of(const Study& study) {
   return plan;
 }
 
+std::vector<std::string> ends_of(const StudyDraw& draw) {
+  if (!draw.choices.empty()) return draw.choices;
+  constexpr double kNearlyOne = 1.0 - 1e-12;
+  return {drawn_text(draw, 0.0), drawn_text(draw, kNearlyOne)};
+}
+
 std::string edited_scenario(std::string_view yaml,
                             const std::vector<std::string>& keys,
                             const std::vector<std::string>& values) {

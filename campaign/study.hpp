@@ -74,6 +74,9 @@ struct Plan {
 /// Throws InputError where there would be more than ten million flights.
 Plan plan_of(const Study& study);
 
+/// Values that a draw can give, its ends or all of its choices.
+std::vector<std::string> ends_of(const StudyDraw& draw);
+
 /// A scenario's text with other values of some keys. Where a key's sections are missing they are
 /// made; an entry of a list has to be there. Throws InputError that names the key.
 std::string edited_scenario(std::string_view yaml,

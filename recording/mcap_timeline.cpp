@@ -232,7 +232,6 @@ class McapTimeline : public TimedRecording {
     from_ = time;
     next_piece_ = 0;
     waiting_ = {};
-    unpacked_bytes_ = 0;
     held_.reset();
   }
 
@@ -304,10 +303,15 @@ class McapTimeline : public TimedRecording {
   }
 
   /// Null where there is nothing to unpack, or it does not.
-  static Unpacked unpack(const Piece& piece) {
+  Unpacked unpack(const Piece& piece) {
     if (!piece.chunk) return nullptr;
     auto bytes = mcap::unpack(*piece.chunk);
-    return bytes ? std::make_shared<const std::vector<std::byte>>(std::move(*bytes)) : nullptr;
+    if (!bytes) return nullptr;
+    unpacked_bytes_ += bytes->size();
+    return {new std::vector<std::byte>(std::move(*bytes)), [this](const auto* gone) {
+              unpacked_bytes_ -= gone->size();
+              delete gone;
+            }};
   }
 
   template <class Take>
@@ -324,8 +328,6 @@ class McapTimeline : public TimedRecording {
 
   void load(const Piece& piece) {
     const auto bytes = unpack(piece);
-    if (bytes && waiting_.empty()) unpacked_bytes_ = 0;
-    if (bytes) unpacked_bytes_ += bytes->size();
     each_message(piece, bytes.get(), [&](const Message& message) {
       if (message.time < from_ || !outline_.number_of(message.channel)) return;
       waiting_.push({message, order_++, bytes});
@@ -337,10 +339,10 @@ class McapTimeline : public TimedRecording {
   std::pair<std::int64_t, std::int64_t> range_;
   std::int64_t from_ = std::numeric_limits<std::int64_t>::min();
   std::size_t next_piece_ = 0;
+  std::size_t unpacked_bytes_ = 0;  ///< Of all chunks that are held; outlives them.
   std::priority_queue<Waiting> waiting_;
   std::uint64_t order_ = 0;
-  std::size_t unpacked_bytes_ = 0;  ///< Since nothing waited last.
-  Unpacked held_;                   ///< Of the message that was given last.
+  Unpacked held_;  ///< Of the message that was given last.
 };
 
 }  // namespace

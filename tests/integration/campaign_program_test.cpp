@@ -144,6 +144,8 @@ TEST_F(Campaigns, MistakesAreSaidBeforeAnythingFlies) {
                     "study.yaml:2: mission.speeed: unknown key");
   expect_user_error(fly("grid: {mission.speed: [1, -1]}\n"), "study.yaml:2: mission.speed: -1");
   expect_user_error(fly("grid:\n  obstacles[0].count: [1]\n"), "the scenario has 0 of these");
+  expect_user_error(fly("draws:\n  count: 1\n  mission.speed: {uniform: [1, 1e6]}\n"),
+                    "study.yaml:4: mission.speed:");
   EXPECT_FALSE(fs::exists(here_ / "c"));
   ASSERT_EQ(fly("seeds: 1\n").code, 0);
   expect_user_error(fly("seeds: 2\n"), "is the campaign of another study");
