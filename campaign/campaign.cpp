@@ -31,12 +31,6 @@ namespace fs = std::filesystem;
 constexpr const char* kResult = "result.json";
 constexpr const char* kAttempt = ".attempt-";
 
-std::string text_of_file(const std::string& path) {
-  const MappedFile file(path);
-  const auto bytes = file.bytes();
-  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
-}
-
 void write_text(const fs::path& path, std::string_view text) {
   OutputFile file(path.string());
   file.write(text);
@@ -104,7 +98,7 @@ Campaign::Campaign(Study study, std::string folder, std::string program)
       program_(std::move(program)),
       plan_(plan_of(study_)),
       scenario_path_(resolve_path(study_.scenario, fs::path(study_.path).parent_path().string())),
-      scenario_text_(text_of_file(scenario_path_)),
+      scenario_text_(MappedFile(scenario_path_).text()),
       map_(load_scenario(scenario_path_).open_map()) {
   check_values();
   check_folder();
@@ -166,7 +160,7 @@ void Campaign::check_folder() const {
   if (error) throw InputError(fmt::format("{}: {}", folder_, error.message()));
   const std::string path = (fs::path(folder_) / "campaign.json").string();
   if (fs::exists(path, error)) {
-    if (text_of_file(path) == identity()) return;
+    if (MappedFile(path).text() == identity()) return;
     throw InputError(fmt::format(
         "{}: is the campaign of another study, scenario, map or version; choose another folder",
         folder_));
@@ -230,7 +224,7 @@ std::optional<RunRecord> Campaign::result(std::size_t number) const {
   const fs::path path = fs::path(run_folder(number)) / kResult;
   std::error_code ignored;
   if (!fs::exists(path, ignored)) return std::nullopt;
-  return parse_record(text_of_file(path.string()), path.string());
+  return parse_record(MappedFile(path.string()).text(), path.string());
 }
 
 Scenario Campaign::scenario_of(const PlannedRun& run) const {

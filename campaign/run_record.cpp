@@ -46,9 +46,7 @@ json parsed(std::string_view text, const std::string& name) {
 std::optional<json> read_json(const fs::path& path) {
   std::error_code ignored;
   if (!fs::is_regular_file(path, ignored)) return std::nullopt;
-  const MappedFile file(path.string());
-  const auto bytes = file.bytes();
-  return parsed({reinterpret_cast<const char*>(bytes.data()), bytes.size()}, path.string());
+  return parsed(MappedFile(path.string()).text(), path.string());
 }
 
 std::optional<double> number_in(const json& object, const char* key) {

@@ -35,11 +35,7 @@ Answer ask(const fs::path& folder, const std::vector<std::string>& command) {
   const std::atomic<bool> never = false;
   const ProcessResult ended = run_process(request, never);
   Answer answer{ended.timed_out ? -1 : ended.exit_code, {}};
-  {
-    const MappedFile file(request.log);
-    const auto bytes = file.bytes();
-    answer.text.assign(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-  }
+  answer.text = MappedFile(request.log).text();
   std::error_code ignored;
   fs::remove(request.log, ignored);
   return answer;
@@ -100,9 +96,7 @@ std::string submit(const Campaign& campaign,
 std::optional<std::string> job_in(const fs::path& file) {
   std::error_code ignored;
   if (!fs::exists(file, ignored)) return std::nullopt;
-  const MappedFile mapped(file.string());
-  const auto bytes = mapped.bytes();
-  const std::string job = first_line({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+  const std::string job = first_line(std::string(MappedFile(file.string()).text()));
   return is_job(job) ? std::optional(job) : std::nullopt;
 }
 

@@ -341,9 +341,7 @@ Study parse_study(std::string_view text, const std::string& path) {
 }
 
 Study load_study(const std::string& path) {
-  const MappedFile file(path);
-  const auto bytes = file.bytes();
-  return parse_study({reinterpret_cast<const char*>(bytes.data()), bytes.size()}, path);
+  return parse_study(MappedFile(path).text(), path);
 }
 
 Plan plan_of(const Study& study) {

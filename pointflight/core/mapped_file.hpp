@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <string_view>
 
 namespace pointflight {
 
@@ -28,6 +29,10 @@ class MappedFile {
 
   /// The whole file; valid as long as this one lives. Zeros where it was cut (`survive_cut_files`).
   [[nodiscard]] std::span<const std::byte> bytes() const { return {data_, size_}; }
+  /// The same as characters.
+  [[nodiscard]] std::string_view text() const {
+    return {reinterpret_cast<const char*>(data_), size_};
+  }
   /// As given to the constructor.
   [[nodiscard]] const std::string& path() const { return path_; }
 
