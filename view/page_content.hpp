@@ -11,7 +11,8 @@
 namespace pointflight {
 
 /// What is under each path: `/` and the files of the page in `folder`, and of the map `/map/index`,
-/// `/map/overview/MOST`, `/map/block/NUMBER/LEVEL` (`MapBlocks`), empty without a map. No path leads out of these.
+/// `/map/overview/MOST`, `/map/block/NUMBER/LEVEL` (`MapBlocks`), empty without a map. No path
+/// leads out of these.
 std::function<std::optional<WebContent>(const std::string& path)> page_content(
     const std::string& folder, std::shared_ptr<const MapBlocks> map);
 
