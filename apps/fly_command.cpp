@@ -16,6 +16,7 @@
 #include "apps/ros_flags.hpp"
 #include "apps/scenario_command.hpp"
 #include "apps/settings_json.hpp"
+#include "apps/share_flags.hpp"
 #include "apps/terminal.hpp"
 #include "apps/view_flags.hpp"
 #include "pointflight/core/input_error.hpp"
@@ -52,6 +53,7 @@ struct FlyFlags {
   bool json = false;
   RosFlags ros;
   ViewFlags view;
+  ShareFlags share;
 };
 
 double parse_rate(const std::string& text) {
@@ -204,7 +206,7 @@ void print_result(const FlyFlags& flags, const Simulation& simulation, double wa
   if (flags.json) {
     auto json = nlohmann::ordered_json::parse(summary_json(simulation));
     if (!flags.output.empty()) json["folder"] = flags.output;
-    json["real_time_factor"] = to_seconds(simulation.time()) / wall;
+    json["real_time_factor"] = to_seconds(simulation.simulated()) / wall;
     print_json(json);
     return;
   }
@@ -214,8 +216,8 @@ void print_result(const FlyFlags& flags, const Simulation& simulation, double wa
              to_string(simulation.end()),
              to_seconds(simulation.time()),
              reason.empty() ? "" : ": " + reason);
-  for (std::size_t v = 0; v < simulation.vehicle_count(); ++v) print_vehicle(simulation, v);
-  fmt::print("  real-time factor  {:.1f}\n", to_seconds(simulation.time()) / wall);
+  for (const std::size_t v : simulation.own_vehicles()) print_vehicle(simulation, v);
+  fmt::print("  real-time factor  {:.1f}\n", to_seconds(simulation.simulated()) / wall);
   if (flags.output.empty() || flags.no_picture) return;
   fmt::print("  picture           {}\n", (fs::path(flags.output) / "overview.png").string());
 }
@@ -251,10 +253,8 @@ int fly(const FlyFlags& flags) {
         "give a folder for the results with -o, or --view, --ros1, --ros2 or --record");
   }
   check_ros_flags(flags.ros);
+  check_share_flags(flags.share);
   RunOptions options;
-  // others live on the wall clock
-  options.rate =
-      parse_rate(flags.rate.empty() ? (flags.ros.is_live() ? "1.0" : "max") : flags.rate);
   options.lockstep = flags.ros.lockstep;
   options.log = [](const std::string& line) { log(line); };
   options.progress = terminal_progress();
@@ -262,6 +262,9 @@ int fly(const FlyFlags& flags) {
   if (!flags.output.empty()) check_folder(flags);
   const Executor executor(flags.threads);
   Scenario scenario = load_input(flags, executor);
+  // others live on the wall clock
+  const bool in_real_time = flags.ros.is_live() || is_free(flags.share, scenario);
+  options.rate = parse_rate(flags.rate.empty() ? (in_real_time ? "1.0" : "max") : flags.rate);
   const auto map = scenario.open_map();
   prepare_for_ros(flags.ros, options.rate, scenario);
   Simulation simulation(scenario, map, executor);
@@ -269,6 +272,8 @@ int fly(const FlyFlags& flags) {
   for (const std::string& warning : start_warnings(simulation, executor)) log(warning);
 
   RunLoop loop(simulation, options);
+  std::optional<SharedRun> shared;
+  if (flags.share.is_asked()) shared.emplace(flags.share, simulation, loop, options.rate);
   std::optional<FolderLink> folder;
   if (!flags.output.empty()) {
     const Existing existing = flags.force ? Existing::kReplace : Existing::kRefuse;
@@ -280,6 +285,7 @@ int fly(const FlyFlags& flags) {
   }
   TerminalLink terminal(simulation);
   loop.add(terminal);
+  if (shared) loop.add(shared->link());
   catch_interrupts();
   const std::shared_ptr<LiveServer> server = start_viewing(flags.view, map);
   const std::unique_ptr<RosLink> ros = make_ros_link(flags.ros, simulation, server);
@@ -292,7 +298,9 @@ int fly(const FlyFlags& flags) {
   if (!loop.has_started()) return failed ? kWrongInput : kInterrupted;
   if (ros) say_recordings(flags.ros, *ros);
   say_waits(loop, flags.ros);
+  if (shared) shared->say();
   print_result(flags, simulation, loop.wall_time());
+  if (shared && !shared->fleet().fault().empty()) throw InputError(shared->fleet().fault());
   return failed ? kWrongInput : exit_code_of(end);
 }
 
@@ -340,6 +348,7 @@ void add_fly_command(CLI::App& parent, int& exit_code) {
       "--snapshot", flags->snapshot, "All beams of a scan from one pose, as in the paper");
   add_ros_flags(*app, flags->ros);
   add_view_flags(*app, flags->view);
+  add_share_flags(*app, flags->share);
   app->callback([flags, &exit_code] {
     flags->ros.overwrite = flags->force;
     flags->ros.view = flags->view.is_asked();

@@ -81,7 +81,7 @@ void FolderLink::write_timing() const {
   const Scenario& scenario = simulation_.scenario();
   nlohmann::ordered_json json;
   json["wall_time"] = loop_.wall_time();
-  json["real_time_factor"] = to_seconds(simulation_.time()) / loop_.wall_time();
+  json["real_time_factor"] = to_seconds(simulation_.simulated()) / loop_.wall_time();
   json["threads"] = threads_;
   json["map"] = fs::weakly_canonical(resolve_path(scenario.map, scenario.folder())).string();
   json["command_line"] = command_line();

@@ -68,4 +68,9 @@ const MpiModule& mpi_module() {
   return module;
 }
 
+const DdsModule& dds_module() {
+  static const DdsModule& module = load<DdsModule>("pointflight_dds", "--share", "cyclonedds-dev");
+  return module;
+}
+
 }  // namespace pointflight::apps

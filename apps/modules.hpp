@@ -4,11 +4,12 @@
 
 #include "campaign/mpi_module.hpp"
 #include "ros_common/wire.hpp"
+#include "share/share_transport.hpp"
 
 namespace pointflight::apps {
 
 /// True where this build came with a module ("pointflight_ros1", "pointflight_ros2",
-/// "pointflight_mpi").
+/// "pointflight_mpi", "pointflight_dds").
 bool has_module(const std::string& name);
 
 /// The library that speaks ROS 1, loaded when first asked for. Throws InputError that says what to
@@ -18,5 +19,7 @@ const Ros1Module& ros1_module();
 const Ros2Module& ros2_module();
 /// The same for MPI.
 const MpiModule& mpi_module();
+/// The same for runs that several processes share.
+const DdsModule& dds_module();
 
 }  // namespace pointflight::apps

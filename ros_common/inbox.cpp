@@ -13,7 +13,9 @@ constexpr std::size_t kOrdersMax = 10000;  // that wait; older ones go
 }  // namespace
 
 Inbox::Inbox(const RunDescription& run, const RosProfile& profile)
-    : streams_(input_streams(run, profile)), services_(run_services(profile)) {
+    : streams_(input_streams(run, profile)) {
+  // a shared run's services are those of the process that flies the first vehicle
+  if (run.vehicles.front().own) services_ = run_services(profile);
   for (std::size_t v = 0; v < run.vehicles.size(); ++v) {
     const VehicleSettings& s = run.vehicles[v].settings;
     OrderContext& context = contexts_.emplace_back();
@@ -25,6 +27,7 @@ Inbox::Inbox(const RunDescription& run, const RosProfile& profile)
     context.world_alias = bare_frame(profile.world_alias);
     context.body_frame =
         bare_frame(body_frame_of(profile, names_of(profile, run.vehicles[v].setup, v), v));
+    if (run.vehicles[v].own) own_contexts_.push_back(context);
   }
 }
 
@@ -54,12 +57,10 @@ void Inbox::push(std::vector<Order> orders) {
 
 void Inbox::receive(const InputStream& stream, Wire wire, const Received& received) {
   std::string reason;
-  const auto contexts = std::span<const OrderContext>(contexts_);
-  push(orders_of(stream,
-                 wire,
-                 received,
-                 stream.for_all ? contexts : contexts.subspan(stream.vehicle, 1),
-                 reason));
+  const auto all = std::span<const OrderContext>(contexts_);
+  const auto own = std::span<const OrderContext>(own_contexts_);
+  push(orders_of(
+      stream, wire, received, stream.for_all ? own : all.subspan(stream.vehicle, 1), reason));
   if (reason.empty()) return;
   const std::lock_guard lock(mutex_);
   ++refused_.count;

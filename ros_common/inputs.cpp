@@ -319,6 +319,7 @@ std::vector<InputStream> input_streams(const RunDescription& run, const RosProfi
     const bool once = type->is_of_run() || !names_vehicle(input.topic);
     const std::size_t vehicles = once ? 1 : run.vehicles.size();
     for (std::size_t v = 0; v < vehicles; ++v) {
+      if (!once && !run.vehicles[v].own) continue;
       const RosNames names = names_of(profile, run.vehicles[v].setup, v);
       InputStream& stream = streams.emplace_back();
       stream.type = type;

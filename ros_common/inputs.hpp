@@ -152,7 +152,8 @@ class Inbox {
 
   std::vector<InputStream> streams_;
   std::vector<Service> services_;
-  std::vector<OrderContext> contexts_;  ///< Of each vehicle.
+  std::vector<OrderContext> contexts_;      ///< By number.
+  std::vector<OrderContext> own_contexts_;  ///< Of vehicles that this process flies.
   mutable std::mutex mutex_;
   std::vector<Order> orders_;
   Refused refused_;

@@ -240,6 +240,9 @@ std::deque<OutputStream> output_streams(RosRun& ros) {
       const bool all = names_vehicle(output.topic) || type.is_transform;
       const std::size_t vehicles = type.per != Per::kRun && all ? ros.run.vehicles.size() : 1;
       for (std::size_t v = 0; v < vehicles; ++v) {
+        // another process' part of a shared run; of one name for all, and of the run, the first's
+        const bool from_each = type.per == Per::kRun && type.from_each;
+        if (!from_each && !ros.run.vehicles[v].own) continue;
         if (type.per != Per::kLidar) {
           add(output, type, v, 0);
           continue;

@@ -56,9 +56,12 @@ struct OutputType {
   bool sets_odometry_rate = false;  ///< Odometry is sampled at its rate at least.
   bool has_child = false;           ///< Profiles may name its child_frame.
   bool is_transform = false;        ///< Names its frames: all vehicles may share a topic.
-  bool latched = false;             ///< Whoever comes late gets the last message.
-  bool large = false;               ///< Paced on ROS 2.
-  std::size_t depth = 10;           ///< Messages that a reader's queue should hold.
+  /// Of a run that several processes share: each says its own vehicles' part. Others of the run
+  /// come from the process that flies the first vehicle.
+  bool from_each = false;
+  bool latched = false;     ///< Whoever comes late gets the last message.
+  bool large = false;       ///< Paced on ROS 2.
+  std::size_t depth = 10;   ///< Messages that a reader's queue should hold.
   std::string sensor = {};  ///< Of measurements: the kind of sensor (`sensor_kinds`); empty: any.
   std::string layout = "xyzi";  ///< Of clouds where the profile names none.
 };

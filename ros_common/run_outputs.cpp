@@ -79,7 +79,9 @@ class StaticTransforms : public Output {
   void send() {
     stream_.note_served();
     msg::TFMessage message;
-    for (std::size_t v = 0; v < stream_.ros.run.vehicles.size(); ++v) add_lidars(v, message);
+    for (std::size_t v = 0; v < stream_.ros.run.vehicles.size(); ++v) {
+      if (stream_.ros.run.vehicles[v].own) add_lidars(v, message);
+    }
     for (const OutputStream& other : *stream_.ros.streams) add_own_frame(other, message);
     stream_.send(std::move(message), SimTime{}, true);
   }
@@ -121,7 +123,9 @@ class Diagnostics : public Output {
     if (!stream_.is_due(time)) return;
     msg::DiagnosticArray message;
     message.header = header_of(time, stream_.ros.epoch, "");
-    for (const StatusSample& status : stream_.ros.status) message.status.push_back(of(status));
+    for (const StatusSample& status : stream_.ros.status) {
+      if (stream_.ros.run.vehicles[status.vehicle].own) message.status.push_back(of(status));
+    }
     stream_.send(std::move(message), time);
   }
 
@@ -240,6 +244,7 @@ std::vector<OutputType> leading_outputs() {
        .help = "sensors on their vehicles, latched",
        .make = made_by<StaticTransforms, msg::TFMessage>(),
        .per = Per::kRun,
+       .from_each = true,
        .latched = true,
        .depth = 1},
   };
@@ -259,14 +264,16 @@ std::vector<OutputType> trailing_outputs() {
       {.name = "collisions",
        .help = "where vehicles met something",
        .make = made_by<CollisionMarkers, msg::MarkerArray>(),
-       .per = Per::kRun},
+       .per = Per::kRun,
+       .from_each = true},
       {.name = "scan_time",
        .help = "position.x: mean seconds that the last 21 scans took",
        .make = made_by<ScanTime, msg::PoseStamped>()},
       {.name = "diagnostics",
        .help = "each vehicle's state in words, once a second",
        .make = made_by<Diagnostics, msg::DiagnosticArray>(),
-       .per = Per::kRun},
+       .per = Per::kRun,
+       .from_each = true},
   };
 }
 

@@ -29,12 +29,14 @@ allowed() {
     campaign) echo "core geometry io map sim campaign" ;;
     mpi) echo "campaign mpi" ;;
     view) echo "core geometry io map lidar vehicle sim run ros_common view" ;;
+    share) echo "core geometry io vehicle world sim run ros_common share" ;;
+    dds) echo "ros_common ros2 share dds" ;;
   esac
 }
-for folder in core geometry io map render lidar vehicle world fit fidelity sim run ros_common recording campaign mpi view ros1 ros2; do
+for folder in core geometry io map render lidar vehicle world fit fidelity sim run ros_common recording campaign mpi view share dds ros1 ros2; do
   where=pointflight/$folder
   [ -d "$where" ] || where=$folder
-  for used in $(grep -rhoE '#include "(pointflight/[a-z_]+|apps|tests|examples|ros_common|recording|campaign|mpi|view|ros1|ros2)/' "$where" |
+  for used in $(grep -rhoE '#include "(pointflight/[a-z_]+|apps|tests|examples|ros_common|recording|campaign|mpi|view|share|dds|ros1|ros2)/' "$where" |
                 sed 's/.*"//; s/^pointflight\///; s/\/$//' | sort -u); do
     case " $(allowed "$folder") " in
       *" $used "*) ;;
@@ -49,25 +51,25 @@ found=$(grep -rhoE '#include "ros_common/[a-z_.]+' ros1 | sort -u | grep -v 'ros
 
 # The path from seed to output must give the same bits on every CPU: no libm transcendentals there.
 found=$(grep -rnE '(std::|[^a-zA-Z_:.>])(sin|cos|tan|asin|acos|atan|atan2|exp|exp2|log|log2|log10|pow|sinh|cosh|tanh)f?\(' \
-        pointflight ros_common recording campaign --include='*.cpp' --include='*.hpp' | sed 's,//.*,,' | grep -E '(sin|cos|tan|exp|exp2|log|log2|log10|pow|atan|atan2)f?\(' | grep -vE 'math::|core/math.hpp')
+        pointflight ros_common recording campaign share --include='*.cpp' --include='*.hpp' | sed 's,//.*,,' | grep -E '(sin|cos|tan|exp|exp2|log|log2|log10|pow|atan|atan2)f?\(' | grep -vE 'math::|core/math.hpp')
 [ -z "$found" ] || { echo "libm instead of core/math.hpp:"; breach "$found"; }
-found=$(grep -rnE 'AngleAxis|slerp|computeDirect\(|<random>' pointflight ros_common recording --include='*.cpp' --include='*.hpp' |
+found=$(grep -rnE 'AngleAxis|slerp|computeDirect\(|<random>' pointflight ros_common recording share --include='*.cpp' --include='*.hpp' |
         grep -vE ':[0-9]*: *//|//.*(slerp|computeDirect|AngleAxis)')
 [ -z "$found" ] || { echo "calls libm or <random>:"; breach "$found"; }
 
 # The core reads no wall clock (runs do: their pace is a wait around the steps) and prints nothing.
 found=$(grep -rnE 'system_clock|steady_clock|time\(nullptr|std::(cout|cerr)|fmt::print|printf\(' \
-        pointflight ros_common recording --include='*.cpp' --include='*.hpp' |
+        pointflight ros_common recording share --include='*.cpp' --include='*.hpp' |
         grep -vE '^pointflight/run/.*steady_clock')
 [ -z "$found" ] || { echo "wall clock or printing in the library:"; breach "$found"; }
 
 # Public headers: std and Eigen only, so that a user needs no other headers.
 found=$(grep -rnE '#include <(fmt|yaml-cpp|nlohmann|tbb|oneapi|nanoflann|xxhash|lzf|liblzf|assimp|Random123|hwy|lzma|boost)' \
-        pointflight ros_common recording campaign view --include='*.hpp' | grep -vE 'io/byte_cursor.hpp|-inl.hpp')
+        pointflight ros_common recording campaign view share --include='*.hpp' | grep -vE 'io/byte_cursor.hpp|-inl.hpp')
 [ -z "$found" ] || { echo "third-party headers in public headers:"; breach "$found"; }
 
 # Each source includes its own header first, so that headers compile alone.
-for source in $(git ls-files 'pointflight/*.cpp' 'apps/*.cpp' 'ros_common/*.cpp' 'recording/*.cpp' 'campaign/*.cpp' 'view/*.cpp' 'ros1/*.cpp' 'ros2/*.cpp'); do
+for source in $(git ls-files 'pointflight/*.cpp' 'apps/*.cpp' 'ros_common/*.cpp' 'recording/*.cpp' 'campaign/*.cpp' 'view/*.cpp' 'share/*.cpp' 'dds/*.cpp' 'ros1/*.cpp' 'ros2/*.cpp'); do
   [ -f "${source%.cpp}.hpp" ] || continue
   case $(grep -m1 '^#include' "$source") in
     "#include \"${source%.cpp}.hpp\"") ;;

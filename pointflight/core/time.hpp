@@ -51,6 +51,16 @@ class Schedule {
     return SimTime(phase_ + Duration(static_cast<std::int64_t>(scaled / millihertz_)));
   }
 
+  /// The first k whose instant is at `time` or later.
+  [[nodiscard]] std::int64_t first_from(SimTime time) const {
+    constexpr __int128 kNanosecondsTimesThousand = 1'000'000'000'000;
+    const __int128 since = (time.time_since_epoch() - phase_).count();
+    auto k = static_cast<std::int64_t>(since * millihertz_ / kNanosecondsTimesThousand);
+    while (k > 0 && at(k - 1) >= time) --k;
+    while (at(k) < time) ++k;
+    return k < 0 ? 0 : k;
+  }
+
  private:
   std::int64_t millihertz_;
   Duration phase_;

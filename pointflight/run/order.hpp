@@ -29,9 +29,24 @@ struct RateOrder {
 struct SeekOrder {
   SimTime to;  ///< Of the run.
 };
+/// Of a run that is shared with other processes: be where they are (`Simulation::skip_to`).
+struct SkipOrder {
+  SimTime to;  ///< Of the run; later than it is.
+};
+/// The same, for less than a moment: from here on each instant is due so much earlier.
+struct HurryOrder {
+  Duration by{0};
+};
 
 /// What may be told to a run from outside; those without a vehicle are about the run.
-using Order =
-    std::variant<VehicleOrder, PauseOrder, StepOrder, ResetOrder, EndOrder, RateOrder, SeekOrder>;
+using Order = std::variant<VehicleOrder,
+                           PauseOrder,
+                           StepOrder,
+                           ResetOrder,
+                           EndOrder,
+                           RateOrder,
+                           SeekOrder,
+                           SkipOrder,
+                           HurryOrder>;
 
 }  // namespace pointflight

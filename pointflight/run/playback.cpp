@@ -260,7 +260,13 @@ struct RecordedRun::Files {
       const std::uint32_t v = numbers[words[2]];
       const Vector3d here(value(4), value(5), value(6));
       if (!words[1].starts_with("collision")) {
-        const VehicleEvent event{v, time, words[1], "", here};
+        VehicleEvent event;
+        event.vehicle = v;
+        event.time = time;
+        event.kind = words[1];
+        event.vehicle_world = here;
+        if (numbers.contains(words[3])) event.partner = kFirstVehicle + numbers[words[3]];
+        if (event.partner) event.penetration = value(10);
         add(Phase::kSamples, time, kEventRank, v, true, [event] { return Sample(event); });
         continue;
       }

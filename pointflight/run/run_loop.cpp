@@ -28,6 +28,11 @@ std::optional<double> Pace::late(SimTime time) const {
   return since.count() - to_seconds(time - from_) / rate_;
 }
 
+std::optional<SimTime> Pace::due_at(Clock::time_point wall) const {
+  if (rate_ <= 0.0) return std::nullopt;
+  return from_ + from_seconds(rate_ * std::chrono::duration<double>(wall - start_).count());
+}
+
 void Pace::wait_for(SimTime time) const {
   if (rate_ <= 0.0) return;
   const auto due = start_ + std::chrono::duration_cast<Clock::duration>(
@@ -153,6 +158,10 @@ RunEnd RunLoop::run() {
   return simulation_.end();
 }
 
+std::optional<SimTime> RunLoop::due_at(Clock::time_point wall) const {
+  return has_started_ ? pace_.due_at(wall) : std::nullopt;
+}
+
 double RunLoop::wall_time() const {
   return wall_time_.value_or(std::chrono::duration<double>(Clock::now() - started_).count());
 }
@@ -213,12 +222,18 @@ void RunLoop::obey(Link& link, const Order& order) {
   } else if (std::holds_alternative<StepOrder>(order)) {
     step_once_ = paused_;
   } else if (std::holds_alternative<ResetOrder>(order)) {
-    reset_ = true;
+    reset_ = simulation_.others() == nullptr;
+    if (!reset_) say("a run that other processes share cannot begin again");
   } else if (const auto* rate = std::get_if<RateOrder>(&order)) {
     pace_ = Pace(rate->rate);
     pace_.restart_at(simulation_.time());
   } else if (std::holds_alternative<EndOrder>(order)) {
     ended_ = true;
+  } else if (const auto* skip = std::get_if<SkipOrder>(&order)) {
+    simulation_.skip_to(skip->to);
+    pace_.restart_at(skip->to);
+  } else if (const auto* hurry = std::get_if<HurryOrder>(&order)) {
+    pace_.hurry(hurry->by);
   }
 }
 

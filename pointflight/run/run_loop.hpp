@@ -25,6 +25,10 @@ class Pace {
   void restart_at(SimTime time);
   /// How long ago an instant was due, s; nothing where the run is not held back.
   [[nodiscard]] std::optional<double> late(SimTime time) const;
+  /// The instant that is due at a time of the wall clock; nothing where the run is not held back.
+  [[nodiscard]] std::optional<SimTime> due_at(std::chrono::steady_clock::time_point wall) const;
+  /// From here on each instant is due so much earlier.
+  void hurry(Duration by) { start_ -= by; }
   /// Waits until an instant is due; not for less than 2 ms.
   void wait_for(SimTime time) const;
   /// Where the run has fallen behind by a second, and when that has doubled: how far (s), and the
@@ -93,6 +97,9 @@ class RunLoop {
   [[nodiscard]] bool has_started() const { return has_started_; }
   /// Since the first step by the wall clock, s.
   [[nodiscard]] double wall_time() const;
+  /// Where the run should be at a time of the wall clock; nothing before its first step, and where
+  /// it is not held to the wall clock. From the loop's thread.
+  [[nodiscard]] std::optional<SimTime> due_at(std::chrono::steady_clock::time_point wall) const;
   /// From a scan's end until it was handed over, where the run is held to the wall clock.
   [[nodiscard]] const ScanDelays& scan_delays() const { return delays_; }
   /// Scans that lockstep waited for in vain.

@@ -106,6 +106,19 @@ nlohmann::ordered_json json_of(const Simulation& simulation, std::size_t number)
   return json;
 }
 
+/// A vehicle that another process flew.
+nlohmann::ordered_json json_of(const Simulation& simulation, const ApartSummary& other) {
+  nlohmann::ordered_json json;
+  json["name"] = simulation.vehicle(other.vehicle).setup().name;
+  json["flown_by"] = other.flown_by;
+  json["losses"] = other.losses;
+  json["time_apart"] = to_seconds(other.apart);
+  json["missed_contacts"] = other.missed_contacts;
+  json["unknown_contacts"] = other.unknown_contacts;
+  json["extrapolated_max"] = other.extrapolated_max;
+  return json;
+}
+
 }  // namespace
 
 /// What one vehicle's samples go to.
@@ -187,6 +200,10 @@ FlightRecorder::FlightRecorder(const std::string& folder,
   }
   for (std::size_t v = 0; v < simulation.vehicle_count(); ++v) {
     names_.push_back(simulation.vehicle(v).setup().name);
+    if (!simulation.is_own(v)) {
+      vehicles_.push_back(nullptr);  // another process writes it
+      continue;
+    }
     auto files = std::make_unique<VehicleFiles>(
         simulation.vehicle_count() == 1 ? folder_.staging() : path_for(names_.back()), output);
     files->trajectory.write(
@@ -298,30 +315,32 @@ void FlightRecorder::write(const ScanSample& sample) {
                                 q.z()));
 }
 
+std::string FlightRecorder::partner_name(Label label) const {
+  if (label == kMapLabel) return "map";
+  if (label >= kFirstObstacle) return fmt::format("obstacle {}", label - kFirstObstacle);
+  return names_[label - kFirstVehicle];
+}
+
 void FlightRecorder::write(const CollisionEvent& event) {
-  std::string partner = "map";
-  if (event.partner >= kFirstObstacle) {
-    partner = fmt::format("obstacle {}", event.partner - kFirstObstacle);
-  } else if (event.partner != kMapLabel) {
-    partner = names_[event.partner - kFirstVehicle];
-  }
   events_.write(fmt::format("{},{},{},{},{},{},{}\n",
                             seconds(event.time),
                             event.entered ? "collision" : "collision_end",
                             names_[event.vehicle],
-                            partner,
+                            partner_name(event.partner),
                             csv(event.vehicle_world),
                             csv(event.place_world),
                             event.penetration));
 }
 
 void FlightRecorder::write(const VehicleEvent& event) {
-  // no partner, no place, no depth
-  events_.write(fmt::format("{},{},{},,{},,,,\n",
+  // no place; mostly no partner and no depth
+  events_.write(fmt::format("{},{},{},{},{},,,,{}\n",
                             seconds(event.time),
                             event.kind,
                             names_[event.vehicle],
-                            csv(event.vehicle_world)));
+                            event.partner ? partner_name(*event.partner) : "",
+                            csv(event.vehicle_world),
+                            event.partner ? fmt::format("{}", event.penetration) : ""));
 }
 
 void FlightRecorder::write(const ObstacleSample& sample) {
@@ -341,7 +360,9 @@ void FlightRecorder::write(const ObstacleSample& sample) {
 }
 
 void FlightRecorder::finish(const Simulation& simulation) {
-  for (const auto& files : vehicles_) files->commit();
+  for (const auto& files : vehicles_) {
+    if (files) files->commit();
+  }
   if (obstacles_) obstacles_->commit();
   events_.commit();
   OutputFile summary(path_for("summary.json"));
@@ -365,8 +386,15 @@ std::string summary_json(const Simulation& simulation) {
   json["simulated_time"] = static_cast<double>(simulation.time().time_since_epoch().count()) / 1e9;
   json["obstacles"] = simulation.obstacle_count();
   json["vehicles"] = nlohmann::ordered_json::array();
-  for (std::size_t v = 0; v < simulation.vehicle_count(); ++v) {
+  for (const std::size_t v : simulation.own_vehicles()) {
     json["vehicles"].push_back(json_of(simulation, v));
+  }
+  if (simulation.others() != nullptr) {
+    json["skipped_time"] = to_seconds(simulation.state().skipped);
+    json["others"] = nlohmann::ordered_json::array();
+    for (const ApartSummary& other : simulation.others()->apart()) {
+      json["others"].push_back(json_of(simulation, other));
+    }
   }
   return json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
 }

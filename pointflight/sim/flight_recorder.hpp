@@ -46,11 +46,12 @@ class FlightRecorder : public SampleSink {
   void write(const VehicleEvent& event);
   void write(const ObstacleSample& sample);
   void write(const StatusSample& /*sample*/) {}
+  [[nodiscard]] std::string partner_name(Label label) const;
 
   RunFolder folder_;
   bool write_scans_;
-  std::vector<std::string> names_;  ///< Of the vehicles.
-  std::vector<std::unique_ptr<VehicleFiles>> vehicles_;
+  std::vector<std::string> names_;                       ///< Of the vehicles.
+  std::vector<std::unique_ptr<VehicleFiles>> vehicles_;  ///< Null: another process' vehicle.
   OutputFile events_;
   std::optional<OutputFile> obstacles_;
 };

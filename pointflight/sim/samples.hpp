@@ -70,9 +70,13 @@ struct CollisionEvent {
 struct VehicleEvent {
   std::uint32_t vehicle = 0;  ///< Number in the fleet, from 0.
   SimTime time;               ///< Of the step that it was noticed in.
-  std::string kind;           ///< "battery_low", "battery_empty", "rotor_lost" or "beyond_limits".
-  std::string words;          ///< One line for users.
+  /// "battery_low", "battery_empty", "rotor_lost", "beyond_limits"; of shared runs "lost", "back",
+  /// "left", "missed_contact".
+  std::string kind;
+  std::string words;                          ///< One line for users.
   Vector3d vehicle_world = Vector3d::Zero();  ///< The body's origin, m.
+  std::optional<Label> partner;               ///< What it is about besides the vehicle.
+  double penetration = 0.0;                   ///< m, with a partner that was met.
 };
 
 /// An obstacle at an instant.

@@ -90,13 +90,16 @@ Simulation::Simulation(const Scenario& scenario,
   const double natural = busy > 0.0 ? busy : kIdleTime;
   setup->end_time = SimTime(from_seconds(scenario.duration > 0.0 ? scenario.duration : natural));
   sources_.resize(fleet.size());
+  for (std::size_t i = 0; i < fleet.size(); ++i) own_.push_back(i);
   setup_ = std::move(setup);
   for (std::size_t i = 0; i < vehicle_count(); ++i) check_start(i);
 }
 
 SimTime Simulation::end_time() const {
-  return setup_->scenario.duration > 0.0 ? setup_->end_time
-                                         : std::max(setup_->end_time, state_.busy_until);
+  const SimTime own = setup_->scenario.duration > 0.0
+                          ? setup_->end_time
+                          : std::max(setup_->end_time + state_.skipped, state_.busy_until);
+  return std::max(own, met_.end_time);
 }
 
 void Simulation::require_vehicle(std::size_t number) const {
@@ -148,6 +151,7 @@ void Simulation::check_start(std::size_t number) const {
 
 std::optional<std::string> Simulation::command(std::size_t vehicle_number, const Command& command) {
   const VehicleAgent& agent = vehicle(vehicle_number);
+  if (!is_own(vehicle_number)) return "another process flies it";
   VehicleStatus& status = state_.vehicles[vehicle_number];
   if (auto reason = agent.command(status, command, state_.time)) return reason;
   status.scripted = false;
@@ -194,7 +198,9 @@ void Simulation::sense(std::vector<StepSamples>& samples) {
   const SimTime before = state_.step_number > 0 ? now - setup_->step : now;
   std::vector<PlacedBody> vehicles;
   vehicles.reserve(vehicle_count());
+  std::vector<PlacedBody> own(vehicle_count());
   for (std::size_t i = 0; i < vehicle_count(); ++i) {
+    if (!status(i).present) continue;
     const VehicleAgent& agent = vehicle(i);
     const Pose pose = status(i).state.body.T_world_body();
     const ProximityState& known = status(i).proximity;
@@ -203,26 +209,33 @@ void Simulation::sense(std::vector<StepSamples>& samples) {
                         bounding_radius(agent.hull()),
                         known.started ? known.T_world_body : pose,
                         pose});
+    own[i] = vehicles.back();
   }
-  executor_->parallel_for(
-      vehicle_count(), kVehiclesPerChunk, [&](std::size_t begin, std::size_t end) {
-        std::vector<PlacedBody> bodies = vehicles;
-        for (std::size_t i = begin; i < end; ++i) {
-          bodies.resize(vehicles.size());  // without the obstacles near the one before
-          sense_one(i, before, bodies, samples[i]);
-        }
-      });
+  executor_->parallel_for(own_.size(), kVehiclesPerChunk, [&](std::size_t begin, std::size_t end) {
+    std::vector<PlacedBody> bodies = vehicles;
+    for (std::size_t k = begin; k < end; ++k) {
+      bodies.resize(vehicles.size());  // without the obstacles near the one before
+      sense_one(own_[k], before, own[own_[k]], bodies, samples[own_[k]]);
+    }
+  });
+}
+
+/// An action for each own vehicle, by all threads.
+void Simulation::for_own(const std::function<void(std::size_t)>& action) const {
+  executor_->parallel_for(own_.size(), kVehiclesPerChunk, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t k = begin; k < end; ++k) action(own_[k]);
+  });
 }
 
 /// What is near one hull. `bodies`: all vehicles where they are; obstacles are added.
 void Simulation::sense_one(std::size_t number,
                            SimTime before,
+                           const PlacedBody& own,
                            std::vector<PlacedBody>& bodies,
                            StepSamples& samples) {
   const SimTime now = state_.time;
   VehicleStatus& status = state_.vehicles[number];
   const VehicleAgent& agent = vehicle(number);
-  const PlacedBody own = bodies[number];
   ProximityQuery query;
   query.vehicle = agent.number();
   query.own_label = agent.label();
@@ -260,7 +273,7 @@ void Simulation::sense_one(std::size_t number,
 /// Collisions of this step: who stops, who falls. True where the run ends.
 bool Simulation::react(std::vector<StepSamples>& samples) {
   bool stops = false;
-  for (std::size_t i = 0; i < vehicle_count(); ++i) {
+  for (const std::size_t i : own_) {
     const VehicleAgent& agent = vehicle(i);
     VehicleStatus& status = state_.vehicles[i];
     for (const CollisionEvent& event : samples[i].collisions) {
@@ -278,19 +291,23 @@ bool Simulation::step(SampleSink& sink) {
   const SimTime now = state_.time;
   const double dt = to_seconds(setup_->step);
   std::vector<StepSamples> samples(vehicle_count());
+  if (others_ != nullptr) meet_others();
   sense(samples);
-  const bool stops = react(samples);
+  if (others_ != nullptr) {
+    for (std::size_t i = 0; i < vehicle_count(); ++i) {
+      if (!is_own(i)) place_other(i);
+    }
+  }
+  const bool met_something = react(samples);
   const bool last = now >= end_time() && !is_landing();
+  const bool stops = agree(met_something, last);
   const SimTime samples_end = stops || last ? now + Duration{1} : now + setup_->step;
-  executor_->parallel_for(
-      vehicle_count(), kVehiclesPerChunk, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t i = begin; i < end; ++i) {
-          VehicleStatus& status = state_.vehicles[i];
-          status.history.record(now, status.state.body.T_world_body());
-          vehicle(i).control(status, *setup_->map, now, setup_->step, state_.step_number);
-          vehicle(i).sample(status, now, samples_end, samples[i]);
-        }
-      });
+  for_own([&](std::size_t i) {
+    VehicleStatus& status = state_.vehicles[i];
+    status.history.record(now, status.state.body.T_world_body());
+    vehicle(i).control(status, *setup_->map, now, setup_->step, state_.step_number);
+    vehicle(i).sample(status, now, samples_end, samples[i]);
+  });
   deliver(samples, sink);
   sample_obstacles(samples_end, sink);
   take_due_scans(sink);
@@ -307,13 +324,10 @@ bool Simulation::step(SampleSink& sink) {
     return false;
   }
   std::vector<char> fine(vehicle_count(), 1);
-  executor_->parallel_for(
-      vehicle_count(), kVehiclesPerChunk, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t i = begin; i < end; ++i) {
-          if (!sources_[i]) fine[i] = vehicle(i).integrate(state_.vehicles[i], dt) ? 1 : 0;
-        }
-      });
-  for (std::size_t i = 0; i < vehicle_count(); ++i) {
+  for_own([&](std::size_t i) {
+    if (!sources_[i]) fine[i] = vehicle(i).integrate(state_.vehicles[i], dt) ? 1 : 0;
+  });
+  for (const std::size_t i : own_) {
     if (sources_[i]) {
       VehicleStatus& status = state_.vehicles[i];
       const auto state = sources_[i]->state_at(now + setup_->step);
@@ -346,11 +360,17 @@ void Simulation::finish_run() {
 /// True while a vehicle comes down at a program's word in a run without a duration.
 bool Simulation::is_landing() const {
   if (setup_->scenario.duration > 0.0) return false;
-  return std::any_of(
-      state_.vehicles.begin(), state_.vehicles.end(), [](const VehicleStatus& status) {
-        return status.commanded && status.autopilot.armed &&
-               std::holds_alternative<LandCommand>(status.autopilot.command);
-      });
+  // as it was told: all processes must see the same last step
+  return others_ != nullptr ? met_.is_landing : lands();
+}
+
+/// An own vehicle comes down at a program's word.
+bool Simulation::lands() const {
+  return std::any_of(own_.begin(), own_.end(), [this](std::size_t i) {
+    const VehicleStatus& s = status(i);
+    return s.commanded && s.autopilot.armed &&
+           std::holds_alternative<LandCommand>(s.autopilot.command);
+  });
 }
 
 /// True where nothing but the lack of commands ends the run: programs gave some, or nobody did.
@@ -358,7 +378,7 @@ bool Simulation::is_idle() const {
   if (setup_->scenario.duration > 0.0) return false;
   bool had_plan = false;
   for (std::size_t i = 0; i < vehicle_count(); ++i) {
-    if (status(i).commanded) return true;
+    if (is_judged(i) && is_commanded(i)) return true;
     had_plan = had_plan || vehicle(i).busy_time() > 0.0;
   }
   return !had_plan;
@@ -367,15 +387,21 @@ bool Simulation::is_idle() const {
 /// All that have a mission and nothing else to do are at their goals; nobody lies broken or empty.
 bool Simulation::arrived() const {
   for (std::size_t i = 0; i < vehicle_count(); ++i) {
-    const VehicleSetup& setup = vehicle(i).setup();
-    if (status(i).crashed || status(i).summary.battery_empty) return false;
-    const bool elsewhere = status(i).commanded || !setup.commands.empty();
-    if (setup.mission.waypoints.empty() || elsewhere) continue;
-    const Mission& mission = vehicle(i).mission();
-    const double away = (status(i).state.body.p_world - mission.goal()).norm();
-    if (away >= kGoalTolerance || to_seconds(state_.time) < mission.duration()) return false;
+    if (is_judged(i) && !(is_own(i) ? has_arrived(i) : met_.vehicles[i]->arrived)) return false;
   }
   return true;
+}
+
+/// The same of an own vehicle.
+bool Simulation::has_arrived(std::size_t number) const {
+  const VehicleSetup& setup = vehicle(number).setup();
+  const VehicleStatus& s = status(number);
+  if (s.crashed || s.summary.battery_empty) return false;
+  const bool elsewhere = s.commanded || !setup.commands.empty();
+  if (setup.mission.waypoints.empty() || elsewhere) return true;
+  const Mission& mission = vehicle(number).mission();
+  const double away = (s.state.body.p_world - mission.goal()).norm();
+  return away < kGoalTolerance && to_seconds(state_.time - s.skipped) >= mission.duration();
 }
 
 /// Somebody flies where nothing can be measured any more, or falls through a hole in the floor. A
@@ -384,6 +410,7 @@ bool Simulation::has_left_map() const {
   bool flying = false;
   bool lost = false;
   for (std::size_t i = 0; i < vehicle_count(); ++i) {
+    if (!is_judged(i)) continue;
     const bool is_out = is_lost(*setup_->map, status(i).state.body.p_world);
     if (is_out && !status(i).crashed) return true;
     lost = lost || is_out;

@@ -1,12 +1,15 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "pointflight/core/parallel.hpp"
+#include "pointflight/sim/fleet_exchange.hpp"
 #include "pointflight/sim/samples.hpp"
 #include "pointflight/sim/scenario.hpp"
 #include "pointflight/sim/state_source.hpp"
@@ -38,7 +41,8 @@ struct SimulationState {
   std::int64_t next_obstacle_sample = 0;  ///< Index in the schedule of output.obstacle_rate.
   std::int64_t next_status = 0;           ///< Index in the schedule of `kStatusRate`.
   RunEnd end = RunEnd::kRunning;          ///< How it ended; no step is done after that.
-  SimTime busy_until;  ///< That commands from the program last and what is waited after them.
+  SimTime busy_until;   ///< That commands from the program last and what is waited after them.
+  Duration skipped{0};  ///< Time that was jumped over (`Simulation::skip_to`).
   std::vector<VehicleStatus> vehicles;  ///< By number.
 };
 
@@ -79,6 +83,28 @@ class Simulation {
   /// Scans, collisions and samples see no difference. Not part of `state`.
   void follow(std::size_t vehicle, std::shared_ptr<StateSource> source);
 
+  /// From now on only the vehicles of `own` (by number) are simulated here: sensed, controlled,
+  /// told of. The others are where `others` says, which must outlive the run: seen in scans, met,
+  /// and nothing else. Throws std::out_of_range, std::invalid_argument without an own vehicle.
+  void share(const std::vector<std::size_t>& own, FleetExchange& others);
+  /// True where it is simulated here.
+  [[nodiscard]] bool is_own(std::size_t vehicle) const;
+  /// Numbers of those that are, ascending.
+  [[nodiscard]] const std::vector<std::size_t>& own_vehicles() const { return own_; }
+  /// The other processes; null where the run is not shared.
+  [[nodiscard]] const FleetExchange* others() const { return others_; }
+
+  /// Goes on at a later time, as if none had passed for the vehicles: they are where they were,
+  /// what they were told lasts as long as it would have, sensors begin with their next measurement.
+  /// Obstacles are where they are then. Throws std::invalid_argument where it is no whole number of
+  /// steps, or earlier.
+  void skip_to(SimTime time);
+
+  /// Before the first step: as if the run had come to `time`, with these states of vehicles (by
+  /// number), and with what the scenario told them until then under way. Controllers, batteries and
+  /// what sensors remember are as at the start. Throws as `skip_to`.
+  void resume_at(SimTime time, const std::map<std::size_t, VehicleState>& states);
+
   /// Ends the run early.
   void interrupt();
   /// Ends the run as completed: a goal that only the calling program knows is reached.
@@ -92,6 +118,10 @@ class Simulation {
 
   /// Of the states that `status` has: the start of the next step.
   [[nodiscard]] SimTime time() const { return state_.time; }
+  /// How much of `time` was simulated: without what was skipped.
+  [[nodiscard]] Duration simulated() const {
+    return state_.time.time_since_epoch() - state_.skipped;
+  }
   /// When the run ends by itself: the scenario's duration, or else the end of missions and
   /// commands, which moves as a program gives more; then a landing under way is waited for.
   [[nodiscard]] SimTime end_time() const;
@@ -130,6 +160,7 @@ class Simulation {
   void sense(std::vector<StepSamples>& samples);
   void sense_one(std::size_t number,
                  SimTime before,
+                 const PlacedBody& own,
                  std::vector<PlacedBody>& bodies,
                  StepSamples& samples);
   [[nodiscard]] bool react(std::vector<StepSamples>& samples);
@@ -147,19 +178,33 @@ class Simulation {
     SimTime start, end;
   };
   [[nodiscard]] std::vector<DueInterval> due_intervals();
+  [[nodiscard]] PoseTrack track_of(std::size_t number, SimTime from, SimTime until) const;
   [[nodiscard]] std::vector<Body> bodies_for(std::size_t number,
                                              const IntervalSensor& sensor,
                                              std::span<const PoseTrack> tracks,
                                              SimTime from,
                                              SimTime until) const;
+  void for_own(const std::function<void(std::size_t)>& action) const;
+  [[nodiscard]] SharedStep shared_step(bool is_verdict) const;
+  void meet_others();
+  void place_other(std::size_t number);
+  [[nodiscard]] bool agree(bool stops, bool last);
+  [[nodiscard]] bool is_judged(std::size_t number) const;
+  [[nodiscard]] bool is_commanded(std::size_t number) const;
+  void move_schedules_to(SimTime time);
+  [[nodiscard]] bool has_arrived(std::size_t number) const;
   [[nodiscard]] bool arrived() const;
   [[nodiscard]] bool has_left_map() const;
   [[nodiscard]] bool is_idle() const;
   [[nodiscard]] bool is_landing() const;
+  [[nodiscard]] bool lands() const;
 
   std::shared_ptr<const Setup> setup_;
   const Executor* executor_;
   std::vector<std::shared_ptr<StateSource>> sources_;
+  std::vector<std::size_t> own_;
+  FleetExchange* others_ = nullptr;
+  OtherVehicles met_;  ///< In the step under way.
   SimulationState state_;
 };
 

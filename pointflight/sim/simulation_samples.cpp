@@ -13,6 +13,11 @@ constexpr double kBeamOrigin = 1.0;  // m: beams start no farther from their sen
 
 /// All vehicles' samples in the order (time, rank, vehicle).
 void Simulation::deliver(std::vector<StepSamples>& samples, SampleSink& sink) {
+  if (others_ != nullptr) {
+    for (VehicleEvent& event : others_->take_events()) {
+      samples[event.vehicle].items.push_back({event.time, kEventRank, std::move(event)});
+    }
+  }
   std::vector<StepSamples::Item*> due;
   for (StepSamples& s : samples) {
     for (CollisionEvent& event : s.collisions)
@@ -68,7 +73,7 @@ void Simulation::sample_status(SampleSink& sink) {
   const Schedule schedule(kStatusRate);
   if (schedule.at(state_.next_status) > state_.time) return;
   while (schedule.at(state_.next_status) <= state_.time) ++state_.next_status;
-  for (std::size_t v = 0; v < vehicle_count(); ++v) sink.on_sample(status_sample(v));
+  for (const std::size_t v : own_) sink.on_sample(status_sample(v));
 }
 
 /// What a sensor of a vehicle can meet: everybody else, and the obstacles that are near enough.
@@ -84,7 +89,7 @@ std::vector<Body> Simulation::bodies_for(std::size_t number,
   std::vector<Body> bodies = setup_->obstacles.near(
       own.at(middle).translation, sensor.reach() + moved + kBeamOrigin, from, until);
   for (std::size_t i = 0; i < vehicle_count(); ++i) {
-    if (i == number && !sensor.sees_own_vehicle()) continue;
+    if ((i == number && !sensor.sees_own_vehicle()) || !status(i).present) continue;
     Body body;
     body.label = vehicle(i).label();
     body.shape = vehicle(i).shape();
@@ -92,6 +97,7 @@ std::vector<Body> Simulation::bodies_for(std::size_t number,
     body.intensity = static_cast<float>(vehicle(i).settings().intensity);
     body.speed_max = tracks[i].speed_max(from, until);
     body.motion = tracks[i];
+    body.from = status(i).present_since;
     bodies.push_back(std::move(body));
   }
   return bodies;
@@ -102,7 +108,7 @@ std::vector<Simulation::DueInterval> Simulation::due_intervals() {
   std::vector<DueInterval> due;
   SimTime first_end = SimTime::max();
   SimTime oldest_needed = state_.time;
-  for (std::size_t v = 0; v < vehicle_count(); ++v) {
+  for (const std::size_t v : own_) {
     const auto sensors = vehicle(v).sensors();
     for (std::size_t i = 0; i < sensors.size(); ++i) {
       const IntervalSensor* sensor = sensors[i].interval;
@@ -122,6 +128,15 @@ std::vector<Simulation::DueInterval> Simulation::due_intervals() {
   return due;
 }
 
+/// Where a vehicle was; at the origin for one that is not there.
+PoseTrack Simulation::track_of(std::size_t number, SimTime from, SimTime until) const {
+  if (!status(number).present) return PoseTrack();
+  if (!is_own(number)) {
+    if (auto track = others_->track(number, from, until)) return *std::move(track);
+  }
+  return status(number).history.track(from, until);
+}
+
 /// Scans that have ended: taken in arrears, those that end together at the same time.
 void Simulation::take_due_scans(SampleSink& sink) {
   for (auto due = due_intervals(); !due.empty(); due = due_intervals()) {
@@ -130,9 +145,7 @@ void Simulation::take_due_scans(SampleSink& sink) {
     for (const DueInterval& d : due) start = std::min(start, d.start);
     std::vector<PoseTrack> tracks;
     tracks.reserve(vehicle_count());
-    for (const VehicleStatus& status : state_.vehicles) {
-      tracks.push_back(status.history.track(start, end));
-    }
+    for (std::size_t v = 0; v < vehicle_count(); ++v) tracks.push_back(track_of(v, start, end));
     std::vector<std::optional<Sample>> samples(due.size());
     executor_->parallel_for(due.size(), 1, [&](std::size_t k, std::size_t) {
       const DueInterval& d = due[k];

@@ -16,6 +16,9 @@ class StateHistory {
   /// Forgets what is not needed for instants at or after `time`.
   void forget_before(SimTime time);
 
+  /// Forgets all: what comes next does not go on from it.
+  void clear() { records_.clear(); }
+
   /// Where it was in [from, until]: the first or last record outside what is known. Safe to call
   /// from several threads; not before the first record.
   [[nodiscard]] PoseTrack track(SimTime from, SimTime until) const;

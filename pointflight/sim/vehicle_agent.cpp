@@ -62,7 +62,8 @@ void VehicleAgent::control(VehicleStatus& status,
   const RigidBodyState& body = status.state.body;
   const double dt = to_seconds(step);
   if (!status.landed && touches_down(status)) status.landed = true;
-  while (status.next_command < commands_.size() && commands_[status.next_command].time <= now) {
+  while (status.next_command < commands_.size() &&
+         commands_[status.next_command].time + status.skipped <= now) {
     command(status, commands_[status.next_command++].command, now);
     status.scripted = true;
   }
@@ -114,7 +115,13 @@ void VehicleAgent::note(VehicleStatus& status,
                         SimTime now,
                         const char* kind,
                         const std::string& words) const {
-  status.events.push_back({number_, now, kind, words, status.state.body.p_world});
+  VehicleEvent event;
+  event.vehicle = number_;
+  event.time = now;
+  event.kind = kind;
+  event.words = words;
+  event.vehicle_world = status.state.body.p_world;
+  status.events.push_back(std::move(event));
 }
 
 std::optional<std::string> VehicleAgent::command(VehicleStatus& status,
@@ -225,6 +232,26 @@ bool VehicleAgent::integrate(VehicleStatus& status, double dt) const {
   if (status.landed && body.v_world.z() > 0.0) status.landed = false;
   status.summary.distance_flown += (body.p_world - before).norm();
   return body.is_finite();
+}
+
+void VehicleAgent::resume(VehicleStatus& status, const VehicleState& state, SimTime time) const {
+  status.state = state;
+  for (std::size_t i = 0; i < state.rotors.size(); ++i) {
+    status.rotor_commands[i] = state.rotors[i].speed;
+  }
+  while (status.next_command < commands_.size() && commands_[status.next_command].time <= time) {
+    const TimedCommand& given = commands_[status.next_command++];
+    command(status, given.command, given.time);
+    status.scripted = true;
+  }
+}
+
+void VehicleAgent::move_schedules_to(VehicleStatus& status, SimTime time) const {
+  status.late.clear();
+  status.next_state = state_schedule_.first_from(time);
+  for (std::size_t i = 0; i < sensors_.size(); ++i) {
+    status.sensors[i].next = sensors_[i].sensor->schedule().first_from(time);
+  }
 }
 
 void VehicleAgent::crash(VehicleStatus& status) const {

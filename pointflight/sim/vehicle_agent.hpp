@@ -81,6 +81,9 @@ struct VehicleStatus {
   double squared_error_sum = 0.0;      ///< Of the tracking error, m^2.
   std::uint64_t steps = 0;             ///< That it was summed over.
   VehicleSummary summary;              ///< What happened so far.
+  bool present = true;                 ///< False: another process', and not there.
+  SimTime present_since = SimTime::min();  ///< Since when it has been there.
+  Duration skipped{0};  ///< The scenario's commands come so much later (`Simulation::skip_to`).
 };
 
 /// The order of a vehicle's samples at one instant: what happened first.
@@ -147,6 +150,13 @@ class VehicleAgent {
 
   /// Advances by a step; false where the dynamics diverged.
   bool integrate(VehicleStatus& status, double dt) const;
+
+  /// As if it had come to a state at `time` with what the scenario told it until then.
+  void resume(VehicleStatus& status, const VehicleState& state, SimTime time) const;
+
+  /// Its sensors begin with their first measurement at or after `time`; what was on its way is
+  /// lost.
+  void move_schedules_to(VehicleStatus& status, SimTime time) const;
 
   /// Its hull met something: what the scenario says happens.
   void crash(VehicleStatus& status) const;

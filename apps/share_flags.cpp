@@ -1,0 +1,173 @@
+#include "apps/share_flags.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <random>
+
+#include "apps/modules.hpp"
+#include "apps/terminal.hpp"
+#include "pointflight/core/input_error.hpp"
+#include "ros_common/ros_names.hpp"
+
+namespace pointflight::apps {
+namespace {
+
+constexpr std::size_t kNameMost = 64;
+
+std::int64_t steady_ns() {
+  return std::chrono::duration_cast<Duration>(std::chrono::steady_clock::now().time_since_epoch())
+      .count();
+}
+
+/// "host:4711"
+std::string process_name() {
+  std::array<char, 65> host{};
+  if (gethostname(host.data(), host.size() - 1) != 0) host = {'?'};
+  return fmt::format("{}:{}", host.data(), getpid());
+}
+
+std::uint64_t random_id() {
+  std::random_device device;
+  const std::uint64_t high = device();
+  return (high << 32 | device()) | 1;  // never 0
+}
+
+/// A number in the fleet, given as such or by name.
+std::size_t vehicle_from(const std::string& word, const Simulation& simulation) {
+  const std::size_t count = simulation.vehicle_count();
+  for (std::size_t v = 0; v < count; ++v) {
+    if (simulation.vehicle(v).setup().name == word) return v;
+  }
+  const bool digits = !word.empty() && word.find_first_not_of("0123456789") == std::string::npos;
+  const std::size_t number = digits && word.size() < 6 ? std::stoul(word) : count;
+  if (number >= count) {
+    throw InputError(
+        fmt::format("--vehicles: '{}' is no vehicle of the scenario; it has 0 to {} ({} to {})",
+                    word,
+                    count - 1,
+                    simulation.vehicle(0).setup().name,
+                    simulation.vehicle(count - 1).setup().name));
+  }
+  return number;
+}
+
+std::vector<std::size_t> vehicles_from(const std::vector<std::string>& words,
+                                       const Simulation& simulation) {
+  std::vector<std::size_t> vehicles;
+  for (const std::string& word : words) {
+    const auto dash = word.find('-');
+    if (dash == std::string::npos || dash == 0) {
+      vehicles.push_back(vehicle_from(word, simulation));
+      continue;
+    }
+    const std::size_t first = vehicle_from(word.substr(0, dash), simulation);
+    const std::size_t last = vehicle_from(word.substr(dash + 1), simulation);
+    if (first > last) throw InputError(fmt::format("--vehicles: {}: from low to high", word));
+    for (std::size_t v = first; v <= last; ++v) vehicles.push_back(v);
+  }
+  std::sort(vehicles.begin(), vehicles.end());
+  vehicles.erase(std::unique(vehicles.begin(), vehicles.end()), vehicles.end());
+  return vehicles;
+}
+
+}  // namespace
+
+void add_share_flags(CLI::App& app, ShareFlags& flags) {
+  app.add_option(
+         "--share",
+         flags.name,
+         "Share the run NAME with other processes and machines, each of which flies some of "
+         "the vehicles (docs/swarms.md)")
+      ->type_name("NAME");
+  app.add_option("--vehicles",
+                 flags.vehicles,
+                 "With --share: those that this process flies: 0-3, or 0,2 or names")
+      ->delimiter(',')
+      ->type_name("LIST");
+  app.add_flag("--share-localhost", flags.localhost, "With --share: on this machine alone");
+}
+
+void check_share_flags(const ShareFlags& flags) {
+  if (!flags.is_asked()) {
+    if (!flags.vehicles.empty()) throw InputError("--vehicles: has no effect without --share");
+    if (flags.localhost) throw InputError("--share-localhost: has no effect without --share");
+    return;
+  }
+  if (!is_ros_word(flags.name) || flags.name.size() > kNameMost) {
+    throw InputError(fmt::format("--share: '{}'; letters, digits and _ only", flags.name));
+  }
+  if (flags.vehicles.empty()) {
+    throw InputError("--share: say which vehicles this process flies with --vehicles 0-3");
+  }
+}
+
+bool is_free(const ShareFlags& flags, const Scenario& scenario) {
+  return flags.is_asked() && share_setup_of(scenario).time == ShareTime::kFree;
+}
+
+SharedRun::SharedRun(const ShareFlags& flags,
+                     Simulation& simulation,
+                     const RunLoop& loop,
+                     double rate)
+    : simulation_(simulation) {
+  const ShareSetup& setup = share_setup_of(simulation.scenario());
+  if (setup.time == ShareTime::kFree && rate <= 0.0) {
+    throw InputError(
+        "--rate max: processes that keep time by their clocks need a rate; give one, or "
+        "share: {time: lockstep} in the scenario");
+  }
+  FleetShareOptions options;
+  options.run = flags.name;
+  options.process = process_name();
+  options.id = random_id();
+  options.since =
+      std::chrono::duration_cast<Duration>(std::chrono::system_clock::now().time_since_epoch())
+          .count();
+  options.vehicles = vehicles_from(flags.vehicles, simulation);
+  options.rate = rate;
+  options.steady = steady_ns;
+  options.clock = [&loop](std::int64_t steady) {
+    return loop.due_at(std::chrono::steady_clock::time_point(Duration(steady)));
+  };
+  options.log = [](const std::string& line) { log(line); };
+  options.interrupted = interrupted;
+  ShareTransportOptions transport;
+  transport.name = flags.name;
+  transport.lockstep = setup.time == ShareTime::kLockstep;
+  transport.lease = setup.lease;
+  transport.localhost_only = flags.localhost;
+  transport.log = options.log;
+  const std::vector<std::size_t> own = options.vehicles;
+  transport_ = dds_module().share(transport);
+  share_ = std::make_unique<FleetShare>(simulation, *transport_, std::move(options));
+  simulation.share(own, *share_);
+  link_ = std::make_unique<ShareLink>(simulation, *share_);
+}
+
+void SharedRun::say() const {
+  for (const FleetShare::PeerReport& peer : share_->peers()) {
+    std::string line = fmt::format("{} flew {} vehicle{}",
+                                   peer.process,
+                                   peer.vehicles.size(),
+                                   peer.vehicles.size() == 1 ? "" : "s");
+    if (peer.offset) {
+      line += fmt::format("; its clock was {:+.1f} ms off (+- {:.1f})",
+                          1e3 * *peer.offset,
+                          1e3 * peer.offset_error);
+    }
+    line += fmt::format("; {} messages, {} lost", peer.received, peer.missing);
+    log(line);
+  }
+  if (share_->foreign() > 0) {
+    log(fmt::format("{} messages were of somebody else and left out", share_->foreign()));
+  }
+}
+
+}  // namespace pointflight::apps

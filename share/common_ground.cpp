@@ -1,0 +1,100 @@
+#include "share/common_ground.hpp"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+
+#include "pointflight/core/hash.hpp"
+#include "pointflight/core/version.hpp"
+
+namespace pointflight {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string hash_of(std::string_view text) {
+  return fmt::format("{:016x}", hash64(std::as_bytes(std::span(text.data(), text.size()))));
+}
+
+void forget_folder(std::string& path) {
+  path = fs::path(path).filename().string();
+}
+
+template <class Settings>
+std::string text_of(Settings settings) {
+  settings.path.clear();
+  SettingsWriter writer;
+  describe(writer, settings);
+  return writer.text();
+}
+
+/// The scenario without what may differ from host to host and what has a part of its own.
+std::string rest_of(Scenario scenario) {
+  scenario.path.clear();
+  scenario.map.clear();
+  scenario.map_hash.clear();
+  scenario.seed = 0;
+  scenario.duration = 0.0;
+  scenario.output = {};
+  scenario.sections.erase("ros");
+  for (VehicleSetup& vehicle : scenario.vehicles) {
+    forget_folder(vehicle.model);
+    for (LidarMount& mount : vehicle.lidars) forget_folder(mount.model);
+  }
+  for (ObstacleSettings& obstacles : scenario.obstacles) {
+    forget_folder(obstacles.file);
+    forget_folder(obstacles.keyframes);
+  }
+  return scenario_yaml(scenario);
+}
+
+std::string vehicles_of(const Simulation& simulation) {
+  std::string text;
+  for (std::size_t v = 0; v < simulation.vehicle_count(); ++v) {
+    const VehicleAgent& agent = simulation.vehicle(v);
+    text += agent.setup().name + "\n" + text_of(agent.settings());
+    for (const MountedLidar* mounted : agent.lidars()) text += text_of(mounted->lidar().settings());
+  }
+  return text;
+}
+
+/// Where they begin: functions of seed, map and files.
+std::string obstacles_of(const Simulation& simulation) {
+  std::string text;
+  for (const Body& body : simulation.obstacles(SimTime{}, SimTime{})) {
+    const Vector3d p = body.T_world_body(std::max(SimTime{}, body.from)).translation;
+    text += fmt::format(
+        "{} {} {} {} {}\n", body.label, p.x(), p.y(), p.z(), bounding_radius(body.shape));
+  }
+  return text;
+}
+
+}  // namespace
+
+std::vector<share_msg::Part> common_ground(const Simulation& simulation, double rate) {
+  const Scenario& scenario = simulation.scenario();
+  return {{"version of pointflight", kVersion},
+          {"map", simulation.map().hash()},
+          {"seed", std::to_string(scenario.seed)},
+          {"rate", fmt::format("{}", rate)},
+          {"vehicles or sensors", hash_of(vehicles_of(simulation))},
+          {"obstacles", hash_of(obstacles_of(simulation))},
+          {"scenario", hash_of(rest_of(scenario))}};
+}
+
+std::optional<std::string> difference(const std::vector<share_msg::Part>& theirs,
+                                      const std::vector<share_msg::Part>& ours) {
+  for (std::size_t i = 0; i < ours.size(); ++i) {
+    if (i < theirs.size() && theirs[i] == ours[i]) continue;
+    if (i >= theirs.size() || theirs[i].name != ours[i].name)
+      return "it describes its run otherwise";
+    return fmt::format("another {} ({} there, {} here)",
+                       ours[i].name,
+                       theirs[i].value.substr(0, 40),
+                       ours[i].value);
+  }
+  if (theirs.size() > ours.size()) return "it describes its run otherwise";
+  return std::nullopt;
+}
+
+}  // namespace pointflight

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "pointflight/sim/simulation.hpp"
+#include "share/messages.hpp"
+
+namespace pointflight {
+
+/// What processes that share a run have to have in common, as name and value: program, map, seed,
+/// rate, obstacles, vehicles with their models and LiDARs, the rest of the scenario.
+/// Names and places of files do not matter, nor does what a process writes and how long it flies.
+std::vector<share_msg::Part> common_ground(const Simulation& simulation, double rate);
+
+/// How two differ, in words: "it flies another map (4f0c..., here 77ab...)"; nothing where they do
+/// not.
+std::optional<std::string> difference(const std::vector<share_msg::Part>& theirs,
+                                      const std::vector<share_msg::Part>& ours);
+
+}  // namespace pointflight

@@ -1,0 +1,17 @@
+#include "share/messages.hpp"
+
+#include <fmt/format.h>
+
+namespace pointflight::share_msg {
+
+Opened open_message(std::span<const std::byte> bytes) {
+  const auto head = decode<Wire::kCdr, Head>(bytes, true);
+  if (!head || head->magic != kMagic) return {std::nullopt, "bytes that are not pointflight's"};
+  if (head->version != kVersion) {
+    return {std::nullopt,
+            fmt::format("messages of version {}; this program has {}", head->version, kVersion)};
+  }
+  return {head, ""};
+}
+
+}  // namespace pointflight::share_msg

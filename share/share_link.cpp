@@ -1,0 +1,34 @@
+#include "share/share_link.hpp"
+
+namespace pointflight {
+
+ShareLink::ShareLink(Simulation& simulation, FleetShare& share)
+    : simulation_(simulation), share_(share) {}
+
+bool ShareLink::is_ready() {
+  if (!share_.is_ready()) return false;
+  const Duration step = from_seconds(simulation_.scenario().physics_step);
+  const Duration ahead = share_.time_of_others() - simulation_.time();
+  if (ahead > Duration{0}) {
+    simulation_.skip_to(simulation_.time() + (ahead + step - Duration{1}) / step * step);
+  }
+  return true;
+}
+
+void ShareLink::on_wait(SimTime /*now*/, Waiting why) {
+  if (why != Waiting::kForLinks)
+    static_cast<void>(share_.keep_time());  // who pauses is still there
+}
+
+std::vector<Order> ShareLink::take_orders() {
+  const FleetShare::Adjustment adjustment = share_.keep_time();
+  if (adjustment.skip > Duration{0}) return {SkipOrder{simulation_.time() + adjustment.skip}};
+  if (adjustment.hurry > Duration{0}) return {HurryOrder{adjustment.hurry}};
+  return {};
+}
+
+void ShareLink::close() {
+  share_.leave();
+}
+
+}  // namespace pointflight
