@@ -247,6 +247,19 @@ void say_waits(const RunLoop& loop, const RosFlags& ros) {
   }
 }
 
+/// A process of a shared run that was killed goes on where its trajectory ends, if the scenario says
+/// so.
+void resume(const FlyFlags& flags, Simulation& simulation) {
+  const bool wanted = share_setup_of(simulation.scenario()).on_return == OnReturn::kLog;
+  if (!wanted || flags.output.empty()) return;
+  const auto ended = ended_run(flags.output, simulation, simulation.own_vehicles());
+  if (!ended) return;
+  simulation.resume_at(ended->time, ended->states);
+  log(fmt::format("{}: goes on where an earlier run's trajectories end, at {:.2f} s",
+                  flags.output,
+                  to_seconds(ended->time)));
+}
+
 int fly(const FlyFlags& flags) {
   if (flags.output.empty() && !flags.ros.any()) {
     throw InputError(
@@ -274,6 +287,7 @@ int fly(const FlyFlags& flags) {
   RunLoop loop(simulation, options);
   std::optional<SharedRun> shared;
   if (flags.share.is_asked()) shared.emplace(flags.share, simulation, loop, options.rate);
+  if (shared) resume(flags, simulation);
   std::optional<FolderLink> folder;
   if (!flags.output.empty()) {
     const Existing existing = flags.force ? Existing::kReplace : Existing::kRefuse;

@@ -111,7 +111,9 @@ RunPicture read_run(const fs::path& folder) {
     figures.end = summary.at("end").get<std::string>();
     for (const auto& vehicle : vehicles) {
       const std::string name = vehicle.at("name").get<std::string>();
-      read_vehicle(vehicles.size() == 1 ? folder : folder / name, picture.names.size(), picture);
+      // one of several, where other processes flew the rest
+      const bool has_folder = fs::exists(folder / name / "trajectory.csv");
+      read_vehicle(has_folder ? folder / name : folder, picture.names.size(), picture);
       picture.names.push_back(name);
       figures.flown += vehicle.at("distance_flown").get<double>();
       figures.scans += vehicle.at("scans").get<std::uint64_t>();

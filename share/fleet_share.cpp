@@ -394,6 +394,7 @@ void FleetShare::lose_writer(std::uint64_t writer) {
 
 void FleetShare::lose(Peer& peer, const char* kind, const std::string& words) {
   peer.lost = true;
+  peer.past.reset();
   peer.lost_at = now_;
   peer.steps.clear();
   peer.clock.clear();
@@ -497,6 +498,10 @@ void FleetShare::take_states(const ShareArrival& arrival) {
     see(state.number, *peer);
   }
   if (std::exchange(peer->owes_past, false)) send_past(*peer);
+  if (peer->past) {  // it may have come before the states
+    look_back(*peer);
+    peer->past.reset();
+  }
 }
 
 void FleetShare::send_states(const SharedStep& own) {
@@ -555,7 +560,12 @@ void FleetShare::place(OtherVehicles& met, std::size_t number) {
     if (!body) return;
     met.vehicles[number] = vehicle_of(v, other.flags, *body);
     const double moved = to_seconds(std::min(lease_, now_ - other.track.newest()));
-    other.summary.extrapolated_max = std::max(other.summary.extrapolated_max, moved);
+    if (moved > other.summary.extrapolated_max) {
+      const VehicleAgent& agent = simulation_.vehicle(number);
+      other.summary.extrapolated_max = moved;
+      other.summary.extrapolation_bound =
+          extrapolation_bound(agent.settings(), bounding_radius(agent.hull()), moved);
+    }
   } else if (setup_.on_loss == OnLoss::kHold) {
     RigidBodyState body = other.track.last();
     body.v_world.setZero();
@@ -807,11 +817,17 @@ void FleetShare::take_past(const ShareArrival& arrival) {
     note_foreign(arrival.writer, "a past that makes no sense");
     return;
   }
-  const Peer* peer = peer_of(past->head.process);
+  Peer* peer = peer_of(past->head.process);
   if (peer == nullptr || !peer->fits || past->to != options_.id) return;
+  peer->past = *past;
+  look_back(*peer);
+}
+
+/// What a process says of its past, of those of its vehicles that were lost and are back.
+void FleetShare::look_back(Peer& peer) {
   std::map<std::uint32_t, OtherTrack> tracks;
-  for (const share_msg::PastState& state : past->states) {
-    const auto& its = peer->intro.vehicles;
+  for (const share_msg::PastState& state : peer.past->states) {
+    const auto& its = peer.intro.vehicles;
     const RigidBodyState body = body_of(state.state);
     if (std::find(its.begin(), its.end(), state.state.number) == its.end()) continue;
     if (makes_sense(body)) tracks[state.state.number].add_past(to_time(state.time), body);

@@ -26,7 +26,7 @@ struct FleetShareOptions {
   std::int64_t since = 0;             ///< When it started, ns since 1970.
   std::vector<std::size_t> vehicles;  ///< Those that it flies, ascending.
   double rate = 1.0;                  ///< Simulated seconds per second; 0: as fast as it goes.
-  Duration settle = std::chrono::milliseconds(1500);  ///< Others are looked for so long at first.
+  Duration settle = std::chrono::milliseconds(1000);  ///< Others are looked for so long at first.
   std::function<std::int64_t()> steady;               ///< A clock that only rises, ns.
   /// Where the run should be by the wall clock at an instant of `steady`; nothing before it starts.
   std::function<std::optional<SimTime>(std::int64_t steady)> clock;
@@ -95,6 +95,7 @@ class FleetShare : public FleetExchange {
     ClockEstimate clock{1.0};
     std::int64_t its_sent = 0, its_arrival = 0;  ///< Of its last clock message.
     bool owes_past = false;                      ///< To it: it was lost, and is back.
+    std::optional<share_msg::Past> past;         ///< What it said then, until its states have come.
     SimTime lost_at;
     std::deque<share_msg::States> steps;  ///< Lockstep: those that are still to be used.
     [[nodiscard]] bool flies() const {
@@ -160,6 +161,7 @@ class FleetShare : public FleetExchange {
   void say_offset(std::uint64_t id, const Peer& peer, std::int64_t offset, std::int64_t error);
 
   void send_past(Peer& peer);
+  void look_back(Peer& peer);
   void find_missed(std::uint32_t number, const OtherTrack& track);
   void give_up_past();
 

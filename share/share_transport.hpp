@@ -26,7 +26,7 @@ struct ShareArrival {
   ShareChannel channel = ShareChannel::kCrew;
   std::vector<std::byte> bytes;  ///< Empty: `writer` is lost, its lease has run out.
   std::uint64_t writer = 0;      ///< Who wrote it on this channel, by the transport's count.
-  std::int64_t at = 0;           ///< When it came, ns of `std::chrono::steady_clock`.
+  std::int64_t at = 0;           ///< When it came, ns of the steady clock.
 };
 
 /// Messages between processes, by DDS or in memory. `take` and `wait` from one thread.

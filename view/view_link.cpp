@@ -251,7 +251,12 @@ void ViewLink::publish_state(SimTime now, const char* doing) {
       for (const RotorState& rotor : s.state.rotors) rotors.push_back(std::round(rotor.speed));
       v["rotors"] = std::move(rotors);
     }
-    if (vehicle.status) {
+    if (vehicle.status && !vehicle.state) {  // another process flies it
+      const RigidBodyState& body = vehicle.status->state;
+      v = {{"p", list_of(body.p_world)},
+           {"q", list_of(body.T_world_body().rotation)},
+           {"v", list_of(body.v_world)}};
+    } else if (vehicle.status) {
       const StatusSample& s = *vehicle.status;
       v["command"] = s.command;
       v["collisions"] = s.collisions;

@@ -56,6 +56,10 @@ void OutputFile::write_at(std::size_t offset, std::span<const std::byte> bytes) 
   if (::fseeko(file_, 0, SEEK_END) != 0) fail(errno);
 }
 
+void OutputFile::flush() {
+  if (std::fflush(file_) != 0) fail(errno);
+}
+
 void OutputFile::commit() {
   throw_if_mapped_file_was_cut();
   if (std::fflush(file_) != 0) fail(errno);

@@ -50,8 +50,11 @@ struct RecordedRun::Files {
         description(describe_run(simulation)),
         step(from_seconds(scenario.physics_step)),
         end(ended_at(fs::path(folder) / "summary.json")) {
+    const auto flown_elsewhere = vehicles_of_others(fs::path(folder) / "summary.json");
     for (std::size_t v = 0; v < simulation.vehicle_count(); ++v) {
       const fs::path own = fs::path(folder) / description.vehicles[v].setup.name;
+      description.vehicles[v].own = !flown_elsewhere.contains(description.vehicles[v].setup.name);
+      if (!description.vehicles[v].own) continue;
       add_vehicle(v, simulation.vehicle_count() == 1 ? fs::path(folder) : own);
     }
     add_events((fs::path(folder) / "events.csv").string());

@@ -89,6 +89,19 @@ SimTime ended_at(const std::filesystem::path& path) {
   return SimTime(from_seconds(time));
 }
 
+std::set<std::string> vehicles_of_others(const std::filesystem::path& path) {
+  std::ifstream file(path);
+  const auto json = nlohmann::json::parse(file, nullptr, false);
+  std::set<std::string> names;
+  if (!json.is_object() || !json.contains("others") || !json["others"].is_array()) return names;
+  for (const auto& other : json["others"]) {
+    if (other.is_object() && other.contains("name") && other["name"].is_string()) {
+      names.insert(other["name"].get<std::string>());
+    }
+  }
+  return names;
+}
+
 double number_in(const std::string& word, const std::string& path) {
   if (word.empty()) return 0.0;
   char* end = nullptr;

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -29,6 +30,9 @@ RigidBodyState body_at(const CsvTable& table, std::size_t row, int column);
 std::vector<std::vector<std::string>> words_of(const std::string& path);
 /// When the run ended, by its summary.json. Throws InputError.
 SimTime ended_at(const std::filesystem::path& path);
+
+/// Names of vehicles that other processes flew, by summary.json; none where it does not say.
+std::set<std::string> vehicles_of_others(const std::filesystem::path& path);
 /// 0 where it is empty. Throws InputError, with the file's name, where it is no number of a run.
 double number_in(const std::string& word, const std::string& path);
 /// A whole number from 0 on.

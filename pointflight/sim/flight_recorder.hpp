@@ -50,11 +50,23 @@ class FlightRecorder : public SampleSink {
 
   RunFolder folder_;
   bool write_scans_;
+  bool flushes_;  ///< A process that is killed goes on where its trajectory ends.
   std::vector<std::string> names_;                       ///< Of the vehicles.
   std::vector<std::unique_ptr<VehicleFiles>> vehicles_;  ///< Null: another process' vehicle.
   OutputFile events_;
   std::optional<OutputFile> obstacles_;
 };
+
+/// Where the trajectories stop that a run left in `folder` which was killed while other processes
+/// shared it: the latest instant that all of these vehicles (by number) have, and their states.
+/// Nothing where there are none.
+struct EndedRun {
+  SimTime time;                                ///< Of the states.
+  std::map<std::size_t, VehicleState> states;  ///< By number.
+};
+std::optional<EndedRun> ended_run(const std::string& folder,
+                                  const Simulation& simulation,
+                                  const std::vector<std::size_t>& vehicles);
 
 /// summary.json as text: what happened, without wall-clock figures.
 std::string summary_json(const Simulation& simulation);

@@ -73,7 +73,9 @@ void Simulation::sample_status(SampleSink& sink) {
   const Schedule schedule(kStatusRate);
   if (schedule.at(state_.next_status) > state_.time) return;
   while (schedule.at(state_.next_status) <= state_.time) ++state_.next_status;
-  for (const std::size_t v : own_) sink.on_sample(status_sample(v));
+  for (std::size_t v = 0; v < vehicle_count(); ++v) {
+    if (status(v).present) sink.on_sample(status_sample(v));
+  }
 }
 
 /// What a sensor of a vehicle can meet: everybody else, and the obstacles that are near enough.

@@ -241,7 +241,9 @@ void VehicleAgent::resume(VehicleStatus& status, const VehicleState& state, SimT
   }
   while (status.next_command < commands_.size() && commands_[status.next_command].time <= time) {
     const TimedCommand& given = commands_[status.next_command++];
-    command(status, given.command, given.time);
+    // ways that are made from where it is begin here; those that are given are half flown
+    const bool is_given = std::holds_alternative<TrajectoryCommand>(given.command);
+    command(status, given.command, is_given ? given.time : time);
     status.scripted = true;
   }
 }
