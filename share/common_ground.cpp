@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 
 #include "pointflight/core/hash.hpp"
@@ -82,19 +83,22 @@ std::vector<share_msg::Part> common_ground(const Simulation& simulation, double 
           {"scenario", hash_of(rest_of(scenario))}};
 }
 
+bool describes_alike(const std::vector<share_msg::Part>& theirs,
+                     const std::vector<share_msg::Part>& ours) {
+  return std::equal(theirs.begin(),
+                    theirs.end(),
+                    ours.begin(),
+                    ours.end(),
+                    [](const auto& a, const auto& b) { return a.name == b.name; });
+}
+
 std::optional<std::string> difference(const std::vector<share_msg::Part>& theirs,
                                       const std::vector<share_msg::Part>& ours) {
-  for (std::size_t i = 0; i < ours.size(); ++i) {
-    if (i < theirs.size() && theirs[i] == ours[i]) continue;
-    if (i >= theirs.size() || theirs[i].name != ours[i].name)
-      return "it describes its run otherwise";
-    return fmt::format("another {} ({} there, {} here)",
-                       ours[i].name,
-                       theirs[i].value.substr(0, 40),
-                       ours[i].value);
-  }
-  if (theirs.size() > ours.size()) return "it describes its run otherwise";
-  return std::nullopt;
+  const auto [their, our] = std::mismatch(theirs.begin(), theirs.end(), ours.begin(), ours.end());
+  if (our == ours.end()) return std::nullopt;
+  constexpr std::size_t kMost = 40;
+  return fmt::format(
+      "another {} ({} there, {} here)", our->name, their->value.substr(0, kMost), our->value);
 }
 
 }  // namespace pointflight

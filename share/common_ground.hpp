@@ -13,8 +13,11 @@ namespace pointflight {
 /// Names and places of files do not matter, nor does what a process writes and how long it flies.
 std::vector<share_msg::Part> common_ground(const Simulation& simulation, double rate);
 
-/// How two differ, in words: "it flies another map (4f0c..., here 77ab...)"; nothing where they do
-/// not.
+/// True where two have the same names in the same order.
+bool describes_alike(const std::vector<share_msg::Part>& theirs,
+                     const std::vector<share_msg::Part>& ours);
+
+/// How two that describe alike differ, in words: "another map (4f0c there, 77ab here)"; nothing where they do not.
 std::optional<std::string> difference(const std::vector<share_msg::Part>& theirs,
                                       const std::vector<share_msg::Part>& ours);
 

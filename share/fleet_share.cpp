@@ -140,6 +140,7 @@ void FleetShare::introduce(Phase phase) {
   intro.vehicles.assign(options_.vehicles.begin(), options_.vehicles.end());
   intro.parts = parts_;
   intro.stops = simulation_.end() == RunEnd::kCollision;
+  intro.ends_at = to_ns(now_);
   transport_.send(ShareChannel::kCrew, bytes_of(intro));
 }
 
@@ -206,8 +207,11 @@ void FleetShare::take_introduction(const ShareArrival& arrival) {
   peer.writer = arrival.writer;
   if (is_new) peer.heard = arrival.at;
   if (peer.intro.phase == Phase::kLeft) {
-    if (peer.fits && before != Phase::kLeft) lose(peer, "left", "has left");
-    stopped_ = stopped_ || (peer.fits && peer.intro.stops);
+    // lockstep: not before its last step has been used
+    if (peer.fits && before != Phase::kLeft && !decides_together()) {
+      lose(peer, "left", "has left");
+      stopped_ = stopped_ || peer.intro.stops;
+    }
     return;
   }
   check(peer);
@@ -229,6 +233,10 @@ void FleetShare::check(Peer& peer) {
   const bool flies = peer.intro.phase == Phase::kFlying;
   const bool gives_way =
       phase_ == Phase::kJoining ? flies || is_older(peer) : flies && is_older(peer);
+  if (!describes_alike(peer.intro.parts, parts_)) {
+    note_foreign(peer.writer, "an introduction that describes no run of ours");
+    return;
+  }
   if (const auto what = difference(peer.intro.parts, parts_)) {
     refuse_or_say(peer,
                   fmt::format("{} flies in another world: {}", peer.intro.name, printable(*what)),
@@ -370,7 +378,7 @@ void FleetShare::begin() {
 }
 
 void FleetShare::leave() {
-  if (phase_ != Phase::kLeft) introduce(Phase::kLeft);
+  if (phase_ != Phase::kLeft) introduce(Phase::kLeft);  // `now_` is that of the last step
 }
 
 // ---- who is lost, who is back ----
@@ -387,7 +395,11 @@ void FleetShare::note(std::size_t vehicle, const char* kind, const std::string& 
 
 void FleetShare::lose_writer(std::uint64_t writer) {
   for (auto& [id, peer] : peers_) {
-    if (peer.writer != writer || peer.lost || peer.intro.phase == Phase::kLeft) continue;
+    if (peer.writer != writer || peer.lost) continue;
+    if (peer.intro.phase == Phase::kLeft) {
+      if (decides_together() && peer.fits) lose(peer, "left", "has left");
+      continue;
+    }
     lose(peer, "lost", "is not heard any more: its lease has run out");
   }
 }
@@ -461,7 +473,8 @@ void FleetShare::take_states(const ShareArrival& arrival) {
     return;
   }
   Peer* peer = peer_of(states->head.process);
-  if (peer == nullptr || !peer->fits || peer->intro.phase != Phase::kFlying) return;
+  if (peer == nullptr || !peer->fits || peer->intro.phase == Phase::kJoining) return;
+  if (peer->intro.phase == Phase::kLeft && !decides_together()) return;
   for (const share_msg::VehicleState& state : states->vehicles) {
     const auto& its = peer->intro.vehicles;
     const bool is_its = std::find(its.begin(), its.end(), state.number) != its.end();
@@ -598,6 +611,15 @@ std::uint64_t FleetShare::joiner() const {
   return 0;
 }
 
+/// Lockstep: it has done, or will do, the step at a time. Who has left is gone after its last one.
+bool FleetShare::is_needed(Peer& peer, SimTime time) {
+  if (!peer.fits || peer.lost || to_time(peer.intro.begins_at) > time) return false;
+  if (peer.intro.phase != Phase::kLeft) return peer.intro.phase == Phase::kFlying;
+  if (time <= to_time(peer.intro.ends_at)) return true;
+  lose(peer, "left", "has left");
+  return false;
+}
+
 /// Until all who fly have said the step that is needed, and nobody wants to join.
 void FleetShare::wait_for_steps(const SharedStep& own, SimTime needed) {
   std::int64_t sent = options_.steady();
@@ -613,7 +635,7 @@ void FleetShare::wait_for_steps(const SharedStep& own, SimTime needed) {
     }
     bool complete = joins == 0;
     for (auto& [id, peer] : peers_) {
-      if (!peer.flies() || to_time(peer.intro.begins_at) > needed) continue;
+      if (!is_needed(peer, needed)) continue;
       complete = complete && step_of(peer, needed, own.is_verdict) != nullptr;
     }
     if (complete || !fault_.empty() || options_.interrupted()) return;
@@ -651,7 +673,7 @@ OtherVehicles FleetShare::meet_in_step(const SharedStep& own) {
   OtherVehicles met;
   met.vehicles.resize(others_.size());
   for (auto& [id, peer] : peers_) {
-    if (!peer.flies()) continue;
+    if (!is_needed(peer, needed)) continue;
     const share_msg::States* step = step_of(peer, needed, own.is_verdict);
     if (step == nullptr) continue;
     using States = share_msg::States;

@@ -153,6 +153,7 @@ class FleetShare : public FleetExchange {
                                                         SimTime time,
                                                         bool verdict);
   [[nodiscard]] std::uint64_t joiner() const;
+  [[nodiscard]] bool is_needed(Peer& peer, SimTime time);
   void wait_for_steps(const SharedStep& own, SimTime needed);
   void say_slow(SimTime needed, bool verdict);
   Adjustment rejoin();

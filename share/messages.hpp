@@ -67,6 +67,7 @@ struct Introduction {
       0;  ///< Lockstep, flying: its first step's time; others need it from then on.
   std::uint64_t waits_for = 0;  ///< Lockstep: the process that joins, and that it stands still for.
   std::int64_t waits_at = 0;    ///< Time of the step that it stands at.
+  std::int64_t ends_at = -1;    ///< Lockstep, left: time of its last step.
   bool stops = false;  ///< It left because a vehicle with on_collision: stop met something.
   template <class M, class V>
   static void fields(M& m, V& v) {
@@ -79,6 +80,7 @@ struct Introduction {
     v("begins_at", m.begins_at);
     v("waits_for", m.waits_for);
     v("waits_at", m.waits_at);
+    v("ends_at", m.ends_at);
     v("stops", m.stops);
   }
 };

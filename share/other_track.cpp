@@ -50,11 +50,15 @@ double extrapolation_bound(const VehicleSettings& vehicle, double radius, double
   const double acceleration = (vehicle.thrust_to_weight() + 1.0) * kGravity + drag;
   const double thrust =
       vehicle.rotor.thrust_coefficient * vehicle.rotor.speed_max * vehicle.rotor.speed_max;
+  const double rate = vehicle.controller.body_rate_max;
   double torque = 0.0;  // all rotors of one side at full speed, the others off
   for (const RotorPlacement& rotor : vehicle.rotors) {
     torque += 0.5 * thrust * rotor.position.head<2>().norm();
+    torque += vehicle.rotor.inertia * vehicle.rotor.speed_max * rate;  // gyroscopic
   }
-  const double turn = torque / vehicle.inertia_diagonal.minCoeff();
+  const double least = vehicle.inertia_diagonal.minCoeff();
+  const double greatest = vehicle.inertia_diagonal.maxCoeff();
+  const double turn = torque / least + (greatest - least) / least * rate * rate;
   return 0.5 * seconds * seconds * (acceleration + turn * radius);
 }
 

@@ -24,9 +24,10 @@ RigidBodyState between(const RigidBodyState& a,
 
 /// No point of a vehicle's body is farther from where `moved_on` puts it, m. Over `seconds` the
 /// centre of mass strays by a t^2 / 2 at most, a = what all rotors give at full speed over the mass
-/// + gravity + what slows it down at the greatest speed; a point at `radius` by
-/// alpha t^2 / 2 * radius more, alpha = the greatest torque of the rotors over the least moment of
-/// inertia. Collisions are not in it.
+/// + gravity + what the air takes at its greatest speed; a point at `radius` by alpha t^2 / 2 *
+/// radius more, alpha = (the greatest torque of the rotors, their gyroscopic torque at the greatest
+/// body rate) over the least moment of inertia + what its own turning does to it (Euler's
+/// equations). Collisions, ground effect and gusts are not in it.
 double extrapolation_bound(const VehicleSettings& vehicle, double radius, double seconds);
 
 /// States of a vehicle of another process as they come in, some late, some never.

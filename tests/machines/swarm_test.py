@@ -37,9 +37,9 @@ LEASE = 0.5  # s
 FAULTS = """map: {map}
 duration: {duration}
 vehicles:
-  - {{name: a, start: [10, 8, 25], mission: {{waypoints: {a}, speed: 4}}, lidars: []}}
-  - {{name: b, start: [22, 8, 25], mission: {{waypoints: {b}, speed: 4}}, lidars: []}}
-  - {{name: c, start: [16, 3, 25], mission: {{waypoints: {c}, speed: 3}}, lidars: []}}
+  - {{name: a, start: [14, 8, 25], mission: {{waypoints: {a}, speed: 4}}, lidars: []}}
+  - {{name: b, start: [18, 8, 25], mission: {{waypoints: {b}, speed: 4}}, lidars: []}}
+  - {{name: c, start: [16, 6, 25], mission: {{waypoints: {c}, speed: 3}}, lidars: []}}
 share: {{lease: {lease}, on_loss: {on_loss}, on_return: {on_return}}}
 output: {{scans: false, imu: false}}
 """
@@ -103,8 +103,8 @@ def scenario(folder, duration, on_loss="vanish", on_return="start"):
     path = folder / "s.yaml"
     path.write_text(FAULTS.format(
         map=pfmap, duration=duration, lease=LEASE, on_loss=on_loss, on_return=on_return,
-        a=there_and_back((10, 8, 25), (22, 8, 25), 16), b=there_and_back((22, 8, 25), (10, 8, 25), 16),
-        c=there_and_back((16, 3, 25), (16, 13, 25), 16)))
+        a=there_and_back((14, 8, 25), (18, 8, 25), 40), b=there_and_back((18, 8, 25), (14, 8, 25), 40),
+        c=there_and_back((16, 6, 25), (16, 10, 25), 40)))
     return path
 
 

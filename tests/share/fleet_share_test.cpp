@@ -1,0 +1,589 @@
+// Processes that share a run, over a bus in memory: the bytes of one process in lockstep; by
+// clocks, where others are, who is lost and what was missed; who is refused; strangers.
+#include "share/fleet_share.hpp"
+
+#include <gtest/gtest.h>
+
+#include <thread>
+
+#include "share/share_link.hpp"
+#include "tests/share/bus.hpp"
+#include "tests/sim/runs.hpp"
+#include "tests/support.hpp"
+
+namespace pointflight {
+namespace {
+
+using testing::Bus;
+using testing::ByteSink;
+using testing::error_of;
+using testing::expect_contains;
+using testing::hall;
+
+constexpr std::int64_t kMs = 1'000'000;
+
+/// What each vehicle says by itself.
+class PerVehicle : public SampleSink {
+ public:
+  void on_sample(const Sample& sample) override {
+    std::visit([&](const auto& s) { take(s, sample); }, sample);
+  }
+  std::map<std::size_t, ByteSink> sinks;
+  std::vector<VehicleEvent> events;
+  std::vector<CollisionEvent> collisions;
+
+  [[nodiscard]] std::vector<std::string> kinds() const {
+    std::vector<std::string> kinds;
+    for (const VehicleEvent& event : events) kinds.push_back(event.kind);
+    return kinds;
+  }
+
+ private:
+  void take(const ScanSample& s, const Sample& sample) { sinks[s.scan->vehicle].on_sample(sample); }
+  void take(const ObstacleSample& /*s*/, const Sample& /*sample*/) {}
+  void take(const StatusSample& /*s*/, const Sample& /*sample*/) {}
+  void take(const VehicleEvent& s, const Sample& /*sample*/) { events.push_back(s); }
+  void take(const CollisionEvent& s, const Sample& sample) {
+    collisions.push_back(s);
+    sinks[s.vehicle].on_sample(sample);
+  }
+  template <class S>
+  void take(const S& s, const Sample& sample) {
+    sinks[s.vehicle].on_sample(sample);
+  }
+};
+
+Scenario with_share(Scenario scenario, const ShareSetup& setup) {
+  scenario.sections["share"] = setup;
+  return scenario;
+}
+
+/// Three that fly past each other among obstacles.
+Scenario three(ShareTime time) {
+  Scenario s;
+  s.path = "s.yaml";
+  s.duration = testing::kSanitized ? 0.4 : 1.2;
+  s.vehicles.resize(3);
+  for (std::size_t i = 0; i < 3; ++i) {
+    VehicleSetup& v = s.vehicles[i];
+    v.start = {6.0 + 1.5 * static_cast<double>(i), 6, 3};
+    v.mission.waypoints = {{6.0 + 1.5 * static_cast<double>(i), 9, 3}};
+    v.lidars.front().model = i == 1 ? "mid360" : "marsim_grid";
+    v.name = std::string(1, static_cast<char>('a' + i));
+  }
+  s.vehicles[1].start.y() = 8.0;
+  s.vehicles[1].mission.waypoints = {{6.4, 4, 3}};
+  ObstacleSettings balls;
+  balls.count = 10;
+  balls.radius = 0.2;
+  balls.speed = 1.0;
+  s.obstacles = {balls};
+  ShareSetup setup;
+  setup.time = time;
+  return with_share(s, setup);
+}
+
+/// One process.
+struct Member {
+  Member(Bus& bus,
+         const Scenario& scenario,
+         std::vector<std::size_t> vehicles,
+         std::function<std::int64_t()> steady,
+         std::uint64_t id)
+      : executor(1), simulation(scenario, hall(), executor), end(bus.join()), clock(steady) {
+    FleetShareOptions options;
+    options.run = "test";
+    options.process = "host:" + std::to_string(id);
+    options.id = id;
+    options.since = static_cast<std::int64_t>(id);
+    options.vehicles = vehicles;
+    options.steady = std::move(steady);
+    options.clock = [this](std::int64_t at) { return due_at(at); };
+    options.log = [this](const std::string& line) { lines.push_back(line); };
+    options.interrupted = [this] { return interrupted; };
+    share = std::make_unique<FleetShare>(simulation, *end, options);
+    simulation.share(vehicles, *share);
+    link = std::make_unique<ShareLink>(simulation, *share);
+  }
+
+  [[nodiscard]] std::optional<SimTime> due_at(std::int64_t at) const {
+    if (start < 0) return std::nullopt;
+    return from + Duration(at - start);
+  }
+
+  /// As the run's loop does it.
+  void obey_share() {
+    for (const Order& order : link->take_orders()) {
+      if (const auto* skip = std::get_if<SkipOrder>(&order)) {
+        simulation.skip_to(skip->to);
+        from = skip->to;
+        start = clock();
+      } else if (const auto* hurry = std::get_if<HurryOrder>(&order)) {
+        start -= hurry->by.count();
+      }
+    }
+  }
+
+  /// What is due by the clock.
+  void tick() {
+    if (start < 0) {
+      if (!link->is_ready()) return;
+      start = clock();
+      from = simulation.time();
+    }
+    while (simulation.time() <= *due_at(clock()) && simulation.step(sink)) obey_share();
+  }
+
+  Executor executor;
+  Simulation simulation;
+  PerVehicle sink;
+  std::unique_ptr<Bus::End> end;
+  std::unique_ptr<FleetShare> share;
+  std::unique_ptr<ShareLink> link;
+  std::function<std::int64_t()> clock;
+  std::vector<std::string> lines;
+  std::int64_t start = -1;  ///< By the clock.
+  SimTime from;
+  bool interrupted = false;
+};
+
+std::int64_t wall() {
+  return std::chrono::steady_clock::now().time_since_epoch().count();
+}
+
+/// In lockstep, a thread each.
+std::vector<std::unique_ptr<Member>> fly_in_step(const Scenario& scenario,
+                                                 const std::vector<std::vector<std::size_t>>& who) {
+  Bus bus(wall);
+  std::vector<std::unique_ptr<Member>> members;
+  for (const auto& vehicles : who) {
+    members.push_back(std::make_unique<Member>(bus, scenario, vehicles, wall, members.size() + 1));
+  }
+  std::vector<std::thread> threads;
+  for (const auto& member : members) {
+    threads.emplace_back([&m = *member] {
+      while (!m.link->is_ready()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      while (m.simulation.step(m.sink)) m.obey_share();
+      m.share->leave();
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  return members;
+}
+
+PerVehicle fly_alone(const Scenario& scenario, RunEnd& end, SimTime& time) {
+  const Executor executor(2);
+  Simulation simulation(scenario, hall(), executor);
+  PerVehicle sink;
+  while (simulation.step(sink)) {
+  }
+  end = simulation.end();
+  time = simulation.time();
+  return sink;
+}
+
+void expect_as_one_process(const Scenario& scenario,
+                           const std::vector<std::vector<std::size_t>>& who) {
+  RunEnd end{};
+  SimTime time;
+  const PerVehicle alone = fly_alone(scenario, end, time);
+  for (const auto& member : fly_in_step(scenario, who)) {
+    EXPECT_EQ(member->simulation.end(), end);
+    EXPECT_EQ(member->simulation.time(), time);
+    for (const auto& [vehicle, sink] : member->sink.sinks) {
+      EXPECT_TRUE(member->simulation.is_own(vehicle));
+      EXPECT_EQ(sink.hash(), alone.sinks.at(vehicle).hash()) << vehicle;
+    }
+    EXPECT_EQ(member->sink.sinks.size(), member->simulation.own_vehicles().size());
+    for (const VehicleEvent& event : member->sink.events) {
+      EXPECT_TRUE(member->simulation.is_own(event.vehicle)) << event.kind << ": " << event.words;
+    }
+  }
+}
+
+TEST(FleetShare, LockstepGivesTheBytesOfOneProcess) {
+  const Scenario scenario = three(ShareTime::kLockstep);
+  RunEnd end{};
+  SimTime time;
+  PerVehicle alone = fly_alone(scenario, end, time);
+  int seen = 0;  // else nothing is shown
+  for (auto& [vehicle, sink] : alone.sinks) {
+    for (Label label = 1; label <= 3; ++label) seen += sink.labels[label];
+  }
+  EXPECT_GT(seen, 100);
+  expect_as_one_process(scenario, {{0}, {1}, {2}});
+  expect_as_one_process(scenario, {{0, 2}, {1}});
+}
+
+TEST(FleetShare, LockstepEndsForAllAtOnce) {
+  Scenario scenario = three(ShareTime::kLockstep);
+  scenario.duration = 0.0;
+  scenario.obstacles.clear();
+  for (VehicleSetup& v : scenario.vehicles) v.lidars.clear();
+  scenario.vehicles[1].start = {6, 11, 3};
+  scenario.vehicles[1].mission.waypoints = {{4.0, 11, 3}};  // through a pillar at (5, 12)
+  scenario.vehicles[1].mission.waypoints = {{4.6, 12, 3}};
+  scenario.vehicles[1].on_collision = CollisionReaction::kStop;
+  expect_as_one_process(scenario, {{0}, {1}, {2}});
+  scenario.vehicles[1].on_collision =
+      CollisionReaction::kCrash;  // the mission is not finished then
+  expect_as_one_process(scenario, {{1}, {0, 2}});
+  scenario.vehicles[1].mission.waypoints = {{7, 10, 3}};
+  expect_as_one_process(scenario, {{0, 1}, {2}});
+}
+
+TEST(FleetShare, StepsAheadComeOutTheSameEachTime) {
+  Scenario scenario = three(ShareTime::kLockstep);
+  ShareSetup setup;
+  setup.time = ShareTime::kLockstep;
+  setup.ahead = 8;
+  scenario = with_share(scenario, setup);
+  std::map<std::size_t, std::uint64_t> first;
+  for (int k = 0; k < 2; ++k) {
+    for (const auto& member : fly_in_step(scenario, {{0}, {1}, {2}})) {
+      for (const auto& [vehicle, sink] : member->sink.sinks) {
+        if (k == 0) first[vehicle] = sink.hash();
+        EXPECT_EQ(sink.hash(), first[vehicle]);
+      }
+    }
+  }
+  RunEnd end{};
+  SimTime time;
+  const PerVehicle alone = fly_alone(scenario, end, time);
+  EXPECT_NE(alone.sinks.at(0).hash(), first[0]);
+}
+
+/// By clocks: time that only moves when it is told to.
+struct World {
+  std::int64_t now = 1'000'000'000;
+  Bus bus{[this] { return now; }};
+  std::vector<std::unique_ptr<Member>> members;
+
+  Member& add(const Scenario& scenario, std::vector<std::size_t> vehicles) {
+    members.push_back(std::make_unique<Member>(
+        bus, scenario, std::move(vehicles), [this] { return now; }, members.size() + 1));
+    return *members.back();
+  }
+  /// All that are not in `still`.
+  void pass(double seconds, const std::vector<Member*>& still = {}) {
+    const std::int64_t until = now + std::llround(1e9 * seconds);
+    for (; now < until; now += kMs) {
+      for (const auto& member : members) {
+        if (std::find(still.begin(), still.end(), member.get()) == still.end()) member->tick();
+      }
+    }
+  }
+};
+
+/// Two that fly to and fro through each other, without LiDARs.
+Scenario through_each_other() {
+  Scenario s;
+  s.path = "s.yaml";
+  s.duration = 40.0;
+  s.vehicles.resize(2);
+  for (std::size_t i = 0; i < 2; ++i) {
+    VehicleSetup& v = s.vehicles[i];
+    v.name = i == 0 ? "a" : "b";
+    v.lidars.clear();
+    const double x = i == 0 ? 8.0 : 11.0;
+    v.start = {x, 6, 3};
+    for (int k = 0; k < 12; ++k) v.mission.waypoints.push_back({k % 2 == 0 ? 19.0 - x : x, 6, 3});
+  }
+  ShareSetup setup;
+  setup.lease = 0.5;
+  return with_share(s, setup);
+}
+
+TEST(FleetShare, OthersAreWhereTheyAreWithinTheBound) {
+  World world;
+  world.bus.delay = 2 * kMs;
+  Scenario scenario = through_each_other();
+  Member& a = world.add(scenario, {0});
+  Member& b = world.add(scenario, {1});
+  world.pass(1.5);
+  double worst = 0.0;
+  for (int k = 0; k < 6000; ++k) {
+    world.pass(1e-3);
+    const SimTime time = a.simulation.time();
+    ASSERT_EQ(time, b.simulation.time());
+    // where a took b to be in its last step, and where b was
+    const RigidBodyState& taken = a.simulation.status(1).state.body;
+    const RigidBodyState& now = b.simulation.status(1).state.body;
+    worst = std::max(worst, (taken.p_world - (now.p_world - 1e-3 * now.v_world)).norm());
+  }
+  const auto apart = a.share->apart();
+  ASSERT_EQ(apart.size(), 1u);
+  EXPECT_EQ(apart[0].flown_by, "host:2");
+  EXPECT_EQ(apart[0].losses, 0u);
+  EXPECT_LE(apart[0].extrapolated_max, 0.0125);
+  EXPECT_GT(worst, 0.0);
+  EXPECT_LT(worst, apart[0].extrapolation_bound);
+  EXPECT_LT(worst, 1e-3);
+  // both have met the other, at the same times
+  ASSERT_FALSE(a.sink.collisions.empty());
+  ASSERT_EQ(a.sink.collisions.size(), b.sink.collisions.size());
+  for (std::size_t i = 0; i < a.sink.collisions.size(); ++i) {
+    EXPECT_NEAR(to_seconds(a.sink.collisions[i].time), to_seconds(b.sink.collisions[i].time), 2e-3);
+    EXPECT_EQ(a.sink.collisions[i].partner, kFirstVehicle + 1);
+  }
+  for (const auto& peer : a.share->peers()) {
+    ASSERT_TRUE(peer.offset);
+    EXPECT_LE(std::abs(*peer.offset), peer.offset_error + 2e-3);
+    EXPECT_EQ(peer.missing, 0u);
+  }
+}
+
+TEST(FleetShare, WhoComesLateBeginsAtTheTimeOfTheOthers) {
+  World world;
+  world.bus.delay = 20 * kMs;
+  const Scenario scenario = through_each_other();
+  Member& a = world.add(scenario, {0});
+  world.pass(4.0);
+  EXPECT_GT(to_seconds(a.simulation.time()), 2.5);
+  Member& b = world.add(scenario, {1});
+  world.pass(1.5);
+  EXPECT_NEAR(to_seconds(b.simulation.time() - a.simulation.time()), 0.0, 0.002);
+  EXPECT_GT(to_seconds(b.simulation.state().skipped), 3.0);
+  EXPECT_LT(to_seconds(b.simulation.simulated()), 1.0);
+  EXPECT_TRUE(a.simulation.status(1).present);
+  // it began at its start, with its mission
+  EXPECT_LT(b.simulation.summary(1).distance_flown, 1.0);
+  world.pass(4.0);  // it turns first
+  EXPECT_GT(b.simulation.summary(1).distance_flown, 0.5);
+  // clocks that were apart: one that began too early lets the other come up
+  World later;
+  later.bus.delay = 20 * kMs;
+  Member& c = later.add(scenario, {0});
+  later.pass(2.0);
+  Member& d = later.add(scenario, {1});
+  later.pass(1.5);
+  c.start -= 40 * kMs;  // by 40 ms ahead
+  later.pass(0.3);
+  EXPECT_GT(to_seconds(c.simulation.time() - d.simulation.time()), 0.02);
+  later.pass(2.0);
+  EXPECT_LT(to_seconds(c.simulation.time() - d.simulation.time()),
+            0.026);  // as exactly as it can know
+}
+
+TEST(FleetShare, WhoIsSilentIsLostAndWhatWasMissedIsSaidAfterwards) {
+  for (const OnLoss on_loss : {OnLoss::kVanish, OnLoss::kHold}) {
+    World world;
+    Scenario scenario = through_each_other();
+    ShareSetup setup = share_setup_of(scenario);
+    setup.on_loss = on_loss;
+    scenario = with_share(scenario, setup);
+    Member& a = world.add(scenario, {0});
+    Member& b = world.add(scenario, {1});
+    world.pass(2.2);
+    ASSERT_TRUE(a.simulation.status(1).present);
+    world.bus.loses = [](std::size_t, std::size_t, ShareChannel) { return true; };
+    world.pass(10.0);
+    EXPECT_EQ(a.sink.kinds(), std::vector<std::string>({"lost"}));
+    EXPECT_EQ(a.simulation.status(1).present, on_loss == OnLoss::kHold);
+    const std::size_t met = a.sink.collisions.size();
+    world.bus.loses = nullptr;
+    world.pass(0.5);
+    ASSERT_GE(a.sink.events.size(), 3u);
+    EXPECT_EQ(a.sink.events.back().kind, "back");
+    const VehicleEvent& missed = a.sink.events[1];
+    EXPECT_EQ(missed.kind, "missed_contact");
+    EXPECT_EQ(missed.vehicle, 0u);
+    EXPECT_EQ(missed.partner, kFirstVehicle + 1);
+    EXPECT_GT(missed.penetration, 0.0);
+    for (const Member* member : {&a, &b}) {
+      const ApartSummary apart = member->share->apart().front();
+      EXPECT_EQ(apart.losses, 1u);
+      EXPECT_NEAR(to_seconds(apart.apart), 10.0, 0.2);
+      EXPECT_GE(apart.missed_contacts, 1u);
+      EXPECT_EQ(apart.unknown_contacts, 0u);
+      EXPECT_TRUE(member->simulation.status(1).present);
+    }
+    world.pass(8.0);  // and they meet again
+    EXPECT_GT(a.sink.collisions.size(), met);
+  }
+}
+
+TEST(FleetShare, WhoHasStoodStillGoesOnWhereTheOthersAre) {
+  World world;
+  const Scenario scenario = through_each_other();
+  Member& a = world.add(scenario, {0});
+  Member& b = world.add(scenario, {1});
+  world.pass(3.0);
+  const Vector3d before = b.simulation.status(1).state.body.p_world;
+  world.pass(5.0, {&b});
+  EXPECT_EQ(a.sink.kinds(), std::vector<std::string>({"lost"}));
+  world.pass(0.02);
+  EXPECT_NEAR(to_seconds(b.simulation.time() - a.simulation.time()), 0.0, 0.002);
+  EXPECT_LT((b.simulation.status(1).state.body.p_world - before).norm(), 0.1);
+  world.pass(1.0);
+  EXPECT_EQ(a.sink.kinds().back(), "back");
+  // its mission went on as if nothing had been: the reference is near
+  EXPECT_LT(b.simulation.summary(1).tracking_error_max, 0.2);
+  EXPECT_TRUE(std::any_of(b.lines.begin(), b.lines.end(), [](const std::string& line) {
+    return line.find("behind the others") != std::string::npos;
+  }));
+}
+
+TEST(FleetShare, WhoLeavesIsGoneAtOnce) {
+  World world;
+  Member& a = world.add(through_each_other(), {0});
+  Member& b = world.add(through_each_other(), {1});
+  world.pass(3.0);
+  b.share->leave();
+  world.pass(0.01, {&b});
+  EXPECT_EQ(a.sink.kinds(), std::vector<std::string>({"left"}));
+  EXPECT_FALSE(a.simulation.status(1).present);
+  EXPECT_EQ(a.share->apart().front().losses, 0u);
+}
+
+TEST(FleetShare, WhoDoesNotFitIsRefusedOrLeftOut) {
+  World world;
+  Member& a = world.add(through_each_other(), {0});
+  world.pass(2.0);
+  const auto joins = [&](const Scenario& scenario, std::vector<std::size_t> vehicles) {
+    return error_of([&] {
+      world.add(scenario, std::move(vehicles));
+      world.pass(2.0);
+    });
+  };
+  Scenario other = through_each_other();
+  expect_contains(joins(other, {0, 1}), "--share test: host:1 flies a (vehicle 0) too");
+  world.members.pop_back();
+  other.seed = 7;
+  expect_contains(joins(other, {1}), "another seed (1 there, 7 here)");
+  world.members.pop_back();
+  other = through_each_other();
+  other.vehicles[1].mission.yaw_rate_deg = 45.0;
+  expect_contains(joins(other, {1}), "another scenario");
+  world.members.pop_back();
+  other = through_each_other();
+  other.vehicles[1].model = "quad_250";
+  expect_contains(joins(other, {1}), "another vehicles or sensors");
+  world.members.pop_back();
+  // what a process writes and where its files lie does not matter
+  other = through_each_other();
+  other.output.scans = false;
+  other.path = "elsewhere/t.yaml";
+  Member& b = world.add(other, {1});
+  world.pass(2.0);
+  EXPECT_TRUE(a.simulation.status(1).present);
+  EXPECT_TRUE(a.share->fault().empty() && b.share->fault().empty());
+}
+
+TEST(FleetShare, OfTwoThatFlyOneVehicleTheYoungerGivesWay) {
+  World world;
+  world.bus.loses = [](std::size_t, std::size_t, ShareChannel) { return true; };
+  Member& a = world.add(through_each_other(), {0});
+  Member& b = world.add(through_each_other(), {0, 1});
+  world.pass(2.0);
+  EXPECT_TRUE(a.start > 0 && b.start > 0);
+  world.bus.loses = nullptr;
+  world.bus.tell_crew();
+  world.pass(0.1);
+  EXPECT_TRUE(a.share->fault().empty());
+  expect_contains(b.share->fault(), "--share test: host:1 flies a (vehicle 0) too");
+  EXPECT_TRUE(b.link->is_over());
+  EXPECT_FALSE(a.link->is_over());
+}
+
+TEST(FleetShare, StrangersChangeNothingAndAreSaidOnce) {
+  std::uint64_t hashes[2] = {};
+  for (const bool disturbed : {false, true}) {
+    World world;
+    Member& a = world.add(through_each_other(), {0});
+    Member& b = world.add(through_each_other(), {1});
+    for (int k = 0; k < 5000; ++k) {
+      world.pass(1e-3);
+      if (!disturbed || k % 5 != 0) continue;
+      const auto channel = static_cast<ShareChannel>(k / 5 % 4);
+      std::vector<std::byte> bytes(static_cast<std::size_t>(k % 97));
+      for (std::size_t i = 0; i < bytes.size(); ++i) bytes[i] = static_cast<std::byte>(i * 37 + k);
+      world.bus.shout(channel, bytes.empty() ? std::vector<std::byte>(1) : bytes);
+      share_msg::States states;  // of somebody that nobody knows, and of another version
+      states.head.kind = share_msg::Kind::kStates;
+      states.head.process = 4711;
+      states.vehicles.resize(1);
+      states.vehicles[0].number = 1;
+      world.bus.shout(ShareChannel::kStates, encode<Wire::kCdr>(states));
+      states.head.version = 99;
+      world.bus.shout(ShareChannel::kStates, encode<Wire::kCdr>(states));
+      share_msg::Introduction intro;
+      intro.head.process = 4712;
+      intro.vehicles = {1};
+      intro.name = "another\nworld";
+      intro.phase = share_msg::Phase::kFlying;
+      intro.parts = {{"map", "x"}};
+      world.bus.shout(ShareChannel::kCrew, encode<Wire::kCdr>(intro));
+      // in the other's name, with what no vehicle does
+      states.head.version = share_msg::kVersion;
+      states.head.process = 2;
+      states.time = a.simulation.time().time_since_epoch().count();
+      states.vehicles[0].position = {std::numeric_limits<double>::quiet_NaN(), 0, 0};
+      world.bus.shout(ShareChannel::kStates, encode<Wire::kCdr>(states));
+    }
+    hashes[disturbed ? 1 : 0] = a.sink.sinks[0].hash() ^ b.sink.sinks[1].hash();
+    if (!disturbed) continue;
+    EXPECT_GT(a.share->foreign(), 500u);
+    EXPECT_LE(a.lines.size(), 8u) << a.lines.back();
+    for (const std::string& line : a.lines) EXPECT_EQ(line.find('\n'), std::string::npos);
+  }
+  EXPECT_EQ(hashes[0], hashes[1]);
+}
+
+TEST(Simulation, TimeThatIsSkippedHasNotPassedForVehicles) {
+  Scenario scenario = through_each_other();
+  scenario.vehicles.resize(1);
+  scenario.vehicles[0].lidars.resize(1);
+  scenario.vehicles[0].lidars[0].model = "marsim_grid";
+  scenario.duration = 0.0;
+  const Executor executor(1);
+  Simulation simulation(scenario, hall(), executor);
+  struct Times : SampleSink {
+    std::vector<SimTime> scans, states;
+    void on_sample(const Sample& sample) override {
+      if (const auto* scan = std::get_if<ScanSample>(&sample)) scans.push_back(scan->scan->start);
+      if (const auto* state = std::get_if<StateSample>(&sample)) states.push_back(state->time);
+    }
+  } times;
+  simulation.advance_to(SimTime(std::chrono::milliseconds(1234)), times);
+  const auto before = simulation.status(0).state.body;
+  const SimTime end = simulation.end_time();
+  simulation.skip_to(SimTime(std::chrono::milliseconds(7777)));
+  EXPECT_EQ(simulation.status(0).state.body.p_world, before.p_world);
+  EXPECT_EQ(simulation.simulated(), Duration(std::chrono::milliseconds(1234)));
+  EXPECT_EQ(simulation.end_time() - end, Duration(std::chrono::milliseconds(7777 - 1234)));
+  while (simulation.step(times)) {
+  }
+  EXPECT_EQ(simulation.end(), RunEnd::kCompleted);  // its whole mission, later
+  EXPECT_LT(simulation.summary(0).tracking_error_max, 0.2);
+  for (std::size_t i = 1; i < times.scans.size(); ++i) {
+    const Duration gap = times.scans[i] - times.scans[i - 1];
+    EXPECT_TRUE(gap == std::chrono::milliseconds(100) ||
+                times.scans[i] == SimTime(std::chrono::milliseconds(7800)));
+  }
+  EXPECT_TRUE(std::is_sorted(times.states.begin(), times.states.end()));
+  EXPECT_THROW(simulation.skip_to(SimTime{}), std::invalid_argument);
+  Simulation other(scenario, hall(), executor);
+  EXPECT_THROW(other.skip_to(SimTime(Duration(1'500'000))), std::invalid_argument);
+}
+
+TEST(Simulation, GoesOnWhereALogEnds) {
+  Scenario scenario = through_each_other();
+  scenario.vehicles.resize(1);
+  scenario.duration = 0.0;
+  const Executor executor(1);
+  Simulation whole(scenario, hall(), executor);
+  ByteSink sink;
+  whole.advance_to(SimTime(std::chrono::seconds(4)), sink);
+  Simulation resumed(scenario, hall(), executor);
+  resumed.resume_at(SimTime(std::chrono::seconds(4)), {{0, whole.status(0).state}});
+  whole.advance_to(SimTime(std::chrono::seconds(9)), sink);
+  resumed.advance_to(SimTime(std::chrono::seconds(9)), sink);
+  // but for what its controllers have forgotten
+  EXPECT_LT((resumed.status(0).state.body.p_world - whole.status(0).state.body.p_world).norm(),
+            0.02);
+  EXPECT_LT(resumed.summary(0).tracking_error_max, 0.2);
+}
+
+}  // namespace
+}  // namespace pointflight
