@@ -85,11 +85,10 @@ std::vector<share_msg::Part> common_ground(const Simulation& simulation, double 
 
 bool describes_alike(const std::vector<share_msg::Part>& theirs,
                      const std::vector<share_msg::Part>& ours) {
-  return std::equal(theirs.begin(),
-                    theirs.end(),
-                    ours.begin(),
-                    ours.end(),
-                    [](const auto& a, const auto& b) { return a.name == b.name; });
+  return std::equal(
+      theirs.begin(), theirs.end(), ours.begin(), ours.end(), [](const auto& a, const auto& b) {
+        return a.name == b.name;
+      });
 }
 
 std::optional<std::string> difference(const std::vector<share_msg::Part>& theirs,

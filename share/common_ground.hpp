@@ -17,7 +17,8 @@ std::vector<share_msg::Part> common_ground(const Simulation& simulation, double 
 bool describes_alike(const std::vector<share_msg::Part>& theirs,
                      const std::vector<share_msg::Part>& ours);
 
-/// How two that describe alike differ, in words: "another map (4f0c there, 77ab here)"; nothing where they do not.
+/// How two that describe alike differ, in words: "another map (4f0c there, 77ab here)"; nothing
+/// where they do not.
 std::optional<std::string> difference(const std::vector<share_msg::Part>& theirs,
                                       const std::vector<share_msg::Part>& ours);
 

@@ -406,6 +406,7 @@ void FleetShare::lose_writer(std::uint64_t writer) {
 
 void FleetShare::lose(Peer& peer, const char* kind, const std::string& words) {
   peer.lost = true;
+  peer.newest = SimTime{};
   peer.past.reset();
   peer.lost_at = now_;
   peer.steps.clear();
@@ -488,7 +489,9 @@ void FleetShare::take_states(const ShareArrival& arrival) {
   }
   ++peer->received;
   peer->counter = std::max(peer->counter, states->counter);
+  peer->newest = std::max(peer->newest, to_time(states->time));
   if (decides_together()) {
+    if (peer->lost) return;
     const auto said = std::pair(states->time, states->flags & share_msg::States::kVerdict);
     for (const share_msg::States& known : peer->steps) {
       if (std::pair(known.time, known.flags & share_msg::States::kVerdict) == said) return;
@@ -635,8 +638,13 @@ void FleetShare::wait_for_steps(const SharedStep& own, SimTime needed) {
     }
     bool complete = joins == 0;
     for (auto& [id, peer] : peers_) {
-      if (!is_needed(peer, needed)) continue;
-      complete = complete && step_of(peer, needed, own.is_verdict) != nullptr;
+      if (!is_needed(peer, needed) || step_of(peer, needed, own.is_verdict) != nullptr) continue;
+      // nobody gets so far who waits for this process
+      if (peer.newest > own.time + (setup_.ahead + 1) * step_) {
+        lose(peer, "lost", "has gone on alone: this process was away");
+        continue;
+      }
+      complete = false;
     }
     if (complete || !fault_.empty() || options_.interrupted()) return;
     const std::int64_t now = options_.steady();
@@ -791,16 +799,20 @@ void FleetShare::say_offset(std::uint64_t id,
                   1e-6 * static_cast<double>(error)));
 }
 
-/// Lockstep: of those who have lost each other all but one join again.
+/// Lockstep: who has lost somebody that has come farther, and hears it again, joins again.
 FleetShare::Adjustment FleetShare::rejoin() {
-  const bool heard = std::any_of(peers_.begin(), peers_.end(), [this](const auto& entry) {
-    const Peer& peer = entry.second;
+  const SimTime now = simulation_.time();
+  const auto is_back = [this](const Peer& peer) {
     return peer.fits && peer.lost && peer.intro.phase == Phase::kFlying &&
-           entry.first < options_.id && options_.steady() - peer.heard < lease_.count() / 2;
+           options_.steady() - peer.heard < lease_.count() / 2;
+  };
+  const bool is_behind = std::any_of(peers_.begin(), peers_.end(), [&](const auto& entry) {
+    const auto& [id, peer] = entry;
+    return is_back(peer) && std::pair(peer.newest, options_.id) > std::pair(now, id);
   });
-  if (!heard) return {};
+  if (!is_behind) return {};
   for (auto& [id, peer] : peers_) {
-    if (peer.lost && peer.intro.phase == Phase::kFlying) recover(peer);
+    if (is_back(peer)) recover(peer);
   }
   introduce(Phase::kJoining);
   while (!may_join_steps() && fault_.empty() && !options_.interrupted()) {

@@ -98,6 +98,7 @@ class FleetShare : public FleetExchange {
     std::optional<share_msg::Past> past;         ///< What it said then, until its states have come.
     SimTime lost_at;
     std::deque<share_msg::States> steps;  ///< Lockstep: those that are still to be used.
+    SimTime newest;                       ///< Of its states.
     [[nodiscard]] bool flies() const {
       return fits && !lost && intro.phase == share_msg::Phase::kFlying;
     }

@@ -40,7 +40,7 @@ vehicles:
   - {{name: a, start: [14, 8, 25], mission: {{waypoints: {a}, speed: 4}}, lidars: []}}
   - {{name: b, start: [18, 8, 25], mission: {{waypoints: {b}, speed: 4}}, lidars: []}}
   - {{name: c, start: [16, 6, 25], mission: {{waypoints: {c}, speed: 3}}, lidars: []}}
-share: {{lease: {lease}, on_loss: {on_loss}, on_return: {on_return}}}
+share: {{time: {time}, lease: {lease}, on_loss: {on_loss}, on_return: {on_return}}}
 output: {{scans: false, imu: false}}
 """
 
@@ -98,11 +98,11 @@ def there_and_back(first, second, legs):
     return str([list(second if i % 2 == 0 else first) for i in range(legs)])
 
 
-def scenario(folder, duration, on_loss="vanish", on_return="start"):
+def scenario(folder, duration, on_loss="vanish", on_return="start", how="free"):
     folder.mkdir(parents=True)
     path = folder / "s.yaml"
     path.write_text(FAULTS.format(
-        map=pfmap, duration=duration, lease=LEASE, on_loss=on_loss, on_return=on_return,
+        map=pfmap, duration=duration, time=how, lease=LEASE, on_loss=on_loss, on_return=on_return,
         a=there_and_back((14, 8, 25), (18, 8, 25), 40), b=there_and_back((18, 8, 25), (14, 8, 25), 40),
         c=there_and_back((16, 6, 25), (16, 10, 25), 40)))
     return path
@@ -194,7 +194,8 @@ class Trial:
 
     def start(self, host, vehicles, output=None, *flags):
         process = Process(self.lan, host, ["fly", self.path, "-o", self.folder / (output or vehicles), "--share",
-                                           self.run, "--vehicles", vehicles, "--force", "--no-picture", *flags])
+                                           self.run, "--vehicles", vehicles, "--force", "--no-picture", "--rate", "1",
+                                           *flags])
         self.all.append(process)
         return process
 
@@ -338,10 +339,46 @@ def fault_leave(trial, rng, result, number):
     trial.finish((a, c), "ac", result)
 
 
+def fault_step_kill(trial, rng, result, number):
+    """In lockstep the others wait for the lease, go on, and stand still for who comes back."""
+    a, b, c = trial.start_all()
+    trial.until(rng.uniform(2, 4))
+    b.signal(signal.SIGKILL)
+    killed = time.monotonic()
+    assert a.wait_for("b at", 5, killed) is not None, "nobody missed b: " + a.text()
+    again = time.monotonic()
+    b = trial.start(1, "b")
+    recovered(result, again, a.wait_for("is heard again", 8, again), c.wait_for("is heard again", 8, again))
+    trial.finish((a, b, c), "abc", result)
+
+
+def fault_step_stop(trial, rng, result, number):
+    a, b, c = trial.start_all()
+    trial.until(rng.uniform(2, 4))
+    b.signal(signal.SIGSTOP)
+    time.sleep(5.0)
+    on = time.monotonic()
+    b.signal(signal.SIGCONT)
+    recovered(result, on, *(process.wait_for("is heard again", 8, on) for process in (a, b, c)))
+    trial.finish((a, b, c), "abc", result)
+
+
+def fault_step_partition(trial, rng, result, number):
+    a, b, c = trial.start_all()
+    trial.until(rng.uniform(2, 4))
+    trial.lan.set(groups=[0, 1, 1, 1])
+    time.sleep(10.0)
+    healed = time.monotonic()
+    trial.lan.set(groups=[0, 0, 0, 0])
+    recovered(result, healed, *(process.wait_for("is heard again", 8, healed) for process in (a, b, c)))
+    trial.finish((a, b, c), "abc", result)
+
+
 # fault: (simulated seconds, where a restarted process begins)
 KINDS = {"kill": (fault_kill, 13), "loss": (fault_loss, 10), "delay": (fault_delay, 10),
          "partition": (fault_partition, 18), "stop": (fault_stop, 14), "double": (fault_double, 5),
-         "late": (fault_late, 10), "leave": (fault_leave, 8)}
+         "late": (fault_late, 10), "leave": (fault_leave, 8), "step_kill": (fault_step_kill, 10),
+         "step_stop": (fault_step_stop, 14), "step_partition": (fault_step_partition, 18)}
 
 
 def try_fault(job):
@@ -350,6 +387,8 @@ def try_fault(job):
     result = collections.Counter({"recovery": 0.0})
     rng = random.Random(f"{kind} {number}")
     setup = {"on_loss": "hold" if number % 4 >= 2 else "vanish"}
+    if kind.startswith("step"):
+        setup["how"] = "lockstep"
     if kind == "kill" and number % 2 == 1:
         setup["on_return"] = "log"
     trial = None

@@ -50,6 +50,13 @@ class Bus {
     send(kStranger, channel, bytes);
   }
 
+  /// The lease of one has run out for another.
+  void lose(std::size_t from, std::size_t to) {
+    const std::lock_guard lock(mutex_);
+    inboxes_[to].push_back({from, now_(), {ShareChannel::kCrew, {}, 10 * from, now_()}});
+    arrived_.notify_all();
+  }
+
   /// Whoever hears each other again learns who the others are.
   void tell_crew() {
     const std::lock_guard lock(mutex_);

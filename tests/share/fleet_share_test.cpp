@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <thread>
 
 #include "share/share_link.hpp"
@@ -221,8 +222,7 @@ TEST(FleetShare, LockstepEndsForAllAtOnce) {
   scenario.obstacles.clear();
   for (VehicleSetup& v : scenario.vehicles) v.lidars.clear();
   scenario.vehicles[1].start = {6, 11, 3};
-  scenario.vehicles[1].mission.waypoints = {{4.0, 11, 3}};  // through a pillar at (5, 12)
-  scenario.vehicles[1].mission.waypoints = {{4.6, 12, 3}};
+  scenario.vehicles[1].mission.waypoints = {{4.6, 12, 3}};  // into a pillar at (5, 12)
   scenario.vehicles[1].on_collision = CollisionReaction::kStop;
   expect_as_one_process(scenario, {{0}, {1}, {2}});
   scenario.vehicles[1].on_collision =
@@ -230,6 +230,61 @@ TEST(FleetShare, LockstepEndsForAllAtOnce) {
   expect_as_one_process(scenario, {{1}, {0, 2}});
   scenario.vehicles[1].mission.waypoints = {{7, 10, 3}};
   expect_as_one_process(scenario, {{0, 1}, {2}});
+}
+
+TEST(FleetShare, LockstepGoesOnWithoutWhoIsLostAndTakesItBack) {
+  Scenario scenario = three(ShareTime::kLockstep);
+  scenario.obstacles.clear();
+  for (VehicleSetup& v : scenario.vehicles) v.lidars.clear();
+  scenario.duration = 1.5;
+  Bus bus(wall);
+  std::atomic<bool> cut = false;
+  bus.loses = [&cut](std::size_t from, std::size_t to, ShareChannel) {
+    return cut && (from == 2) != (to == 2);
+  };
+  std::vector<std::unique_ptr<Member>> members;
+  for (std::size_t i = 0; i < 3; ++i) {
+    members.push_back(std::make_unique<Member>(bus, scenario, std::vector{i}, wall, i + 1));
+  }
+  std::atomic<std::int64_t> reached[3] = {};
+  std::vector<std::thread> threads;
+  for (std::size_t i = 0; i < 3; ++i) {
+    threads.emplace_back([&, i, &m = *members[i]] {
+      while (!m.link->is_ready()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      while (m.simulation.step(m.sink)) {
+        m.obey_share();
+        reached[i] = m.simulation.time().time_since_epoch().count();
+        std::this_thread::sleep_for(std::chrono::milliseconds(i == 2 ? 2 : 1));
+      }
+      m.share->leave();
+    });
+  }
+  const auto wait_for = [&](std::size_t member, double seconds) {
+    while (reached[member] < std::llround(1e9 * seconds)) std::this_thread::yield();
+  };
+  wait_for(2, 0.3);
+  cut = true;
+  for (const std::size_t i : {0, 1}) {
+    bus.lose(2, i);
+    bus.lose(i, 2);
+  }
+  wait_for(0, 0.8);  // the third one is slower, alone as well
+  cut = false;
+  bus.tell_crew();
+  for (std::thread& thread : threads) thread.join();
+  for (const auto& member : members) {
+    EXPECT_EQ(to_seconds(member->simulation.time()), 1.5);
+    EXPECT_EQ(member->simulation.end(), RunEnd::kMissionUnfinished);
+    const auto kinds = member->sink.kinds();
+    EXPECT_EQ(std::count(kinds.begin(), kinds.end(), "lost"), member == members[2] ? 2 : 1);
+    EXPECT_EQ(std::count(kinds.begin(), kinds.end(), "back"), member == members[2] ? 2 : 1);
+    for (const ApartSummary& other : member->share->apart()) {
+      EXPECT_EQ(other.losses, member == members[2] || other.vehicle == 2 ? 1u : 0u);
+    }
+  }
+  // the one that was slower has jumped to where the others were
+  EXPECT_GT(to_seconds(members[2]->simulation.state().skipped), 0.05);
+  EXPECT_EQ(members[0]->simulation.state().skipped, Duration{0});
 }
 
 TEST(FleetShare, StepsAheadComeOutTheSameEachTime) {
