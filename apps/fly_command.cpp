@@ -247,8 +247,8 @@ void say_waits(const RunLoop& loop, const RosFlags& ros) {
   }
 }
 
-/// A process of a shared run that was killed goes on where its trajectory ends, if the scenario says
-/// so.
+/// A process of a shared run that was killed goes on where its trajectory ends, if the scenario
+/// says so.
 void resume(const FlyFlags& flags, Simulation& simulation) {
   const bool wanted = share_setup_of(simulation.scenario()).on_return == OnReturn::kLog;
   if (!wanted || flags.output.empty()) return;

@@ -38,12 +38,13 @@ void TerminalLink::say(const CollisionEvent& event) {
 
 void TerminalLink::say(const VehicleEvent& event) {
   if (events_ > kSaid) return;
-  log(events_++ == kSaid ? std::string("more on board: see events.csv")
-                         : fmt::format("{}{} at {:.3f} s: {}",
-                                       event.kind == "back" || event.kind == "left" ? "" : "warning: ",
-                                       simulation_.vehicle(event.vehicle).setup().name,
-                                       to_seconds(event.time),
-                                       event.words));
+  log(events_++ == kSaid
+          ? std::string("more on board: see events.csv")
+          : fmt::format("{}{} at {:.3f} s: {}",
+                        event.kind == "back" || event.kind == "left" ? "" : "warning: ",
+                        simulation_.vehicle(event.vehicle).setup().name,
+                        to_seconds(event.time),
+                        event.words));
 }
 
 FolderLink::FolderLink(const FolderOptions& options,

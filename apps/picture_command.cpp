@@ -107,6 +107,7 @@ RunPicture read_run(const fs::path& folder) {
     const auto& vehicles = summary.at("vehicles");
     RunFigures figures;
     figures.vehicles = vehicles.size();
+    if (summary.contains("others")) figures.others = summary.at("others").size();
     figures.time = summary.at("simulated_time").get<double>();
     figures.end = summary.at("end").get<std::string>();
     for (const auto& vehicle : vehicles) {

@@ -40,7 +40,13 @@ void RunPicture::add_obstacle(std::uint32_t label, const Vector3d& p, double rad
 
 void RunPicture::on_sample(const Sample& sample) {
   std::visit(
-      Overloaded{[&](const StateSample& s) { add_path_point(s.vehicle, s.state.body.p_world); },
+      Overloaded{[&](const StateSample& s) {
+                   own_.insert(s.vehicle);
+                   add_path_point(s.vehicle, s.state.body.p_world);
+                 },
+                 [&](const StatusSample& s) {  // all that is told of another process' vehicle
+                   if (!own_.contains(s.vehicle)) add_path_point(s.vehicle, s.state.p_world);
+                 },
                  [&](const ScanSample& s) { add_scan(s); },
                  [&](const CollisionEvent& s) {
                    if (s.entered) collisions.add(s.place_world);
@@ -76,12 +82,11 @@ void RunFigures::add_closest(std::optional<double> distance) {
 }
 
 void write_titles(const RunFigures& f, RunPicture& picture) {
-  picture.title =
-      fmt::format("{}{:.1f} m flown in {:.1f} s, {}",
-                  f.vehicles > 1 ? fmt::format("{} vehicles, ", f.vehicles) : std::string(),
-                  f.flown,
-                  f.time,
-                  f.end);
+  const std::string who =
+      f.others > 0     ? fmt::format("{} of {} vehicles, ", f.vehicles, f.vehicles + f.others)
+      : f.vehicles > 1 ? fmt::format("{} vehicles, ", f.vehicles)
+                       : std::string();
+  picture.title = fmt::format("{}{:.1f} m flown in {:.1f} s, {}", who, f.flown, f.time, f.end);
   picture.subtitle =
       fmt::format("{} scan{}, {:.2f} M points; closest approach {}; {} collision{}",
                   f.scans,
@@ -94,7 +99,8 @@ void write_titles(const RunFigures& f, RunPicture& picture) {
 
 void describe_run(const Simulation& simulation, RunPicture& picture) {
   RunFigures figures;
-  figures.vehicles = simulation.vehicle_count();
+  figures.vehicles = simulation.own_vehicles().size();
+  figures.others = simulation.vehicle_count() - figures.vehicles;
   figures.time = to_seconds(simulation.time());
   figures.end = to_string(simulation.end());
   picture.waypoints.clear();

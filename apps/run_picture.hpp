@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <set>
 #include <string>
 #include <unordered_map>
 #include <vector>
@@ -82,6 +83,7 @@ class RunPicture : public SampleSink {
   std::string title, subtitle;
 
  private:
+  std::set<std::size_t> own_;  ///< Vehicles that this process flies.
   void add_scan(const ScanSample& sample);
   std::unordered_map<std::uint32_t, std::size_t> trace_of_;  ///< By label.
 };
@@ -89,8 +91,9 @@ class RunPicture : public SampleSink {
 /// Figures of a run for its titles.
 struct RunFigures {
   std::size_t vehicles = 0;
-  double flown = 0.0;  ///< By all together, m.
-  double time = 0.0;   ///< s
+  std::size_t others = 0;  ///< Vehicles that other processes flew.
+  double flown = 0.0;      ///< By all together, m.
+  double time = 0.0;       ///< s
   std::string end;
   std::uint64_t scans = 0, points = 0, collisions = 0;
   std::optional<double> closest;  ///< m; nothing where it was over 10 m.
