@@ -47,7 +47,7 @@ struct ApartSummary {
   Duration apart{0};          ///< How long it was lost altogether.
   std::uint64_t missed_contacts = 0;   ///< With own vehicles meanwhile, as found afterwards.
   std::uint64_t unknown_contacts = 0;  ///< Losses of which nobody could say afterwards.
-  double extrapolation_bound = 0.0;  ///< By that no point of it was farther off, m.
+  double extrapolation_bound = 0.0;    ///< By that no point of it was farther off, m.
   double extrapolated_max = 0.0;       ///< Longest time that its state was moved on, s.
 };
 

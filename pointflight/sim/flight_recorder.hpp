@@ -50,8 +50,8 @@ class FlightRecorder : public SampleSink {
 
   RunFolder folder_;
   bool write_scans_;
-  bool flushes_;  ///< A process that is killed goes on where its trajectory ends.
-  std::vector<std::string> names_;                       ///< Of the vehicles.
+  bool flushes_;                    ///< A process that is killed goes on where its trajectory ends.
+  std::vector<std::string> names_;  ///< Of the vehicles.
   std::vector<std::unique_ptr<VehicleFiles>> vehicles_;  ///< Null: another process' vehicle.
   OutputFile events_;
   std::optional<OutputFile> obstacles_;
