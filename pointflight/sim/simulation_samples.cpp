@@ -15,7 +15,9 @@ constexpr double kBeamOrigin = 1.0;  // m: beams start no farther from their sen
 void Simulation::deliver(std::vector<StepSamples>& samples, SampleSink& sink) {
   if (others_ != nullptr) {
     for (VehicleEvent& event : others_->take_events()) {
-      samples[event.vehicle].items.push_back({event.time, kEventRank, std::move(event)});
+      StepSamples& of_vehicle = samples[event.vehicle];
+      const SimTime time = event.time;
+      of_vehicle.items.push_back({time, kEventRank, std::move(event)});
     }
   }
   std::vector<StepSamples::Item*> due;
