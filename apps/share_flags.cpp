@@ -115,8 +115,7 @@ bool is_free(const ShareFlags& flags, const Scenario& scenario) {
 SharedRun::SharedRun(const ShareFlags& flags,
                      Simulation& simulation,
                      const RunLoop& loop,
-                     double rate)
-    : simulation_(simulation) {
+                     double rate) {
   const ShareSetup& setup = share_setup_of(simulation.scenario());
   if (setup.time == ShareTime::kFree && rate <= 0.0) {
     throw InputError(

@@ -43,7 +43,6 @@ class SharedRun {
   std::unique_ptr<ShareTransport> transport_;
   std::unique_ptr<FleetShare> share_;
   std::unique_ptr<ShareLink> link_;
-  const Simulation& simulation_;
 };
 
 }  // namespace pointflight::apps
