@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "pointflight/core/math.hpp"
 #include "pointflight/core/random.hpp"
@@ -114,7 +115,7 @@ Vector3d Imu::normals(StreamId stream, std::uint64_t which) const {
 /// Rotors out of balance shake the body across their axes, once per turn; blades along them, once
 /// per blade that passes an arm. Forces of imbalance grow with the square of the speed. All rotors
 /// start at angles of their own.
-void Imu::vibrate(std::int64_t index,
+void Imu::vibrate(bool is_first,
                   const VehicleState& state,
                   Memory& memory,
                   Vector3d& gyro,
@@ -131,7 +132,7 @@ void Imu::vibrate(std::int64_t index,
   for (std::size_t i = 0; i < state.rotors.size(); ++i) {
     double& angle = memory.rotor_angles[i];
     const double speed = state.rotors[i].speed;
-    if (index > 0) angle = std::remainder(angle + speed / settings_.rate, 2.0 * kPi);
+    if (!is_first) angle = std::remainder(angle + speed / settings_.rate, 2.0 * kPi);
     const double share = speed * speed / (hover_speed_ * hover_speed_);
     const auto turn = math::sincos(angle);
     const auto blade = math::sincos(blades * angle);
@@ -149,8 +150,9 @@ ImuSample Imu::sample(std::int64_t index,
                       Memory& memory) const {
   const double dt = 1.0 / settings_.rate;
   const auto number = static_cast<std::uint64_t>(index);
+  const bool is_first = !std::exchange(memory.has_begun, true);
   // the first sample has no walk: it starts at zero
-  if (index > 0) {
+  if (!is_first) {
     memory.gyro_walk +=
         errors_.gyro.bias_walk * std::sqrt(dt) * normals(StreamId::kImuGyroBias, number);
     memory.accel_walk +=
@@ -163,7 +165,7 @@ ImuSample Imu::sample(std::int64_t index,
   Vector3d force = specific_force_body(body.q_world_body, acceleration.a_world) +
                    acceleration.alpha_body.cross(arm) + w.cross(w.cross(arm));
   Vector3d rates = w;
-  vibrate(index, state, memory, rates, force);
+  vibrate(is_first, state, memory, rates, force);
 
   ImuSample sample;
   sample.vehicle = vehicle_;
@@ -177,18 +179,18 @@ ImuSample Imu::sample(std::int64_t index,
       q_imu_body_ * force + memory.accel_walk +
       errors_.accel.noise_density / std::sqrt(dt) * normals(StreamId::kImuAccelNoise, number);
   if (!is_plain_)
-    add_steady_errors(index, q_imu_body_ * rates, q_imu_body_ * force, memory, sample);
+    add_steady_errors(number, is_first, q_imu_body_ * rates, q_imu_body_ * force, memory, sample);
   return sample;
 }
 
 /// Scales, leaning axes, turn-on biases, flicker, sensitivity to force; then the converter and the
 /// clock.
-void Imu::add_steady_errors(std::int64_t index,
+void Imu::add_steady_errors(std::uint64_t number,
+                            bool is_first,
                             const Vector3d& rates,
                             const Vector3d& force,
                             Memory& memory,
                             ImuSample& sample) const {
-  const auto number = static_cast<std::uint64_t>(index);
   const Matrix3d one = Matrix3d::Identity();
   sample.gyro += (gyro_scale_ - one) * rates + gyro_turn_on_ + g_sensitivity_ * force;
   sample.accel += (accel_scale_ - one) * force + accel_turn_on_;
@@ -199,11 +201,11 @@ void Imu::add_steady_errors(std::int64_t index,
   };
   if (gyro_flicker_.deviation() > 0.0) {
     sample.gyro +=
-        gyro_flicker_.step(index == 0, memory.gyro_flicker, flicker(StreamId::kImuGyroFlicker));
+        gyro_flicker_.step(is_first, memory.gyro_flicker, flicker(StreamId::kImuGyroFlicker));
   }
   if (accel_flicker_.deviation() > 0.0) {
     sample.accel +=
-        accel_flicker_.step(index == 0, memory.accel_flicker, flicker(StreamId::kImuAccelFlicker));
+        accel_flicker_.step(is_first, memory.accel_flicker, flicker(StreamId::kImuAccelFlicker));
   }
   sample.gyro = read_out(sample.gyro, errors_.gyro.range, errors_.bits);
   sample.accel = read_out(sample.accel, errors_.accel.range, errors_.bits);

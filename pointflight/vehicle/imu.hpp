@@ -76,9 +76,10 @@ class Imu {
     FlickerNoise::Values gyro_flicker{};     ///< rad/s
     FlickerNoise::Values accel_flicker{};    ///< m/s^2
     std::vector<double> rotor_angles;        ///< rad; empty without vibration.
+    bool has_begun = false;                  ///< A sample was taken.
   };
 
-  /// Sample number `index` (0, 1, ...; ask for each once and in order).
+  /// Sample number `index` (ask for each once and in order; a run may begin late, and skip some).
   ImuSample sample(std::int64_t index,
                    SimTime time,
                    const VehicleState& state,
@@ -87,12 +88,13 @@ class Imu {
 
  private:
   [[nodiscard]] Vector3d normals(StreamId stream, std::uint64_t which) const;
-  void add_steady_errors(std::int64_t index,
+  void add_steady_errors(std::uint64_t number,
+                         bool is_first,
                          const Vector3d& rates,
                          const Vector3d& force,
                          Memory& memory,
                          ImuSample& sample) const;
-  void vibrate(std::int64_t index,
+  void vibrate(bool is_first,
                const VehicleState& state,
                Memory& memory,
                Vector3d& gyro,

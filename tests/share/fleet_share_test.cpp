@@ -590,6 +590,7 @@ TEST(Simulation, TimeThatIsSkippedHasNotPassedForVehicles) {
   scenario.vehicles.resize(1);
   scenario.vehicles[0].lidars.resize(1);
   scenario.vehicles[0].lidars[0].model = "marsim_grid";
+  scenario.vehicles[0].mission.waypoints.resize(2);
   scenario.duration = 0.0;
   const Executor executor(1);
   Simulation simulation(scenario, hall(), executor);
