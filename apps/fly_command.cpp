@@ -254,7 +254,7 @@ void resume(const FlyFlags& flags, Simulation& simulation) {
   if (!wanted || flags.output.empty()) return;
   const auto ended = ended_run(flags.output, simulation, simulation.own_vehicles());
   if (!ended) return;
-  simulation.resume_at(ended->time, ended->states);
+  simulation.resume_at(ended->time, ended->skipped, ended->states);
   log(fmt::format("{}: goes on where an earlier run's trajectories end, at {:.2f} s",
                   flags.output,
                   to_seconds(ended->time)));
@@ -287,7 +287,10 @@ int fly(const FlyFlags& flags) {
   RunLoop loop(simulation, options);
   std::optional<SharedRun> shared;
   if (flags.share.is_asked()) shared.emplace(flags.share, simulation, loop, options.rate);
-  if (shared) resume(flags, simulation);
+  if (shared) {
+    resume(flags, simulation);
+    loop.add(shared->link());  // first: that it leaves is said before pictures are drawn
+  }
   std::optional<FolderLink> folder;
   if (!flags.output.empty()) {
     const Existing existing = flags.force ? Existing::kReplace : Existing::kRefuse;
@@ -299,7 +302,6 @@ int fly(const FlyFlags& flags) {
   }
   TerminalLink terminal(simulation);
   loop.add(terminal);
-  if (shared) loop.add(shared->link());
   catch_interrupts();
   const std::shared_ptr<LiveServer> server = start_viewing(flags.view, map);
   const std::unique_ptr<RosLink> ros = make_ros_link(flags.ros, simulation, server);

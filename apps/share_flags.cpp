@@ -126,9 +126,6 @@ SharedRun::SharedRun(const ShareFlags& flags,
   options.run = flags.name;
   options.process = process_name();
   options.id = random_id();
-  options.since =
-      std::chrono::duration_cast<Duration>(std::chrono::system_clock::now().time_since_epoch())
-          .count();
   options.vehicles = vehicles_from(flags.vehicles, simulation);
   options.rate = rate;
   options.steady = steady_ns;
@@ -142,7 +139,7 @@ SharedRun::SharedRun(const ShareFlags& flags,
   transport.lockstep = setup.time == ShareTime::kLockstep;
   transport.lease = setup.lease;
   transport.localhost_only = flags.localhost;
-  transport.log = options.log;
+  transport.ahead = setup.ahead;
   const std::vector<std::size_t> own = options.vehicles;
   transport_ = dds_module().share(transport);
   share_ = std::make_unique<FleetShare>(simulation, *transport_, std::move(options));

@@ -2,11 +2,14 @@
 
 #include <dds/dds.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <cstdlib>
+#include <cstring>
+#include <map>
 #include <mutex>
 #include <optional>
 #include <stdexcept>
@@ -23,9 +26,10 @@ constexpr const char* kTypes[kShareChannels] = {"pointflight_share::msg::dds_::I
                                                 "pointflight_share::msg::dds_::States_",
                                                 "pointflight_share::msg::dds_::Clock_",
                                                 "pointflight_share::msg::dds_::Past_"};
-constexpr std::int32_t kStepsKept = 64;      // of a writer, in lockstep
-constexpr std::int32_t kArrivalsKept = 256;  // in a reader, until its listener has come to them
-constexpr std::size_t kInboxMost = 20000;    // what the run has not taken yet: it stands still
+constexpr std::int32_t kStepsKept = 64;        // of a writer, in lockstep
+constexpr std::int32_t kArrivalsKept = 256;    // in a reader, until the listener has read them
+constexpr std::size_t kInboxMost = 20000;      // what the run has not taken yet: it stands still
+constexpr std::size_t kMessageMost = 4 << 20;  // bytes; nobody says more
 
 std::int64_t steady_now() {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(
@@ -79,6 +83,17 @@ Qos qos_for(ShareChannel channel, const ShareTransportOptions& options) {
   return qos;
 }
 
+/// A domain and all that is in it.
+struct Domain {
+  Domain() = default;
+  Domain(const Domain&) = delete;
+  Domain& operator=(const Domain&) = delete;
+  ~Domain() {
+    if (entity > 0) dds_delete(entity);
+  }
+  dds_entity_t entity = 0;
+};
+
 class DdsShareTransport : public ShareTransport {
  public:
   explicit DdsShareTransport(const ShareTransportOptions& options) {
@@ -86,14 +101,13 @@ class DdsShareTransport : public ShareTransport {
     if (options.localhost_only) discovery.range = DiscoverySettings::Range::kLocalhost;
     discovery.domain = domain_for(discovery);
     const std::string user = environment("CYCLONEDDS_URI").value_or("");
-    domain_ = dds_create_domain(discovery.domain, configuration(discovery, user).c_str());
-    if (domain_ < 0) refuse(domain_, discovery.domain);
+    domain_.entity = dds_create_domain(discovery.domain, configuration(discovery, user).c_str());
+    if (domain_.entity < 0) refuse(domain_.entity, discovery.domain);
     participant_ = dds_create_participant(discovery.domain, nullptr, nullptr);
     if (participant_ < 0) refuse(participant_, discovery.domain);
     for (std::size_t i = 0; i < kShareChannels; ++i) add_channel(i, options);
   }
 
-  ~DdsShareTransport() override { dds_delete(domain_); }
   DdsShareTransport(const DdsShareTransport&) = delete;
   DdsShareTransport& operator=(const DdsShareTransport&) = delete;
 
@@ -131,8 +145,11 @@ class DdsShareTransport : public ShareTransport {
     return lease + "," + cyclone_configuration(discovery, user);
   }
 
-  [[noreturn]] void refuse(dds_return_t code, std::uint32_t domain) {
-    if (domain_ > 0) dds_delete(domain_);
+  [[noreturn]] static void refuse(dds_return_t code, std::uint32_t domain) {
+    if (code == DDS_RETCODE_PRECONDITION_NOT_MET) {
+      throw std::runtime_error("--share: domain " + std::to_string(domain) +
+                               " is that of --ros2; set POINTFLIGHT_DOMAIN_ID to another");
+    }
     throw std::runtime_error(
         "--share: no DDS participant could be made in domain " + std::to_string(domain) + " (" +
         dds_strretcode(-code) + "); is CYCLONEDDS_URI right, are there network interfaces," +
@@ -147,11 +164,14 @@ class DdsShareTransport : public ShareTransport {
     const RawTopic topic = make_raw_topic(participant_, name, kTypes[index]);
     end.type = topic.type;
     const Qos qos = qos_for(end.channel, options);
-    const std::int32_t depth = end.channel == ShareChannel::kCrew ? 1 : kStepsKept;
+    const auto steps = std::max(kStepsKept, static_cast<std::int32_t>(options.ahead) + 16);
+    const std::int32_t depth = end.channel == ShareChannel::kCrew ? 1 : steps;
     dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, depth);
     end.writer = dds_create_writer(participant_, topic.topic, qos.get(), nullptr);
     // of several writers: one's news must not push out another's
-    dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, kArrivalsKept);
+    dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, std::max(kArrivalsKept, steps));
+    // each writer by its own lease, also one that has another: it is to be refused, not missed
+    dds_qset_liveliness(qos.get(), DDS_LIVELINESS_AUTOMATIC, DDS_INFINITY);
     dds_listener_t* listener = dds_create_listener(&end);
     dds_lset_data_available(listener, &DdsShareTransport::on_data);
     if (end.channel == ShareChannel::kCrew) {
@@ -161,7 +181,6 @@ class DdsShareTransport : public ShareTransport {
     dds_delete_listener(listener);
     if (end.reader < 0 || end.writer < 0) {
       const dds_return_t code = std::min(end.reader, end.writer);
-      dds_delete(domain_);
       throw std::runtime_error("--share: cannot make " + name + ": " + dds_strretcode(-code));
     }
   }
@@ -172,36 +191,65 @@ class DdsShareTransport : public ShareTransport {
     RawSample sample;
     std::vector<ShareArrival> arrivals;
     while (take_raw(reader, sample)) {
-      arrivals.push_back(
-          {end.channel, std::move(sample.bytes), sample.info.publication_handle, now});
+      if (sample.bytes.empty() || sample.bytes.size() > kMessageMost) continue;
+      const std::uint64_t writer =
+          end.transport->participant_of(reader, sample.info.publication_handle);
+      arrivals.push_back({end.channel, std::move(sample.bytes), writer, now});
     }
     end.transport->put(std::move(arrivals));
   }
 
-  static void on_liveliness(dds_entity_t /*reader*/,
+  static void on_liveliness(dds_entity_t reader,
                             const dds_liveliness_changed_status_t status,
                             void* self) {
     if (status.alive_count_change >= 0) return;
     const End& end = *static_cast<End*>(self);
-    end.transport->put({{end.channel, {}, status.last_publication_handle, steady_now()}});
+    DdsShareTransport& transport = *end.transport;
+    const std::uint64_t writer = transport.participant_of(reader, status.last_publication_handle);
+    transport.put({{end.channel, {}, writer, steady_now()}});
+  }
+
+  /// Who a writer belongs to: the same for all its topics, and by DDS, not by what it says.
+  std::uint64_t participant_of(dds_entity_t reader, dds_instance_handle_t publication) {
+    const std::lock_guard lock(names_mutex_);
+    const auto known = participants_.find(publication);
+    if (known != participants_.end()) return known->second;
+    std::uint64_t name = publication;
+    if (auto* endpoint = dds_get_matched_publication_data(reader, publication)) {
+      std::uint64_t halves[2];
+      static_assert(sizeof halves == sizeof endpoint->participant_key.v);
+      std::memcpy(halves, endpoint->participant_key.v, sizeof halves);
+      name = halves[0] * 0x9e3779b97f4a7c15ull ^ halves[1];
+      dds_builtintopic_free_endpoint(endpoint);
+      if (participants_.size() < kInboxMost) participants_.emplace(publication, name);
+    }
+    return name;
   }
 
   void put(std::vector<ShareArrival> arrivals) {
     const std::lock_guard lock(mutex_);
     for (ShareArrival& arrival : arrivals) {
-      if (inbox_.size() >= kInboxMost)
-        inbox_.erase(inbox_.begin(), inbox_.begin() + kInboxMost / 2);
+      if (inbox_.size() >= kInboxMost) {
+        // states and clocks are out of date by now; who takes part and who is lost is not
+        std::erase_if(inbox_, [](const ShareArrival& a) {
+          return a.channel == ShareChannel::kStates || a.channel == ShareChannel::kClock;
+        });
+        if (inbox_.size() >= kInboxMost) return;
+      }
       inbox_.push_back(std::move(arrival));
     }
     arrived_.notify_all();
   }
 
-  dds_entity_t domain_ = 0, participant_ = 0;
   std::array<End, kShareChannels> ends_;
+  dds_entity_t participant_ = 0;
   std::atomic<std::uint64_t> bytes_sent_{0};
   std::mutex mutex_;
   std::condition_variable arrived_;
   std::vector<ShareArrival> inbox_;
+  std::mutex names_mutex_;
+  std::map<dds_instance_handle_t, std::uint64_t> participants_;  ///< By publication.
+  Domain domain_;  ///< Ends first: its threads use all above.
 };
 
 }  // namespace

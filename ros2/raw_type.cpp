@@ -178,7 +178,7 @@ RawTopic make_raw_topic(dds_entity_t participant,
       dds_create_topic_sertype(participant, name.c_str(), &sertype, nullptr, nullptr, nullptr);
   if (topic < 0) {
     ddsi_sertype_unref(sertype);
-    throw std::runtime_error("ROS 2: topic " + name + " of type " + type +
+    throw std::runtime_error("DDS: topic " + name + " of type " + type +
                              " cannot be made: " + dds_strretcode(-topic));
   }
   return {topic, sertype};

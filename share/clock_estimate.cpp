@@ -7,6 +7,7 @@ namespace pointflight {
 namespace {
 
 constexpr std::int64_t kWindow = 2'000'000'000;  // ns
+constexpr std::size_t kMost = 64;                // samples
 
 }  // namespace
 
@@ -14,10 +15,14 @@ void ClockEstimate::add(std::int64_t sent,
                         std::int64_t held,
                         std::int64_t arrived,
                         std::int64_t clock) {
+  // others' figures: any
+  if (held < 0 || held > kWindow || sent > arrived || sent < arrived - 2 * kWindow) return;
   const std::int64_t round = arrived - sent - held;
-  if (held < 0 || round < 0 || round > kWindow) return;
+  if (round < 0) return;
   samples_.push_back({round, arrived - round / 2, clock});
-  while (samples_.front().steady < arrived - kWindow) samples_.pop_front();
+  while (samples_.front().steady < arrived - kWindow || samples_.size() > kMost) {
+    samples_.pop_front();
+  }
 }
 
 std::optional<ClockEstimate::Reading> ClockEstimate::at(std::int64_t steady) const {
@@ -26,6 +31,7 @@ std::optional<ClockEstimate::Reading> ClockEstimate::at(std::int64_t steady) con
       std::min_element(samples_.begin(), samples_.end(), [](const Sample& a, const Sample& b) {
         return a.round < b.round;
       });
+  if (steady - best->steady > 2 * kWindow) return std::nullopt;  // it has fallen silent
   const double passed = rate_ * static_cast<double>(steady - best->steady);
   const auto half = static_cast<std::int64_t>(0.5 * rate_ * static_cast<double>(best->round));
   return Reading{best->clock + std::llround(passed), half};

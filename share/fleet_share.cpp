@@ -26,6 +26,10 @@ constexpr Duration kPastKept = std::chrono::seconds(120);
 constexpr Duration kPastPatience = std::chrono::seconds(2);
 constexpr std::size_t kPastMost = 4000;  // states in one message
 constexpr std::size_t kPeersMost = 1000;
+constexpr std::size_t kPartsMost = 32;
+constexpr std::size_t kResentMost = 8;                         // messages
+constexpr std::int64_t kIntroducePeriod = 500 * kMillisecond;  // while joining
+constexpr double kJump = 0.1;           // s moved on, after which a vehicle may be elsewhere
 constexpr std::size_t kWordMost = 100;  // characters of others' names
 constexpr int kForeignSaid = 5;
 constexpr double kFarthest = 1e7;  // m
@@ -84,7 +88,7 @@ SharedVehicle vehicle_of(std::uint32_t number, std::uint32_t flags, const RigidB
 }
 
 /// Figures that a vehicle can have.
-bool makes_sense(const RigidBodyState& body) {
+bool is_plausible(const RigidBodyState& body) {
   return body.is_finite() && body.p_world.cwiseAbs().maxCoeff() < kFarthest &&
          body.v_world.norm() < 1e4 && body.omega_body.norm() < 1e4 &&
          std::abs(body.q_world_body.norm() - 1.0) < 1e-3;
@@ -121,7 +125,12 @@ FleetShare::FleetShare(const Simulation& simulation,
   std::sort(options_.vehicles.begin(), options_.vehicles.end());
 }
 
-FleetShare::~FleetShare() = default;
+FleetShare::~FleetShare() {
+  try {
+    leave();
+  } catch (...) {  // a run that ends by an error has said why
+  }
+}
 
 bool FleetShare::decides_together() const {
   return setup_.time == ShareTime::kLockstep;
@@ -135,18 +144,27 @@ void FleetShare::introduce(Phase phase) {
   intro.head.kind = Kind::kIntroduction;
   intro.head.process = options_.id;
   intro.name = options_.process;
-  intro.since = options_.since;
   intro.phase = phase;
   intro.vehicles.assign(options_.vehicles.begin(), options_.vehicles.end());
   intro.parts = parts_;
   intro.stops = simulation_.end() == RunEnd::kCollision;
   intro.ends_at = to_ns(now_);
+  introduced_at_ = options_.steady();
   transport_.send(ShareChannel::kCrew, bytes_of(intro));
 }
 
-FleetShare::Peer* FleetShare::peer_of(std::uint64_t process) {
+/// While joining: whoever could not take this process at first may have changed its mind.
+void FleetShare::keep_introducing() {
+  if (options_.steady() - introduced_at_ > kIntroducePeriod) introduce(phase_);
+}
+
+/// Nothing for one that nobody knows, and for one in whose name somebody else speaks.
+FleetShare::Peer* FleetShare::peer_of(std::uint64_t process, std::uint64_t writer) {
   const auto found = peers_.find(process);
-  return found == peers_.end() ? nullptr : &found->second;
+  if (found == peers_.end()) return nullptr;
+  if (found->second.writer == writer) return &found->second;
+  note_foreign(writer, "messages in another process' name");
+  return nullptr;
 }
 
 void FleetShare::receive() {
@@ -186,46 +204,74 @@ void FleetShare::note_foreign(std::uint64_t writer, const std::string& what) {
       "warning: --share {}: somebody sends {}; left out (said once)", options_.run, what));
 }
 
+/// Of two that cannot both fly: the one that has flown for longer by the run's own time.
 bool FleetShare::is_older(const Peer& peer) const {
-  return std::pair(peer.intro.since, peer.intro.head.process) <
-         std::pair(options_.since, options_.id);
+  return std::pair(peer.intro.begins_at, peer.intro.head.process) <
+         std::pair(own_.begins_at, options_.id);
+}
+
+bool FleetShare::has_sane_shape(const share_msg::Introduction& intro) const {
+  std::vector<char> named(others_.size(), 0);
+  for (const std::uint32_t v : intro.vehicles) {
+    if (v >= named.size() || std::exchange(named[v], 1) != 0) return false;
+  }
+  return !intro.vehicles.empty() && intro.phase <= Phase::kLeft &&
+         intro.parts.size() <= kPartsMost && share_msg::is_time(intro.begins_at) &&
+         share_msg::is_time(intro.waits_at) &&
+         (intro.ends_at == -1 || share_msg::is_time(intro.ends_at));
 }
 
 void FleetShare::take_introduction(const ShareArrival& arrival) {
   const auto intro = decode<Wire::kCdr, share_msg::Introduction>(arrival.bytes);
-  if (!intro || intro->vehicles.size() > others_.size() || intro->phase > Phase::kLeft) {
+  if (!intro || !has_sane_shape(*intro)) {
     note_foreign(arrival.writer, "an introduction that makes no sense");
     return;
   }
-  if (peers_.size() >= kPeersMost && !peers_.contains(intro->head.process)) return;
-  const bool is_new = !peers_.contains(intro->head.process);
+  const auto known = peers_.find(intro->head.process);
+  const bool is_new = known == peers_.end();
+  if (!is_new &&
+      (known->second.writer != arrival.writer || known->second.intro.vehicles != intro->vehicles)) {
+    note_foreign(arrival.writer, "an introduction in another process' name");
+    return;
+  }
+  if (is_new && !describes_alike(intro->parts, parts_)) {
+    note_foreign(arrival.writer, "an introduction that describes no run of ours");
+    return;
+  }
+  if (is_new && peers_.size() >= kPeersMost) {
+    std::erase_if(peers_, [](const auto& entry) { return !entry.second.fits; });
+    if (peers_.size() >= kPeersMost) return;
+  }
   Peer& peer = peers_[intro->head.process];
   if (is_new) peer.clock = ClockEstimate(options_.rate);
   const Phase before = peer.intro.phase;
   peer.intro = *intro;
   peer.intro.name = printable(peer.intro.name);
   peer.writer = arrival.writer;
+  peer.gone = false;
   if (is_new) peer.heard = arrival.at;
   if (peer.intro.phase == Phase::kLeft) {
     // lockstep: not before its last step has been used
-    if (peer.fits && before != Phase::kLeft && !decides_together()) {
+    if (peer.fits && before != Phase::kLeft && (!decides_together() || peer.lost)) {
       lose(peer, "left", "has left");
-      stopped_ = stopped_ || peer.intro.stops;
     }
     return;
   }
+  const bool fitted = peer.fits;
   check(peer);
   if (!peer.fits) return;
-  if (is_new) {
-    std::vector<std::string> names;
-    for (const std::uint32_t v : peer.intro.vehicles) {
-      names.push_back(simulation_.vehicle(v).setup().name);
-    }
-    options_.log(fmt::format(
-        "--share {}: {} flies {}", options_.run, peer.intro.name, fmt::join(names, ", ")));
-  }
+  if (!fitted) say_taken(peer);
   // lockstep: one that was lost comes back by joining again
   if (decides_together() && peer.lost && peer.intro.phase == Phase::kJoining) recover(peer);
+}
+
+void FleetShare::say_taken(const Peer& peer) const {
+  std::vector<std::string> names;
+  for (const std::uint32_t v : peer.intro.vehicles) {
+    names.push_back(simulation_.vehicle(v).setup().name);
+  }
+  options_.log(fmt::format(
+      "--share {}: {} flies {}", options_.run, peer.intro.name, fmt::join(names, ", ")));
 }
 
 void FleetShare::check(Peer& peer) {
@@ -233,28 +279,20 @@ void FleetShare::check(Peer& peer) {
   const bool flies = peer.intro.phase == Phase::kFlying;
   const bool gives_way =
       phase_ == Phase::kJoining ? flies || is_older(peer) : flies && is_older(peer);
-  if (!describes_alike(peer.intro.parts, parts_)) {
-    note_foreign(peer.writer, "an introduction that describes no run of ours");
-    return;
-  }
   if (const auto what = difference(peer.intro.parts, parts_)) {
-    refuse_or_say(peer,
-                  fmt::format("{} flies in another world: {}", peer.intro.name, printable(*what)),
-                  phase_ == Phase::kJoining && gives_way);
+    refuse_or_warn(peer,
+                   fmt::format("{} flies in another world: {}", peer.intro.name, printable(*what)),
+                   phase_ == Phase::kJoining && gives_way);
     return;
   }
   for (const std::uint32_t v : peer.intro.vehicles) {
-    if (v >= others_.size()) {
-      refuse_or_say(peer, fmt::format("{} names a vehicle {}", peer.intro.name, v), false);
-      return;
-    }
     if (!std::binary_search(options_.vehicles.begin(), options_.vehicles.end(), v)) continue;
-    refuse_or_say(peer,
-                  fmt::format("{} flies {} (vehicle {}) too; give each process other --vehicles",
-                              peer.intro.name,
-                              simulation_.vehicle(v).setup().name,
-                              v),
-                  gives_way);
+    refuse_or_warn(peer,
+                   fmt::format("{} flies {} (vehicle {}) too; give each process other --vehicles",
+                               peer.intro.name,
+                               simulation_.vehicle(v).setup().name,
+                               v),
+                   gives_way);
     return;
   }
   for (const auto& [id, other] : peers_) {
@@ -263,14 +301,14 @@ void FleetShare::check(Peer& peer) {
     for (const std::uint32_t v : other.intro.vehicles) {
       const auto& theirs = peer.intro.vehicles;
       if (std::find(theirs.begin(), theirs.end(), v) == theirs.end()) continue;
-      return;  // these two settle it among themselves; the first one counts until then
+      return;  // the two will resolve it; until then the first one counts
     }
   }
   peer.fits = true;
 }
 
 /// This process may not fly, or the other one is left out.
-void FleetShare::refuse_or_say(Peer& peer, const std::string& what, bool refuses) {
+void FleetShare::refuse_or_warn(Peer& peer, const std::string& what, bool refuses) {
   if (refuses) {
     const std::string line = fmt::format("--share {}: {}", options_.run, what);
     if (phase_ == Phase::kJoining && !flown_) {
@@ -280,15 +318,23 @@ void FleetShare::refuse_or_say(Peer& peer, const std::string& what, bool refuses
     if (fault_.empty()) fault_ = line;
     return;
   }
-  if (std::exchange(peer.said, true)) return;
+  if (std::exchange(peer.warned, true)) return;
   options_.log(
       fmt::format("warning: --share {}: {}; it is left out (said once)", options_.run, what));
 }
 
+/// A process is gone: who could not be taken beside it may fit now.
+void FleetShare::look_again_at_the_rest() {
+  for (auto& [id, peer] : peers_) {
+    if (peer.fits || peer.gone || peer.intro.phase == Phase::kLeft) continue;
+    check(peer);
+    if (peer.fits) say_taken(peer);
+  }
+}
+
 bool FleetShare::has_company() const {
-  return std::any_of(peers_.begin(), peers_.end(), [](const auto& entry) {
-    return entry.second.fits && entry.second.intro.phase != Phase::kLeft;
-  });
+  return std::any_of(
+      peers_.begin(), peers_.end(), [](const auto& entry) { return entry.second.flies(); });
 }
 
 /// Each vehicle of the fleet has its process.
@@ -320,9 +366,11 @@ bool FleetShare::is_ready() {
   const std::int64_t now = options_.steady();
   if (first_look_ == 0) {
     first_look_ = said_waiting_ = now;
+    introduced_ = true;
     introduce(Phase::kJoining);
   }
   receive();
+  keep_introducing();
   if (decides_together()) return may_join_steps();
   send_clock();
   const std::int64_t looked = now - first_look_;
@@ -345,7 +393,9 @@ bool FleetShare::may_join_steps() {
     own_.begins_at = std::max(own_.begins_at, peer.intro.waits_at);
   }
   const bool settled = options_.steady() - first_look_ >= options_.settle.count();
-  if (any_flies ? all_wait && settled : has_everybody()) return true;
+  // before the first step nobody may be missing, or it would not be that of one process
+  const bool complete = has_everybody() || own_.begins_at > 0;
+  if (complete && (!any_flies || (all_wait && settled))) return true;
   if (options_.steady() - said_waiting_ > kSayWaiting) {
     said_waiting_ = std::numeric_limits<std::int64_t>::max() / 2;
     const auto missing = missing_vehicles();
@@ -378,7 +428,13 @@ void FleetShare::begin() {
 }
 
 void FleetShare::leave() {
-  if (phase_ != Phase::kLeft) introduce(Phase::kLeft);  // `now_` is that of the last step
+  if (phase_ == Phase::kLeft || !introduced_) return;
+  introduce(Phase::kLeft);  // `now_` is that of the last step
+  if (!decides_together()) return;
+  for (int k = 0; k < 4; ++k) {  // nobody could ask for the last step again
+    for (const Bytes& bytes : last_sent_) transport_.send(ShareChannel::kStates, bytes);
+    transport_.wait(kMillisecond);
+  }
 }
 
 // ---- who is lost, who is back ----
@@ -395,11 +451,11 @@ void FleetShare::note(std::size_t vehicle, const char* kind, const std::string& 
 
 void FleetShare::lose_writer(std::uint64_t writer) {
   for (auto& [id, peer] : peers_) {
-    if (peer.writer != writer || peer.lost) continue;
-    if (peer.intro.phase == Phase::kLeft) {
-      if (decides_together() && peer.fits) lose(peer, "left", "has left");
-      continue;
-    }
+    if (peer.writer != writer) continue;
+    peer.gone = true;
+    if (!peer.fits || peer.lost) continue;
+    // lockstep: of one that has left, steps that came are still used
+    if (peer.intro.phase == Phase::kLeft) continue;
     lose(peer, "lost", "is not heard any more: its lease has run out");
   }
 }
@@ -412,18 +468,22 @@ void FleetShare::lose(Peer& peer, const char* kind, const std::string& words) {
   peer.steps.clear();
   peer.clock.clear();
   const bool left = peer.intro.phase == Phase::kLeft;
+  stopped_ = stopped_ || (left && peer.intro.stops);
+  const char* then = left                              ? ""
+                     : setup_.on_loss == OnLoss::kHold ? "; its body stays"
+                                                       : "; its body vanishes";
   for (const std::uint32_t v : peer.intro.vehicles) {
     Other& other = others_[v];
-    if (!other.there || other.process != peer.intro.head.process) continue;
+    if (!other.seen || other.process != peer.intro.head.process) continue;
+    if (!other.there && !left) continue;
+    if (!other.there) other.summary.apart += std::max(Duration{0}, now_ - other.lost_at);
+    other.lost_at = other.track.empty() ? now_ : std::min(now_, other.track.newest());
     other.there = false;
     if (left) other.seen = false;  // its body goes with it
-    other.lost_at = other.track.empty() ? now_ : std::min(now_, other.track.newest());
     if (!left) ++other.summary.losses;
-    const char* then = left                              ? ""
-                       : setup_.on_loss == OnLoss::kHold ? "; its body stays"
-                                                         : "; its body vanishes";
     note(v, kind, fmt::format("{} {}{}", peer.intro.name, words, then));
   }
+  look_again_at_the_rest();
 }
 
 void FleetShare::watch_silence() {
@@ -441,12 +501,13 @@ void FleetShare::recover(Peer& peer) {
 }
 
 /// Its states are there (again).
-void FleetShare::see(std::uint32_t number, Peer& peer) {
+void FleetShare::mark_present(std::uint32_t number, Peer& peer) {
   Other& other = others_[number];
   const bool same = other.process == peer.intro.head.process;
   other.process = peer.intro.head.process;
   other.summary.flown_by = peer.intro.name;
   if (std::exchange(other.there, true)) return;
+  other.jumped = true;
   const bool was_seen = std::exchange(other.seen, true);
   if (!was_seen) return;
   const Duration apart = std::max(Duration{0}, now_ - other.lost_at);
@@ -469,17 +530,17 @@ void FleetShare::see(std::uint32_t number, Peer& peer) {
 
 void FleetShare::take_states(const ShareArrival& arrival) {
   auto states = decode<Wire::kCdr, share_msg::States>(arrival.bytes);
-  if (!states) {
+  if (!states || !share_msg::is_time(states->time) || !share_msg::is_time(states->end_time)) {
     note_foreign(arrival.writer, "states that make no sense");
     return;
   }
-  Peer* peer = peer_of(states->head.process);
+  Peer* peer = peer_of(states->head.process, arrival.writer);
   if (peer == nullptr || !peer->fits || peer->intro.phase == Phase::kJoining) return;
   if (peer->intro.phase == Phase::kLeft && !decides_together()) return;
   for (const share_msg::VehicleState& state : states->vehicles) {
     const auto& its = peer->intro.vehicles;
     const bool is_its = std::find(its.begin(), its.end(), state.number) != its.end();
-    if (is_its && makes_sense(body_of(state))) continue;
+    if (is_its && is_plausible(body_of(state))) continue;
     note_foreign(arrival.writer, "states that no vehicle of its has");
     return;
   }
@@ -491,19 +552,22 @@ void FleetShare::take_states(const ShareArrival& arrival) {
   peer->counter = std::max(peer->counter, states->counter);
   peer->newest = std::max(peer->newest, to_time(states->time));
   if (decides_together()) {
-    if (peer->lost) return;
+    if (peer->lost && phase_ != Phase::kJoining) return;
+    if (peer->lost) recover(*peer);
     const auto said = std::pair(states->time, states->flags & share_msg::States::kVerdict);
     for (const share_msg::States& known : peer->steps) {
       if (std::pair(known.time, known.flags & share_msg::States::kVerdict) == said) return;
     }
-    const Duration kept = (setup_.ahead + 4) * step_;
-    while (!peer->steps.empty() && to_time(peer->steps.front().time) + kept < now_) {
-      peer->steps.pop_front();
-    }
+    const std::size_t kept = 2 * (static_cast<std::size_t>(setup_.ahead) + 8);
+    if (peer->steps.size() >= kept) peer->steps.pop_front();
     peer->steps.push_back(std::move(*states));
     return;
   }
-  if (peer->lost) recover(*peer);
+  if (peer->lost) {
+    check(*peer);  // somebody else may fly its vehicles by now
+    if (!peer->fits) return;
+    recover(*peer);
+  }
   for (const share_msg::VehicleState& state : states->vehicles) {
     Other& other = others_[state.number];
     if (other.process != peer->intro.head.process || !other.there) other.track.clear();
@@ -511,7 +575,7 @@ void FleetShare::take_states(const ShareArrival& arrival) {
     body.q_world_body.normalize();
     other.track.add(to_time(states->time), body);
     if (other.track.newest() == to_time(states->time)) other.flags = state.flags;
-    see(state.number, *peer);
+    mark_present(state.number, *peer);
   }
   if (std::exchange(peer->owes_past, false)) send_past(*peer);
   if (peer->past) {  // it may have come before the states
@@ -532,8 +596,7 @@ void FleetShare::send_states(const SharedStep& own) {
                  (own.is_verdict ? share_msg::States::kVerdict : 0u);
   for (const SharedVehicle& vehicle : own.vehicles) states.vehicles.push_back(state_of(vehicle));
   last_sent_.push_back(bytes_of(states));
-  const std::size_t kept = decides_together() ? static_cast<std::size_t>(setup_.ahead) + 3 : 1;
-  while (last_sent_.size() > kept) last_sent_.pop_front();
+  while (last_sent_.size() > (decides_together() ? kResentMost : 1)) last_sent_.pop_front();
   transport_.send(ShareChannel::kStates, last_sent_.back());
 }
 
@@ -576,6 +639,10 @@ void FleetShare::place(OtherVehicles& met, std::size_t number) {
     if (!body) return;
     met.vehicles[number] = vehicle_of(v, other.flags, *body);
     const double moved = to_seconds(std::min(lease_, now_ - other.track.newest()));
+    const double before = std::exchange(other.moved, moved);
+    // after a long silence it is elsewhere: it did not fly there in one step
+    met.vehicles[number]->jumped =
+        std::exchange(other.jumped, false) || (before > kJump && moved < before);
     if (moved > other.summary.extrapolated_max) {
       const VehicleAgent& agent = simulation_.vehicle(number);
       other.summary.extrapolated_max = moved;
@@ -623,6 +690,14 @@ bool FleetShare::is_needed(Peer& peer, SimTime time) {
   return false;
 }
 
+/// A step that is needed and not there will not come.
+bool FleetShare::is_hopeless(const Peer& peer, const SharedStep& own) const {
+  // who waits for this process does not get so far
+  if (peer.newest > own.time + (setup_.ahead + 1) * step_) return true;
+  if (own.is_verdict && peer.newest > own.time) return true;  // for it the run goes on
+  return peer.gone && peer.intro.phase == Phase::kLeft;
+}
+
 /// Until all who fly have said the step that is needed, and nobody wants to join.
 void FleetShare::wait_for_steps(const SharedStep& own, SimTime needed) {
   std::int64_t sent = options_.steady();
@@ -639,12 +714,12 @@ void FleetShare::wait_for_steps(const SharedStep& own, SimTime needed) {
     bool complete = joins == 0;
     for (auto& [id, peer] : peers_) {
       if (!is_needed(peer, needed) || step_of(peer, needed, own.is_verdict) != nullptr) continue;
-      // nobody gets so far who waits for this process
-      if (peer.newest > own.time + (setup_.ahead + 1) * step_) {
-        lose(peer, "lost", "has gone on alone: this process was away");
-        continue;
+      if (!is_hopeless(peer, own)) {
+        complete = false;
+      } else if (!own.is_verdict || peer.intro.phase == Phase::kLeft) {
+        const bool left = peer.intro.phase == Phase::kLeft;
+        lose(peer, left ? "left" : "lost", left ? "has left" : "has gone on without this process");
       }
-      complete = false;
     }
     if (complete || !fault_.empty() || options_.interrupted()) return;
     const std::int64_t now = options_.steady();
@@ -680,6 +755,12 @@ OtherVehicles FleetShare::meet_in_step(const SharedStep& own) {
   wait_for_steps(own, needed);
   OtherVehicles met;
   met.vehicles.resize(others_.size());
+  // what this process said then: all decide by the same words
+  own_steps_.push_back(own);
+  own_steps_.back().vehicles.clear();
+  while (own_steps_.front().time < needed) own_steps_.pop_front();
+  met.end_time = own_steps_.front().end_time;
+  met.is_landing = own_steps_.front().is_landing;
   for (auto& [id, peer] : peers_) {
     if (!is_needed(peer, needed)) continue;
     const share_msg::States* step = step_of(peer, needed, own.is_verdict);
@@ -693,8 +774,9 @@ OtherVehicles FleetShare::meet_in_step(const SharedStep& own) {
       if (own.time > needed) body = moved_on(body, to_seconds(own.time - needed));
       others_[state.number].track.add(needed, body_of(state));
       others_[state.number].flags = state.flags;
-      see(state.number, peer);
+      mark_present(state.number, peer);
       met.vehicles[state.number] = vehicle_of(state.number, state.flags, body);
+      met.vehicles[state.number]->jumped = std::exchange(others_[state.number].jumped, false);
     }
     if (std::exchange(peer.owes_past, false)) send_past(peer);
   }
@@ -726,19 +808,19 @@ void FleetShare::send_clock() {
 
 void FleetShare::take_clock(const ShareArrival& arrival) {
   const auto clock = decode<Wire::kCdr, share_msg::Clock>(arrival.bytes);
-  if (!clock) {
+  if (!clock || (clock->clock != -1 && !share_msg::is_time(clock->clock))) {
     note_foreign(arrival.writer, "a clock that makes no sense");
     return;
   }
-  Peer* peer = peer_of(clock->head.process);
+  Peer* peer = peer_of(clock->head.process, arrival.writer);
   if (peer == nullptr || !peer->fits) return;
   peer->its_sent = clock->sent;
   peer->its_arrival = arrival.at;
   if (clock->clock < 0) return;
   for (const share_msg::Echo& echo : clock->echoes) {
-    if (echo.process == options_.id) {
-      peer->clock.add(echo.sent, echo.held, arrival.at, clock->clock);
-    }
+    if (echo.process != options_.id) continue;
+    peer->clock.add(echo.sent, echo.held, arrival.at, clock->clock);
+    break;
   }
 }
 
@@ -771,7 +853,8 @@ FleetShare::Adjustment FleetShare::keep_time() {
         to_seconds(adjustment.skip),
         to_seconds(simulation_.time() + adjustment.skip)));
   } else if (ahead > kLeastAdjustment) {
-    adjustment.hurry = Duration(std::min(ahead, kMostAdjustment));
+    const double wall = static_cast<double>(ahead) / options_.rate;
+    adjustment.hurry = std::min(Duration(std::llround(wall)), Duration(kMostAdjustment));
   }
   return adjustment;
 }
@@ -780,7 +863,7 @@ void FleetShare::say_offset(std::uint64_t id,
                             const Peer& peer,
                             std::int64_t offset,
                             std::int64_t error) {
-  double scan = 0.1;  // s; the shortest of the own LiDARs'
+  double scan = 1.0;  // s; the shortest of the own LiDARs'
   for (const std::size_t v : options_.vehicles) {
     for (const MountedLidar* mounted : simulation_.vehicle(v).lidars()) {
       scan = std::min(scan, to_seconds(mounted->schedule().at(1) - mounted->schedule().at(0)));
@@ -801,14 +884,13 @@ void FleetShare::say_offset(std::uint64_t id,
 
 /// Lockstep: who has lost somebody that has come farther, and hears it again, joins again.
 FleetShare::Adjustment FleetShare::rejoin() {
-  const SimTime now = simulation_.time();
   const auto is_back = [this](const Peer& peer) {
     return peer.fits && peer.lost && peer.intro.phase == Phase::kFlying &&
            options_.steady() - peer.heard < lease_.count() / 2;
   };
   const bool is_behind = std::any_of(peers_.begin(), peers_.end(), [&](const auto& entry) {
     const auto& [id, peer] = entry;
-    return is_back(peer) && std::pair(peer.newest, options_.id) > std::pair(now, id);
+    return is_back(peer) && std::pair(peer.newest, options_.id) > std::pair(now_, id);
   });
   if (!is_behind) return {};
   for (auto& [id, peer] : peers_) {
@@ -818,6 +900,7 @@ FleetShare::Adjustment FleetShare::rejoin() {
   while (!may_join_steps() && fault_.empty() && !options_.interrupted()) {
     transport_.wait(kMillisecond);
     receive();
+    keep_introducing();
   }
   Adjustment adjustment;
   adjustment.skip = std::max(Duration{0}, to_time(own_.begins_at) - simulation_.time());
@@ -851,7 +934,7 @@ void FleetShare::take_past(const ShareArrival& arrival) {
     note_foreign(arrival.writer, "a past that makes no sense");
     return;
   }
-  Peer* peer = peer_of(past->head.process);
+  Peer* peer = peer_of(past->head.process, arrival.writer);
   if (peer == nullptr || !peer->fits || past->to != options_.id) return;
   peer->past = *past;
   look_back(*peer);
@@ -864,7 +947,8 @@ void FleetShare::look_back(Peer& peer) {
     const auto& its = peer.intro.vehicles;
     const RigidBodyState body = body_of(state.state);
     if (std::find(its.begin(), its.end(), state.state.number) == its.end()) continue;
-    if (makes_sense(body)) tracks[state.state.number].add_past(to_time(state.time), body);
+    if (is_plausible(body) && share_msg::is_time(state.time))
+      tracks[state.state.number].add_past(to_time(state.time), body);
   }
   for (auto& [number, track] : tracks) {
     Other& other = others_[number];

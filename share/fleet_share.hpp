@@ -23,7 +23,6 @@ struct FleetShareOptions {
   std::string run;                    ///< Name of the shared run, for messages.
   std::string process;                ///< What others call this process: "host:4711".
   std::uint64_t id = 0;               ///< Its random number.
-  std::int64_t since = 0;             ///< When it started, ns since 1970.
   std::vector<std::size_t> vehicles;  ///< Those that it flies, ascending.
   double rate = 1.0;                  ///< Simulated seconds per second; 0: as fast as it goes.
   Duration settle = std::chrono::milliseconds(1000);  ///< Others are looked for so long at first.
@@ -77,7 +76,7 @@ class FleetShare : public FleetExchange {
     std::uint64_t missing = 0;     ///< That never came, by their counters.
   };
   [[nodiscard]] std::vector<PeerReport> peers() const;
-  /// Messages that were not a process' of this run.
+  /// Messages that did not come from a process of this run.
   [[nodiscard]] std::uint64_t foreign() const { return foreign_; }
   /// At least one other process takes part, or did.
   [[nodiscard]] bool has_company() const;
@@ -85,10 +84,11 @@ class FleetShare : public FleetExchange {
  private:
   struct Peer {
     share_msg::Introduction intro;
-    std::uint64_t writer = 0;  ///< Of introductions.
+    std::uint64_t writer = 0;  ///< Whom the transport says that it is.
+    bool gone = false;         ///< The transport does not hear it any more.
     bool fits = false;         ///< It flies in the same world, and no vehicle of ours.
     bool lost = false;         ///< Silent for the lease.
-    bool said = false;         ///< What is wrong with it.
+    bool warned = false;       ///< Of what is wrong with it.
     std::int64_t heard = 0;    ///< `steady` when states came last.
     std::uint32_t counter = 0;
     std::uint64_t received = 0, missing = 0;
@@ -111,6 +111,8 @@ class FleetShare : public FleetExchange {
     bool seen = false;   ///< It has been there.
     bool there = false;  ///< Its states are heard.
     SimTime lost_at, back_at;
+    bool jumped = false;     ///< It is not where it was: came, or came back.
+    double moved = 0.0;      ///< For how long it was moved on last, s.
     bool asks_past = false;  ///< What happened while it was lost is still to be found out.
     ApartSummary summary;
   };
@@ -130,9 +132,13 @@ class FleetShare : public FleetExchange {
   void take_past(const ShareArrival& arrival);
   void note_foreign(std::uint64_t writer, const std::string& what);
   void check(Peer& peer);
-  void refuse_or_say(Peer& peer, const std::string& what, bool refuses);
+  void say_taken(const Peer& peer) const;
+  void refuse_or_warn(Peer& peer, const std::string& what, bool refuses);
   [[nodiscard]] bool is_older(const Peer& peer) const;
-  [[nodiscard]] Peer* peer_of(std::uint64_t process);
+  [[nodiscard]] Peer* peer_of(std::uint64_t process, std::uint64_t writer);
+  void look_again_at_the_rest();
+  void keep_introducing();
+  [[nodiscard]] bool has_sane_shape(const share_msg::Introduction& intro) const;
   [[nodiscard]] bool has_everybody() const;
   [[nodiscard]] std::vector<std::string> missing_vehicles() const;
   [[nodiscard]] bool may_join_steps();
@@ -140,7 +146,7 @@ class FleetShare : public FleetExchange {
   void lose_writer(std::uint64_t writer);
   void lose(Peer& peer, const char* kind, const std::string& words);
   void recover(Peer& peer);
-  void see(std::uint32_t number, Peer& peer);
+  void mark_present(std::uint32_t number, Peer& peer);
   void watch_silence();
   void note(std::size_t vehicle, const char* kind, const std::string& words);
 
@@ -155,6 +161,7 @@ class FleetShare : public FleetExchange {
                                                         bool verdict);
   [[nodiscard]] std::uint64_t joiner() const;
   [[nodiscard]] bool is_needed(Peer& peer, SimTime time);
+  [[nodiscard]] bool is_hopeless(const Peer& peer, const SharedStep& own) const;
   void wait_for_steps(const SharedStep& own, SimTime needed);
   void say_slow(SimTime needed, bool verdict);
   Adjustment rejoin();
@@ -182,14 +189,17 @@ class FleetShare : public FleetExchange {
   SimTime now_;  ///< Of the last meeting.
   share_msg::Introduction own_;
   share_msg::Phase phase_ = share_msg::Phase::kJoining;
+  bool introduced_ = false;
   bool flown_ = false;    ///< It has done a step.
   bool stopped_ = false;  ///< Another process left because of a collision.
   std::string fault_;
+  std::int64_t introduced_at_ = 0;
   std::int64_t first_look_ = 0;
   std::int64_t said_waiting_ = 0;
   std::int64_t next_clock_ = 0;
-  std::int64_t next_sent_ = 0;   ///< Index in the schedule.
-  std::deque<Bytes> last_sent_;  ///< States; in lockstep those that others may still need.
+  std::int64_t next_sent_ = 0;        ///< Index in the schedule.
+  std::deque<Bytes> last_sent_;       ///< States; in lockstep those that others may still need.
+  std::deque<SharedStep> own_steps_;  ///< Lockstep with steps ahead: what was told, without states.
   std::uint32_t counter_ = 0;
   std::uint64_t foreign_ = 0;
   std::map<std::uint64_t, bool> said_foreign_;

@@ -59,12 +59,11 @@ struct Introduction {
   static constexpr msg::TypeName kType{"pointflight_share", "Introduction"};
   Head head;                            ///< kIntroduction
   std::string name;                     ///< "host:4711"
-  std::int64_t since = 0;               ///< When it started, ns since 1970 by its own clock.
   Phase phase = Phase::kJoining;        ///< How far it has come.
   std::vector<std::uint32_t> vehicles;  ///< Numbers in the fleet that it flies.
   std::vector<Part> parts;              ///< What it flies in.
-  std::int64_t begins_at =
-      0;  ///< Lockstep, flying: its first step's time; others need it from then on.
+  /// Flying: the time of its first step, which in lockstep others need from then on.
+  std::int64_t begins_at = 0;
   std::uint64_t waits_for = 0;  ///< Lockstep: the process that joins, and that it stands still for.
   std::int64_t waits_at = 0;    ///< Time of the step that it stands at.
   std::int64_t ends_at = -1;    ///< Lockstep, left: time of its last step.
@@ -73,7 +72,6 @@ struct Introduction {
   static void fields(M& m, V& v) {
     v("head", m.head);
     v("name", m.name);
-    v("since", m.since);
     v("phase", m.phase);
     v("vehicles", m.vehicles);
     v("parts", m.parts);
@@ -182,6 +180,12 @@ struct Past {
     v("states", m.states);
   }
 };
+
+/// True for an instant that a run can come to: up to eleven days.
+inline bool is_time(std::int64_t ns) {
+  constexpr std::int64_t kMost = 1'000'000'000'000'000;
+  return ns >= 0 && ns < kMost;
+}
 
 /// Why bytes are none of these messages, in words; or nothing, and the head.
 struct Opened {

@@ -15,11 +15,6 @@ bool ShareLink::is_ready() {
   return true;
 }
 
-void ShareLink::on_wait(SimTime /*now*/, Waiting why) {
-  if (why != Waiting::kForLinks)
-    static_cast<void>(share_.keep_time());  // who pauses is still there
-}
-
 std::vector<Order> ShareLink::take_orders() {
   const FleetShare::Adjustment adjustment = share_.keep_time();
   if (adjustment.skip > Duration{0}) return {SkipOrder{simulation_.time() + adjustment.skip}};

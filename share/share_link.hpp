@@ -15,7 +15,6 @@ class ShareLink : public Link {
   ShareLink(Simulation& simulation, FleetShare& share);
 
   bool is_ready() override;
-  void on_wait(SimTime now, Waiting why) override;
   std::vector<Order> take_orders() override;
   void close() override;
   [[nodiscard]] bool is_over() const override { return !share_.fault().empty(); }

@@ -2,7 +2,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -25,7 +24,7 @@ inline constexpr std::size_t kShareChannels = 4;
 struct ShareArrival {
   ShareChannel channel = ShareChannel::kCrew;
   std::vector<std::byte> bytes;  ///< Empty: `writer` is lost, its lease has run out.
-  std::uint64_t writer = 0;      ///< Who wrote it on this channel, by the transport's count.
+  std::uint64_t writer = 0;      ///< Who wrote it, on whatever channel: not what the bytes say.
   std::int64_t at = 0;           ///< When it came, ns of the steady clock.
 };
 
@@ -45,11 +44,11 @@ class ShareTransport {
 
 /// How processes find each other.
 struct ShareTransportOptions {
-  std::string name;       ///< Of the shared run: letters, digits and _.
-  bool lockstep = false;  ///< States must all arrive.
-  double lease = 1.0;     ///< s
-  bool localhost_only = false;
-  std::function<void(const std::string&)> log;  ///< Lines for the user, from any thread.
+  std::string name;             ///< Of the shared run: letters, digits and _.
+  bool lockstep = false;        ///< States must all arrive.
+  double lease = 1.0;           ///< s
+  std::int64_t ahead = 0;       ///< Steps that may be on their way.
+  bool localhost_only = false;  ///< No other machine.
 };
 
 /// What the library with DDS gives (one of its own, so that the program needs no DDS); errors are

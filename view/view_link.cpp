@@ -196,6 +196,8 @@ void ViewLink::on_sample(const Sample& sample) {
     publish_scan(*scan);
   } else if (const auto* event = std::get_if<VehicleEvent>(&sample)) {
     publish_event(event->time, event->vehicle, event->words);
+    // of another process: where it is comes as long as it is there
+    if (event->kind == "lost" || event->kind == "left") vehicles_[event->vehicle].status.reset();
   } else if (const auto* collision = std::get_if<CollisionEvent>(&sample)) {
     if (collision->entered) publish_event(collision->time, collision->vehicle, "collision");
   }

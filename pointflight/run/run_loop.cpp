@@ -215,6 +215,9 @@ void RunLoop::obey(Link& link, const Order& order) {
     if (!why) return;
     link.on_rejected(*vehicle, *why);
     say_rejected(vehicle->vehicle, *why);
+  } else if (is_kept_by_clocks() && (std::holds_alternative<PauseOrder>(order) ||
+                                     std::holds_alternative<RateOrder>(order))) {
+    say("a run that other processes share by their clocks cannot be paused or go at another rate");
   } else if (const auto* pause = std::get_if<PauseOrder>(&order)) {
     if (paused_ != pause->pause) say(pause->pause ? "paused" : "going on");
     paused_ = pause->pause;
@@ -235,6 +238,11 @@ void RunLoop::obey(Link& link, const Order& order) {
   } else if (const auto* hurry = std::get_if<HurryOrder>(&order)) {
     pace_.hurry(hurry->by);
   }
+}
+
+/// Other processes take part, each by its own clock.
+bool RunLoop::is_kept_by_clocks() const {
+  return simulation_.others() != nullptr && !simulation_.others()->decides_together();
 }
 
 void RunLoop::say_rejected(std::size_t vehicle, const std::string& why) {

@@ -116,6 +116,7 @@ class RunLoop {
   void wait_for_answer();
   void take_orders();
   void obey(Link& link, const Order& order);
+  [[nodiscard]] bool is_kept_by_clocks() const;
   void say_rejected(std::size_t vehicle, const std::string& why);
   void wait_while_paused();
   void reset();

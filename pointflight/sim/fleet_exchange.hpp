@@ -18,6 +18,7 @@ struct SharedVehicle {
   bool crashed = false;      ///< Rotors off for good.
   bool arrived = true;     ///< Nothing is left of its mission, and it is neither broken nor empty.
   bool commanded = false;  ///< A program has told it something.
+  bool jumped = false;     ///< Received: it is not where it was, and did not fly here.
 };
 
 /// What a process tells the others at the start of a step.
@@ -32,8 +33,9 @@ struct SharedStep {
 
 /// What the other processes said.
 struct OtherVehicles {
-  SimTime end_time;         ///< The latest of theirs; the start of time without any.
-  bool is_landing = false;  ///< Any of them.
+  /// The latest of theirs, and where all decide together of this process' as well.
+  SimTime end_time;
+  bool is_landing = false;  ///< The same: any of them.
   bool stops = false;       ///< Any of them.
   /// By number; nothing for own ones and those that nobody flies, or that are lost and vanish.
   std::vector<std::optional<SharedVehicle>> vehicles;
@@ -47,8 +49,9 @@ struct ApartSummary {
   Duration apart{0};          ///< How long it was lost altogether.
   std::uint64_t missed_contacts = 0;   ///< With own vehicles meanwhile, as found afterwards.
   std::uint64_t unknown_contacts = 0;  ///< Losses of which nobody could say afterwards.
-  double extrapolation_bound = 0.0;    ///< By that no point of it was farther off, m.
-  double extrapolated_max = 0.0;       ///< Longest time that its state was moved on, s.
+  double extrapolation_bound =
+      0.0;  ///< Upper bound on the position error of any point of its hull then, m.
+  double extrapolated_max = 0.0;  ///< Longest time that its state was moved on, s.
 };
 
 /// The other processes, as a simulation sees them. Called from the thread that steps it.

@@ -58,6 +58,7 @@ std::string row_of(const RigidBodyState& b) {
                      csv(b.omega_body));
 }
 
+constexpr const char* kSkippedFile = "skipped.txt";  // ns; goes when the run is whole
 constexpr Duration kFlushPeriod = std::chrono::milliseconds(100);
 constexpr const char* kStateColumns = "px,py,pz,qw,qx,qy,qz,vx,vy,vz,wx,wy,wz";
 constexpr const char* kTrueStateColumns =
@@ -194,7 +195,7 @@ FlightRecorder::FlightRecorder(const std::string& folder,
                                Existing existing)
     : folder_(folder, existing),
       write_scans_(simulation.scenario().output.scans),
-      flushes_(simulation.others() != nullptr),
+      shared_(simulation.others() != nullptr ? &simulation : nullptr),
       events_(path_for("events.csv")) {
   write_scenario_copy(simulation.scenario(), simulation.map(), folder_.staging(), folder_.path());
   const OutputSetup& output = simulation.scenario().output;
@@ -258,10 +259,7 @@ void FlightRecorder::write(const StateSample& sample) {
                         : std::string(",");
   for (const RotorState& rotor : sample.state.rotors) row += fmt::format(",{}", rotor.speed);
   files.trajectory.write(row + "\n");
-  if (flushes_ && sample.time >= files.flushed + kFlushPeriod) {
-    files.trajectory.flush();
-    files.flushed = sample.time;
-  }
+  if (shared_ != nullptr) keep_up(files, sample.time);
   files.tum.write(fmt::format("{} {} {} {} {} {} {} {}\n",
                               time,
                               b.p_world.x(),
@@ -271,6 +269,16 @@ void FlightRecorder::write(const StateSample& sample) {
                               q.y(),
                               q.z(),
                               q.w()));
+}
+
+/// What a process needs that goes on where this one is killed (`ended_run`).
+void FlightRecorder::keep_up(VehicleFiles& files, SimTime time) {
+  if (time < files.flushed + kFlushPeriod) return;
+  files.trajectory.flush();
+  files.flushed = time;
+  if (skipped_ == shared_->state().skipped) return;
+  skipped_ = shared_->state().skipped;
+  std::ofstream(path_for(kSkippedFile)) << skipped_.count() << '\n';
 }
 
 void FlightRecorder::write(const OdometrySample& sample) {
@@ -374,6 +382,8 @@ void FlightRecorder::finish(const Simulation& simulation) {
   for (const auto& files : vehicles_) {
     if (files) files->commit();
   }
+  std::error_code ignored;
+  fs::remove(path_for(kSkippedFile), ignored);
   if (obstacles_) obstacles_->commit();
   events_.commit();
   OutputFile summary(path_for("summary.json"));
@@ -436,7 +446,11 @@ std::optional<EndedRun> ended_run(const std::string& folder,
                                   const std::vector<std::size_t>& vehicles) {
   constexpr std::size_t kRead = 1 << 17;
   std::map<std::size_t, std::map<SimTime, VehicleState>> known;
-  EndedRun ended{SimTime::max(), {}};
+  EndedRun ended{SimTime::max(), Duration{0}, {}};
+  std::int64_t skipped = 0;
+  if (!(std::ifstream(fs::path(folder) / ".partial" / kSkippedFile) >> skipped))
+    return std::nullopt;
+  ended.skipped = Duration(skipped);
   for (const std::size_t v : vehicles) {
     const VehicleAgent& agent = simulation.vehicle(v);
     const std::string name = simulation.vehicle_count() == 1 ? "" : agent.setup().name;
@@ -448,6 +462,7 @@ std::optional<EndedRun> ended_run(const std::string& folder,
     if (known[v].empty()) return std::nullopt;
     ended.time = std::min(ended.time, known[v].rbegin()->first);
   }
+  if (ended.skipped < Duration{0} || SimTime{} + ended.skipped > ended.time) return std::nullopt;
   // instants of the truth may lie within a step
   const Duration step = from_seconds(simulation.scenario().physics_step);
   const SimTime within = ended.time;

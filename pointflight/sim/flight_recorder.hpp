@@ -47,10 +47,14 @@ class FlightRecorder : public SampleSink {
   void write(const ObstacleSample& sample);
   void write(const StatusSample& /*sample*/) {}
   [[nodiscard]] std::string partner_name(Label label) const;
+  void keep_up(VehicleFiles& files, SimTime time);
 
   RunFolder folder_;
   bool write_scans_;
-  bool flushes_;                    ///< A process that is killed goes on where its trajectory ends.
+  /// Of a run that other processes share: a process that is killed goes on where its trajectories
+  /// end. Null: not shared.
+  const Simulation* shared_;
+  Duration skipped_{-1};  ///< As the file beside them has it.
   std::vector<std::string> names_;  ///< Of the vehicles.
   std::vector<std::unique_ptr<VehicleFiles>> vehicles_;  ///< Null: another process' vehicle.
   OutputFile events_;
@@ -62,6 +66,7 @@ class FlightRecorder : public SampleSink {
 /// Nothing where there are none.
 struct EndedRun {
   SimTime time;                                ///< Of the states.
+  Duration skipped{0};                         ///< Of it, jumped over.
   std::map<std::size_t, VehicleState> states;  ///< By number.
 };
 std::optional<EndedRun> ended_run(const std::string& folder,

@@ -99,7 +99,8 @@ SimTime Simulation::end_time() const {
   const SimTime own = setup_->scenario.duration > 0.0
                           ? setup_->end_time
                           : std::max(setup_->end_time + state_.skipped, state_.busy_until);
-  return std::max(own, met_.end_time);
+  if (others_ != nullptr && others_->decides_together()) return met_.end_time;
+  return own;
 }
 
 void Simulation::require_vehicle(std::size_t number) const {
@@ -359,9 +360,9 @@ void Simulation::finish_run() {
 
 /// True while a vehicle comes down at a program's word in a run without a duration.
 bool Simulation::is_landing() const {
-  if (setup_->scenario.duration > 0.0) return false;
   // as it was told: all processes must see the same last step
-  return others_ != nullptr ? met_.is_landing : lands();
+  if (others_ != nullptr) return met_.is_landing;
+  return setup_->scenario.duration <= 0.0 && lands();
 }
 
 /// An own vehicle comes down at a program's word.

@@ -100,10 +100,11 @@ class Simulation {
   /// steps, or earlier.
   void skip_to(SimTime time);
 
-  /// Before the first step: as if the run had come to `time`, with these states of vehicles (by
+  /// Before the first step: as if the run had come to `time`, of which `skipped` was jumped over,
+  /// with these states of vehicles (by
   /// number), and with what the scenario told them until then under way. Controllers, batteries and
   /// what sensors remember are as at the start. Throws as `skip_to`.
-  void resume_at(SimTime time, const std::map<std::size_t, VehicleState>& states);
+  void resume_at(SimTime time, Duration skipped, const std::map<std::size_t, VehicleState>& states);
 
   /// Ends the run early.
   void interrupt();

@@ -31,7 +31,7 @@ SharedStep Simulation::shared_step(bool is_verdict) const {
   step.end_time = setup_->scenario.duration > 0.0
                       ? setup_->end_time
                       : std::max(setup_->end_time + state_.skipped, state_.busy_until);
-  step.is_landing = lands();
+  step.is_landing = setup_->scenario.duration <= 0.0 && lands();
   step.is_verdict = is_verdict;
   for (const std::size_t i : own_) {
     const VehicleStatus& s = status(i);
@@ -45,17 +45,18 @@ SharedStep Simulation::shared_step(bool is_verdict) const {
 void Simulation::meet_others() {
   const SharedStep own = shared_step(false);
   met_ = others_->meet(own);
-  met_.is_landing = met_.is_landing || own.is_landing;
+  if (!others_->decides_together()) met_.is_landing = met_.is_landing || own.is_landing;
   met_.vehicles.resize(vehicle_count());
   for (std::size_t i = 0; i < vehicle_count(); ++i) {
     if (is_own(i)) continue;
     VehicleStatus& s = state_.vehicles[i];
     const auto& other = met_.vehicles[i];
-    if (!other || !s.present) {
+    if (!other || !s.present || other->jumped) {
       s.history.clear();
       s.proximity = {};
     }
-    if (other && !s.present && state_.step_number > 0) s.present_since = state_.time;
+    const bool comes = other && (!s.present || other->jumped);
+    if (comes && state_.step_number > 0) s.present_since = state_.time;
     s.present = other.has_value();
     if (!other) continue;
     s.state.body = other->body;
@@ -121,18 +122,23 @@ void Simulation::skip_to(SimTime time) {
   move_schedules_to(time);
   state_.skipped += by;
   state_.busy_until += by;
-  for (const std::size_t i : own_) {
-    VehicleStatus& s = state_.vehicles[i];
-    s.skipped += by;
-    s.autopilot.since += by;
+  for (VehicleStatus& s : state_.vehicles) {  // nobody has flown through what lies between
     s.history.clear();
     s.proximity = {};
     s.present_since = time;
   }
+  for (const std::size_t i : own_) {
+    state_.vehicles[i].skipped += by;
+    state_.vehicles[i].autopilot.since += by;
+  }
 }
 
-void Simulation::resume_at(SimTime time, const std::map<std::size_t, VehicleState>& states) {
+void Simulation::resume_at(SimTime time,
+                           Duration skipped,
+                           const std::map<std::size_t, VehicleState>& states) {
   move_schedules_to(time);
+  state_.skipped = skipped;
+  for (const std::size_t i : own_) state_.vehicles[i].skipped = skipped;
   for (const auto& [number, state] : states) {
     require_vehicle(number);
     vehicle(number).resume(state_.vehicles[number], state, time);

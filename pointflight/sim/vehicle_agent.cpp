@@ -239,11 +239,16 @@ void VehicleAgent::resume(VehicleStatus& status, const VehicleState& state, SimT
   for (std::size_t i = 0; i < state.rotors.size(); ++i) {
     status.rotor_commands[i] = state.rotors[i].speed;
   }
-  while (status.next_command < commands_.size() && commands_[status.next_command].time <= time) {
+  const bool rotors_stand = std::all_of(
+      state.rotors.begin(), state.rotors.end(), [](const RotorState& r) { return r.speed < 1.0; });
+  status.landed = setup_.landed && (state.body.p_world - setup_.start).norm() < kTouchdown;
+  if (rotors_stand && !status.landed) crash(status);  // it lies where it fell
+  while (status.next_command < commands_.size() &&
+         commands_[status.next_command].time + status.skipped <= time) {
     const TimedCommand& given = commands_[status.next_command++];
     // ways that are made from where it is begin here; those that are given are half flown
     const bool is_given = std::holds_alternative<TrajectoryCommand>(given.command);
-    command(status, given.command, is_given ? given.time : time);
+    command(status, given.command, is_given ? given.time + status.skipped : time);
     status.scripted = true;
   }
 }

@@ -86,7 +86,6 @@ void listen(std::span<const std::uint8_t> data) {
   options.run = "fuzz";
   options.process = "host:1";
   options.id = 1;
-  options.since = 1;  // older than whoever comes
   options.vehicles = {0};
   options.settle = Duration{0};
   options.steady = [&now] { return now; };
@@ -102,7 +101,7 @@ void listen(std::span<const std::uint8_t> data) {
   ShareLink link(simulation, share);
   share_msg::Introduction intro;
   intro.name = "host:2";
-  intro.since = 2;
+  intro.begins_at = 1000;  // younger
   intro.phase = share_msg::Phase::kFlying;
   intro.vehicles = {1};
   intro.parts = common_ground(simulation, setup.time == ShareTime::kFree ? 1.0 : 0.0);

@@ -238,8 +238,9 @@ def fault_kill(trial, rng, result, number):
     trial.until(rng.uniform(3, 5))
     b.signal(signal.SIGKILL)
     killed = time.monotonic()
-    assert a.wait_for("b at", 5, killed) is not None, "nobody missed b: " + a.text()
-    time.sleep(rng.uniform(0.0, 2.0))
+    if number % 3 != 2:  # else it comes again before anybody has missed it
+        assert a.wait_for("b at", 5, killed) is not None, "nobody missed b: " + a.text()
+        time.sleep(rng.uniform(0.0, 2.0))
     again = time.monotonic()
     b = trial.start(1, "b")
     recovered(result, again, a.wait_for("is heard again", 8, again), c.wait_for("is heard again", 8, again))
@@ -345,7 +346,8 @@ def fault_step_kill(trial, rng, result, number):
     trial.until(rng.uniform(2, 4))
     b.signal(signal.SIGKILL)
     killed = time.monotonic()
-    assert a.wait_for("b at", 5, killed) is not None, "nobody missed b: " + a.text()
+    if number % 3 != 2:
+        assert a.wait_for("b at", 5, killed) is not None, "nobody missed b: " + a.text()
     again = time.monotonic()
     b = trial.start(1, "b")
     recovered(result, again, a.wait_for("is heard again", 8, again), c.wait_for("is heard again", 8, again))

@@ -45,16 +45,22 @@ class Bus {
     return std::make_unique<End>(*this, inboxes_.size() - 1);
   }
 
-  /// To all, as if it came from a stranger.
-  void shout(ShareChannel channel, std::vector<std::byte> bytes) {
-    send(kStranger, channel, bytes);
+  /// To all, as if it came from a stranger, or from the process of a number.
+  void shout(ShareChannel channel, std::vector<std::byte> bytes, std::size_t from = kStranger) {
+    send(from, channel, bytes);
   }
 
   /// The lease of one has run out for another.
   void lose(std::size_t from, std::size_t to) {
     const std::lock_guard lock(mutex_);
-    inboxes_[to].push_back({from, now_(), {ShareChannel::kCrew, {}, 10 * from, now_()}});
+    inboxes_[to].push_back({from, now_(), {ShareChannel::kCrew, {}, from, now_()}});
     arrived_.notify_all();
+  }
+
+  /// Who is dead tells nobody who it was.
+  void forget(std::size_t from) {
+    const std::lock_guard lock(mutex_);
+    std::erase_if(crew_, [&](const Message& m) { return m.from == from; });
   }
 
   /// Whoever hears each other again learns who the others are.
@@ -77,11 +83,10 @@ class Bus {
 
   void send(std::size_t from, ShareChannel channel, const std::vector<std::byte>& bytes) {
     const std::lock_guard lock(mutex_);
-    if (from != kStranger) sent_[from] += bytes.size();
+    if (from < sent_.size()) sent_[from] += bytes.size();
     const std::int64_t due = now_() + delay;
-    const Message message{
-        from, due, {channel, bytes, 10 * from + static_cast<std::uint64_t>(channel), due}};
-    if (channel == ShareChannel::kCrew && from != kStranger) {
+    const Message message{from, due, {channel, bytes, from, due}};
+    if (channel == ShareChannel::kCrew && from < sent_.size()) {
       std::erase_if(crew_, [&](const Message& m) { return m.from == from; });
       crew_.push_back(message);
     }

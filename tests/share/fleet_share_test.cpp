@@ -5,8 +5,10 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <limits>
 #include <thread>
 
+#include "share/common_ground.hpp"
 #include "share/share_link.hpp"
 #include "tests/share/bus.hpp"
 #include "tests/sim/runs.hpp"
@@ -96,7 +98,6 @@ struct Member {
     options.run = "test";
     options.process = "host:" + std::to_string(id);
     options.id = id;
-    options.since = static_cast<std::int64_t>(id);
     options.vehicles = vehicles;
     options.steady = std::move(steady);
     options.clock = [this](std::int64_t at) { return due_at(at); };
@@ -313,10 +314,11 @@ struct World {
   std::int64_t now = 1'000'000'000;
   Bus bus{[this] { return now; }};
   std::vector<std::unique_ptr<Member>> members;
+  std::uint64_t last_id = 0;
 
   Member& add(const Scenario& scenario, std::vector<std::size_t> vehicles) {
     members.push_back(std::make_unique<Member>(
-        bus, scenario, std::move(vehicles), [this] { return now; }, members.size() + 1));
+        bus, scenario, std::move(vehicles), [this] { return now; }, ++last_id));
     return *members.back();
   }
   /// All that are not in `still`.
@@ -479,6 +481,47 @@ TEST(FleetShare, WhoHasStoodStillGoesOnWhereTheOthersAre) {
   }));
 }
 
+TEST(FleetShare, NobodyIsMetOnAWayThatNobodyFlew) {
+  // abreast, a metre apart: whoever jumps would sweep through the other
+  Scenario scenario = through_each_other();
+  scenario.vehicles[0].start = {8, 5, 3};
+  scenario.vehicles[1].start = {8, 6, 3};
+  scenario.vehicles[0].mission.waypoints = {{16, 5, 3}, {16, 9, 3}};
+  scenario.vehicles[1].mission.waypoints = {{16, 6, 3}, {16, 2, 3}};
+  ShareSetup setup = share_setup_of(scenario);
+  setup.on_loss = OnLoss::kHold;
+  scenario = with_share(scenario, setup);
+  World world;
+  Member& a = world.add(scenario, {0});
+  Member& b = world.add(scenario, {1});
+  world.pass(3.0);
+  world.pass(5.0, {&b});
+  world.pass(0.5);
+  EXPECT_EQ(a.sink.kinds().back(), "back");
+  // b stood beside a's way, and so did what a took it for
+  EXPECT_TRUE(a.sink.collisions.empty());
+  EXPECT_TRUE(b.sink.collisions.empty());
+}
+
+TEST(FleetShare, WhoIsStartedAgainBeforeItsLeaseHasRunOutIsTakenThen) {
+  World world;
+  const Scenario scenario = through_each_other();
+  Member& a = world.add(scenario, {0});
+  Member& b = world.add(scenario, {1});
+  world.pass(3.0);
+  // killed: it says nothing more, not even that it goes
+  world.bus.loses = [](std::size_t from, std::size_t, ShareChannel) { return from == 1; };
+  world.bus.forget(1);
+  world.pass(0.1, {&b});
+  Member& again = world.add(scenario, {1});
+  world.pass(2.0, {&b});
+  EXPECT_EQ(a.sink.kinds(), std::vector<std::string>({"lost", "back"}));
+  EXPECT_TRUE(a.simulation.status(1).present);
+  EXPECT_EQ(a.share->apart().front().flown_by, "host:3");
+  EXPECT_EQ(a.share->apart().front().unknown_contacts, 1u);
+  EXPECT_TRUE(again.simulation.status(0).present);
+}
+
 TEST(FleetShare, WhoLeavesIsGoneAtOnce) {
   World world;
   Member& a = world.add(through_each_other(), {0});
@@ -585,6 +628,60 @@ TEST(FleetShare, StrangersChangeNothingAndAreSaidOnce) {
   EXPECT_EQ(hashes[0], hashes[1]);
 }
 
+TEST(FleetShare, WhoSpeaksInAnothersNameIsNotHeardAndNoNumberIsTooLarge) {
+  World world;
+  Member& a = world.add(through_each_other(), {0});
+  Member& b = world.add(through_each_other(), {1});
+  world.pass(3.0);
+  share_msg::Introduction left;
+  left.head.process = 2;
+  left.phase = share_msg::Phase::kLeft;
+  left.vehicles = {1};
+  left.parts = common_ground(a.simulation, 1.0);
+  world.bus.shout(ShareChannel::kCrew, encode<Wire::kCdr>(left));
+  share_msg::States states;
+  states.head.kind = share_msg::Kind::kStates;
+  states.head.process = 2;
+  states.time = a.simulation.time().time_since_epoch().count();
+  states.vehicles.resize(1);
+  states.vehicles[0].number = 1;
+  world.bus.shout(ShareChannel::kStates, encode<Wire::kCdr>(states));
+  world.pass(0.1);
+  EXPECT_TRUE(a.sink.events.empty());
+  EXPECT_LT((a.simulation.status(1).state.body.p_world - b.simulation.status(1).state.body.p_world)
+                .norm(),
+            0.01);
+  // the process itself, out of its mind
+  constexpr std::int64_t kEnds[] = {std::numeric_limits<std::int64_t>::max(),
+                                    std::numeric_limits<std::int64_t>::min()};
+  for (const std::int64_t end : kEnds) {
+    states.time = states.end_time = end;
+    world.bus.shout(ShareChannel::kStates, encode<Wire::kCdr>(states), 1);
+    share_msg::Clock clock;
+    clock.head.kind = share_msg::Kind::kClock;
+    clock.head.process = 2;
+    clock.sent = clock.clock = end;
+    clock.echoes = {{1, end, end}, {1, -end, 0}};
+    world.bus.shout(ShareChannel::kClock, encode<Wire::kCdr>(clock), 1);
+    clock.clock = 0;
+    world.bus.shout(ShareChannel::kClock, encode<Wire::kCdr>(clock), 1);
+    left.ends_at = left.begins_at = left.waits_at = end;
+    left.vehicles = {4000000000u};
+    world.bus.shout(ShareChannel::kCrew, encode<Wire::kCdr>(left), 1);
+    share_msg::Past past;
+    past.head.kind = share_msg::Kind::kPast;
+    past.head.process = 2;
+    past.to = 1;
+    past.states = {{end, states.vehicles[0]}, {0, {}}};
+    past.states[1].state.number = 77;
+    world.bus.shout(ShareChannel::kPast, encode<Wire::kCdr>(past), 1);
+  }
+  world.pass(1.0);
+  EXPECT_TRUE(a.sink.events.empty());
+  EXPECT_TRUE(a.simulation.status(1).present);
+  EXPECT_NEAR(to_seconds(a.simulation.time() - b.simulation.time()), 0.0, 0.002);
+}
+
 TEST(Simulation, TimeThatIsSkippedHasNotPassedForVehicles) {
   Scenario scenario = through_each_other();
   scenario.vehicles.resize(1);
@@ -632,7 +729,7 @@ TEST(Simulation, GoesOnWhereALogEnds) {
   ByteSink sink;
   whole.advance_to(SimTime(std::chrono::seconds(4)), sink);
   Simulation resumed(scenario, hall(), executor);
-  resumed.resume_at(SimTime(std::chrono::seconds(4)), {{0, whole.status(0).state}});
+  resumed.resume_at(SimTime(std::chrono::seconds(4)), Duration{0}, {{0, whole.status(0).state}});
   whole.advance_to(SimTime(std::chrono::seconds(9)), sink);
   resumed.advance_to(SimTime(std::chrono::seconds(9)), sink);
   // but for what its controllers have forgotten
