@@ -54,8 +54,8 @@ class FlightRecorder : public SampleSink {
   /// Of a run that other processes share: a process that is killed goes on where its trajectories
   /// end. Null: not shared.
   const Simulation* shared_;
-  Duration skipped_{-1};  ///< As the file beside them has it.
-  std::vector<std::string> names_;  ///< Of the vehicles.
+  Duration skipped_{-1};                                 ///< As the file beside them has it.
+  std::vector<std::string> names_;                       ///< Of the vehicles.
   std::vector<std::unique_ptr<VehicleFiles>> vehicles_;  ///< Null: another process' vehicle.
   OutputFile events_;
   std::optional<OutputFile> obstacles_;

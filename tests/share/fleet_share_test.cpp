@@ -661,7 +661,7 @@ TEST(FleetShare, WhoSpeaksInAnothersNameIsNotHeardAndNoNumberIsTooLarge) {
     clock.head.kind = share_msg::Kind::kClock;
     clock.head.process = 2;
     clock.sent = clock.clock = end;
-    clock.echoes = {{1, end, end}, {1, -end, 0}};
+    clock.echoes = {{1, end, end}, {1, kEnds[end < 0 ? 0 : 1], 0}};
     world.bus.shout(ShareChannel::kClock, encode<Wire::kCdr>(clock), 1);
     clock.clock = 0;
     world.bus.shout(ShareChannel::kClock, encode<Wire::kCdr>(clock), 1);
