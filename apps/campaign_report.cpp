@@ -48,7 +48,6 @@ std::vector<Line> lines_over(const Plan& plan, const std::vector<Runs>& points, 
     if (found == lines.end()) found = lines.insert(lines.end(), Line{name, {}});
     found->by_value[x] = points[point];
   }
-  if (lines.size() > kMostPlotLines) lines.resize(kMostPlotLines);
   return lines;
 }
 
@@ -145,7 +144,13 @@ std::pair<double, double> extent(const std::vector<Line>& lines, const Estimator
 std::unique_ptr<Canvas> plot_of(const Plan& plan,
                                 const Results& results,
                                 std::size_t axis,
-                                const std::vector<Line>& lines) {
+                                std::vector<Line> lines) {
+  std::string title = plan.keys[axis];
+  if (lines.size() > kMostPlotLines) {
+    title += fmt::format(
+        " (the first {} of {} combinations; all are in points.csv)", kMostPlotLines, lines.size());
+    lines.resize(kMostPlotLines);
+  }
   const std::vector<Panel> panels = panels_for(results);
   std::vector<LegendEntry> legend;
   for (std::size_t i = 0; i < lines.size() && lines.size() > 1; ++i) {
@@ -162,7 +167,7 @@ std::unique_ptr<Canvas> plot_of(const Plan& plan,
       static_cast<int>(top + static_cast<double>(panels.size()) * (kRatesHeight + kRatesGap)),
       kPaper,
       true);
-  canvas->text_within(left, 30.0, plan.keys[axis], kTitleText, kRatesWidth, kInk);
+  canvas->text_within(left, 30.0, title, kTitleText, kRatesWidth, kInk);
   if (!legend.empty()) draw_legend(*canvas, legend, left, 52.0, kRatesWidth);
   double low_x = lines[0].by_value.begin()->first;
   double high_x = low_x;
@@ -271,9 +276,9 @@ std::vector<CampaignPlot> campaign_plots(const Plan& plan, const Results& result
   if (results.empty()) return plots;
   const auto points = by_point(plan, results);
   for (std::size_t axis = 0; axis < plan.grid_keys; ++axis) {
-    const std::vector<Line> lines = lines_over(plan, points, axis);
+    std::vector<Line> lines = lines_over(plan, points, axis);
     if (lines.empty() || lines.front().by_value.size() < 2) continue;
-    plots.push_back({plan.keys[axis], plot_of(plan, results, axis, lines)});
+    plots.push_back({plan.keys[axis], plot_of(plan, results, axis, std::move(lines))});
   }
   return plots;
 }

@@ -56,6 +56,16 @@ fs::path make_attempt(const fs::path& run) {
   return name;
 }
 
+/// The attempt is over: it gets the run's name.
+void keep(const fs::path& attempt, const fs::path& final_folder, const RunRecord& record) {
+  write_text(attempt / kResult, record_json(record));
+  std::error_code error;
+  fs::rename(attempt, final_folder, error);
+  if (error && !fs::exists(final_folder)) {  // else somebody else has flown it meanwhile: the same
+    throw InputError(fmt::format("{}: {}", final_folder.string(), error.message()));
+  }
+}
+
 /// An attempt that ends without a result leaves nothing.
 class AttemptGuard {
  public:
@@ -227,12 +237,12 @@ std::optional<RunRecord> Campaign::result(std::size_t number) const {
   return parse_record(MappedFile(path.string()).text(), path.string());
 }
 
-Scenario Campaign::scenario_of(const PlannedRun& run) const {
+std::string Campaign::scenario_text_of(const PlannedRun& run) const {
   std::vector<std::string> keys = plan_.keys;
   std::vector<std::string> values = run.values;
   keys.emplace_back("seed");
   values.push_back(std::to_string(run.seed));
-  return parse_scenario(edited_scenario(scenario_text_, keys, values), scenario_path_);
+  return edited_scenario(scenario_text_, keys, values);
 }
 
 std::vector<std::string> Campaign::command_of(const PlannedRun& run,
@@ -279,7 +289,19 @@ std::optional<RunRecord> Campaign::fly(std::size_t number, const std::atomic<boo
   const fs::path final_folder = run_folder(number);
   const fs::path attempt = fs::absolute(make_attempt(final_folder));
   const AttemptGuard guard(attempt);
-  write_scenario_copy(scenario_of(run), *map_, attempt.string(), final_folder.string());
+  Scenario scenario;
+  try {
+    scenario = parse_scenario(scenario_text_of(run), scenario_path_);
+  } catch (const InputError& problem) {  // values that fit the scenario one by one
+    RunRecord record;
+    record.status = RunStatus::kFailed;
+    record.reason = "values that do not fit together";
+    write_text(attempt / "scenario.yaml", scenario_text_of(run));
+    write_text(attempt / "log.txt", std::string(problem.what()) + "\n");
+    keep(attempt, final_folder, record);
+    return record;
+  }
+  write_scenario_copy(scenario, *map_, attempt.string(), final_folder.string());
   const std::string output = (attempt / "output").string();
   std::error_code error;
   fs::create_directory(output, error);
@@ -303,11 +325,7 @@ std::optional<RunRecord> Campaign::fly(std::size_t number, const std::atomic<boo
     write_text(attempt / "results_error.txt", std::string(problem.what()) + "\n");
   }
   remove_bulk(output);
-  write_text(attempt / kResult, record_json(record));
-  fs::rename(attempt, final_folder, error);
-  if (error && !fs::exists(final_folder)) {  // else somebody else has flown it meanwhile: the same
-    throw InputError(fmt::format("{}: {}", final_folder.string(), error.message()));
-  }
+  keep(attempt, final_folder, record);
   return record;
 }
 

@@ -56,7 +56,7 @@ class Campaign {
  private:
   void check_folder() const;
   void check_values() const;
-  [[nodiscard]] Scenario scenario_of(const PlannedRun& run) const;
+  [[nodiscard]] std::string scenario_text_of(const PlannedRun& run) const;
   [[nodiscard]] std::vector<std::string> command_of(const PlannedRun& run,
                                                     const std::string& scenario,
                                                     const std::string& output) const;

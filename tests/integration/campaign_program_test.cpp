@@ -56,6 +56,18 @@ TEST_F(Campaigns, FlyAGridAndTellWhatCameOfIt) {
   EXPECT_EQ(table("c"), runs);
 }
 
+TEST_F(Campaigns, ValuesThatDoNotFitTogetherAreAFlightThatFailed) {
+  const std::string file =
+      study("seeds: 1\ngrid: {share.time: [lockstep, free], share.ahead: [0, 5]}\n");
+  write_file(here_ / "s.yaml", read_file(here_ / "s.yaml") + "share: {time: lockstep}\n");
+  const Result result = run(fmt::format("campaign {} -o {}", file, here_ / "c"));
+  EXPECT_EQ(result.code, 0) << result.err;
+  const std::string runs = table("c");
+  expect_contains(runs, ",failed,values that do not fit together,");
+  expect_contains(runs, "\n0,0,1,lockstep,0,ended,");
+  expect_contains(read_file(here_ / "c/runs/000003/log.txt"), "ahead");
+}
+
 TEST_F(Campaigns, GoOnAfterAKillAndComeToTheSame) {
   const std::string file = study("seeds: 12\ngrid: {mission.speed: [1, 2]}\n");
   ASSERT_EQ(run(fmt::format("campaign {} -o {}", file, here_ / "whole")).code, 0);
