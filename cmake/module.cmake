@@ -50,3 +50,16 @@ function(pointflight_module name)
   endif()
   set_property(GLOBAL APPEND PROPERTY POINTFLIGHT_MODULES pointflight_${name})
 endfunction()
+
+# pointflight_loaded(name SOURCES files... LIBRARIES libs...): pointflight_<name>, a library that the program loads when
+# it is asked for (apps/modules.cpp), so that it needs none of these libraries itself.
+function(pointflight_loaded name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;LIBRARIES" ${ARGN})
+  add_library(pointflight_${name} MODULE ${ARG_SOURCES})
+  set_target_properties(pointflight_${name} PROPERTIES CXX_VISIBILITY_PRESET hidden
+    LIBRARY_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/lib/pointflight)
+  target_compile_options(pointflight_${name} PRIVATE -Wall -Wextra $<$<BOOL:${POINTFLIGHT_WERROR}>:-Werror>)
+  target_include_directories(pointflight_${name} PRIVATE ${PROJECT_SOURCE_DIR})
+  target_link_libraries(pointflight_${name} PRIVATE ${ARG_LIBRARIES})
+  install(TARGETS pointflight_${name} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/pointflight)
+endfunction()

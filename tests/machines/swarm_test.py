@@ -259,7 +259,8 @@ def fault_delay(trial, rng, result, number):
     trial.finish(trial.start_all(), "abc", result)
 
 
-def fault_partition(trial, rng, result, number):
+def cut_off_a(trial, rng, result):
+    """a hears nobody for ten seconds; b and c hear each other."""
     a, b, c = trial.start_all()
     trial.until(rng.uniform(2, 4))
     trial.lan.set(groups=[0, 1, 1, 1])
@@ -269,6 +270,10 @@ def fault_partition(trial, rng, result, number):
     # b and c are told of a, and a of both
     recovered(result, healed, *(process.wait_for("is heard again", 8, healed) for process in (a, b, c)))
     trial.finish((a, b, c), "abc", result)
+
+
+def fault_partition(trial, rng, result, number):
+    cut_off_a(trial, rng, result)
     for name, others in (("a", "bc"), ("b", "a"), ("c", "a")):
         summary = json.loads((trial.folder / name / "summary.json").read_text())
         for other in summary["others"]:
@@ -366,14 +371,7 @@ def fault_step_stop(trial, rng, result, number):
 
 
 def fault_step_partition(trial, rng, result, number):
-    a, b, c = trial.start_all()
-    trial.until(rng.uniform(2, 4))
-    trial.lan.set(groups=[0, 1, 1, 1])
-    time.sleep(10.0)
-    healed = time.monotonic()
-    trial.lan.set(groups=[0, 0, 0, 0])
-    recovered(result, healed, *(process.wait_for("is heard again", 8, healed) for process in (a, b, c)))
-    trial.finish((a, b, c), "abc", result)
+    cut_off_a(trial, rng, result)
 
 
 # fault: (simulated seconds, where a restarted process begins)
