@@ -332,9 +332,14 @@ void FleetShare::look_again_at_the_rest() {
   }
 }
 
+/// Others fly, or did until just now: who has stood still finds all of them silent.
 bool FleetShare::has_company() const {
-  return std::any_of(
-      peers_.begin(), peers_.end(), [](const auto& entry) { return entry.second.flies(); });
+  constexpr std::int64_t kRemembered = 30'000 * kMillisecond;
+  const std::int64_t now = options_.steady();
+  return std::any_of(peers_.begin(), peers_.end(), [now](const auto& entry) {
+    const Peer& peer = entry.second;
+    return peer.fits && peer.intro.phase == Phase::kFlying && now - peer.heard < kRemembered;
+  });
 }
 
 /// Each vehicle of the fleet has its process.

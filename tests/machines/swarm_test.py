@@ -153,8 +153,13 @@ def contacts_of(folder, own, other):
     summary = json.loads((mine / "summary.json").read_text())
     bound = max([o["extrapolation_bound"] for o in summary["others"] if o["name"] == other], default=0.0)
     hidden = apart(mine, other)
-    said = [float(row["time"]) for row in rows(mine / "events.csv")
-            if row["event"] == "collision" and row["vehicle"] == own and row["partner"] == other]
+    said = []  # [from, until] of contacts
+    for row in rows(mine / "events.csv"):
+        if row["vehicle"] == own and row["partner"] == other and row["event"].startswith("collision"):
+            if row["event"] == "collision":
+                said.append([float(row["time"]), math.inf])
+            else:
+                said[-1][1] = float(row["time"])
     met = missed = tiny = 0
     inside = np.flatnonzero(depth > 0)
     if len(inside) == 0:
@@ -163,12 +168,14 @@ def contacts_of(folder, own, other):
         start, end = t[span[0]], t[span[-1]]
         if any(start < until and end > since for since, until in hidden):
             continue
-        if any(start - 0.3 <= at <= end + 0.3 for at in said):
+        if any(since <= end + 0.3 and until >= start - 0.3 for since, until in said):
             met += 1
         elif depth[span].max() <= bound:
             tiny += 1
         else:
             missed += 1
+            print(f"{folder.name}: {own} and {other} met from {start:.2f} to {end:.2f} s, {depth[span].max():.3f} m deep; "
+                  f"{own}'s process said {said}, did not hear {hidden}", flush=True)
     return met, missed, tiny
 
 
