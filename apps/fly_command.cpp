@@ -268,6 +268,7 @@ int fly(const FlyFlags& flags) {
   check_ros_flags(flags.ros);
   check_share_flags(flags.share);
   RunOptions options;
+  if (!flags.rate.empty()) options.rate = parse_rate(flags.rate);
   options.lockstep = flags.ros.lockstep;
   options.log = [](const std::string& line) { log(line); };
   options.progress = terminal_progress();
@@ -277,7 +278,7 @@ int fly(const FlyFlags& flags) {
   Scenario scenario = load_input(flags, executor);
   // others live on the wall clock
   const bool in_real_time = flags.ros.is_live() || is_free(flags.share, scenario);
-  options.rate = parse_rate(flags.rate.empty() ? (in_real_time ? "1.0" : "max") : flags.rate);
+  if (flags.rate.empty()) options.rate = in_real_time ? 1.0 : 0.0;
   const auto map = scenario.open_map();
   prepare_for_ros(flags.ros, options.rate, scenario);
   Simulation simulation(scenario, map, executor);

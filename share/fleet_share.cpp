@@ -546,7 +546,7 @@ void FleetShare::take_states(const ShareArrival& arrival) {
     const auto& its = peer->intro.vehicles;
     const bool is_its = std::find(its.begin(), its.end(), state.number) != its.end();
     if (is_its && is_plausible(body_of(state))) continue;
-    note_foreign(arrival.writer, "states that no vehicle of its has");
+    note_foreign(arrival.writer, "states that none of its vehicles can have");
     return;
   }
   peer->heard = arrival.at;
@@ -697,7 +697,7 @@ bool FleetShare::is_needed(Peer& peer, SimTime time) {
 
 /// A step that is needed and not there will not come.
 bool FleetShare::is_hopeless(const Peer& peer, const SharedStep& own) const {
-  // who waits for this process does not get so far
+  // a process that waits for this one cannot be so far ahead
   if (peer.newest > own.time + (setup_.ahead + 1) * step_) return true;
   if (own.is_verdict && peer.newest > own.time) return true;  // for it the run goes on
   return peer.gone && peer.intro.phase == Phase::kLeft;
@@ -756,7 +756,8 @@ OtherVehicles FleetShare::meet_in_step(const SharedStep& own) {
   // with steps ahead the others are taken from so many steps ago, and moved on: the same figures
   // each time, whoever is how fast
   const Duration back = own.is_verdict ? Duration{0} : setup_.ahead * step_;
-  const SimTime needed = std::max(SimTime{}, own.time - back);
+  // nobody has told who joins what was before
+  const SimTime needed = std::max(to_time(own_.begins_at), own.time - back);
   wait_for_steps(own, needed);
   OtherVehicles met;
   met.vehicles.resize(others_.size());

@@ -35,7 +35,7 @@ struct SkipOrder {
 };
 /// The same, for less than a moment: from here on each instant is due so much earlier.
 struct HurryOrder {
-  Duration by{0};
+  Duration by{0};  ///< Of the wall clock.
 };
 
 /// What may be told to a run from outside; those without a vehicle are about the run.

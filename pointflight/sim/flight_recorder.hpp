@@ -61,14 +61,14 @@ class FlightRecorder : public SampleSink {
   std::optional<OutputFile> obstacles_;
 };
 
-/// Where the trajectories stop that a run left in `folder` which was killed while other processes
-/// shared it: the latest instant that all of these vehicles (by number) have, and their states.
-/// Nothing where there are none.
+/// Where the trajectories stop of a run that was killed while other processes shared it.
 struct EndedRun {
   SimTime time;                                ///< Of the states.
   Duration skipped{0};                         ///< Of it, jumped over.
   std::map<std::size_t, VehicleState> states;  ///< By number.
 };
+/// The latest instant that all of these vehicles (by number) have in what such a run left in
+/// `folder`; nothing where it left nothing of the kind.
 std::optional<EndedRun> ended_run(const std::string& folder,
                                   const Simulation& simulation,
                                   const std::vector<std::size_t>& vehicles);

@@ -229,7 +229,8 @@ function showFigures() {
   if (now) rows.push(["time", `${now.t.toFixed(2)} s`], [state.recording ? "pace" : "real-time factor", now.rate.toFixed(2)]);
   if (v.p) rows.push(["place", `${v.p.map((x) => x.toFixed(2)).join(", ")} m`]);
   if (v.v) rows.push(["speed", `${Math.hypot(...v.v).toFixed(2)} m/s`]);
-  if (v.p && !state.recording) {
+  // of another process' vehicle only the pose is told
+  if (v.p && !state.recording && v.command !== undefined) {
     rows.push(
       ["clearance", v.nearest ? `${v.nearest.distance.toFixed(2)} m` : "over 10 m"],
       ...["command", "scans", "collisions"].filter((name) => v[name] !== undefined).map((name) => [name, v[name]]),

@@ -67,8 +67,8 @@ export class Vehicle {
 
   update(state, time) {
     this.state = state;
+    this.group.visible = Boolean(state.p); // another process' vehicle may not be there
     if (!state.p) return;
-    this.group.visible = true;
     setPose(this.group, state.p, state.q);
     if (!this.lastPath || Math.hypot(...state.p.map((v, i) => v - this.lastPath[i])) > 0.05) {
       append(this.path, state.p);
