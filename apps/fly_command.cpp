@@ -23,6 +23,7 @@
 #include "pointflight/core/number_text.hpp"
 #include "pointflight/core/output_file.hpp"
 #include "pointflight/core/resources.hpp"
+#include "pointflight/sim/ended_run.hpp"
 #include "pointflight/sim/flight_recorder.hpp"
 #include "pointflight/sim/scenario_maker.hpp"
 #include "pointflight/sim/start_check.hpp"

@@ -61,18 +61,6 @@ class FlightRecorder : public SampleSink {
   std::optional<OutputFile> obstacles_;
 };
 
-/// Where the trajectories stop of a run that was killed while other processes shared it.
-struct EndedRun {
-  SimTime time;                                ///< Of the states.
-  Duration skipped{0};                         ///< Of it, jumped over.
-  std::map<std::size_t, VehicleState> states;  ///< By number.
-};
-/// The latest instant that all of these vehicles (by number) have in what such a run left in
-/// `folder`; nothing where it left nothing of the kind.
-std::optional<EndedRun> ended_run(const std::string& folder,
-                                  const Simulation& simulation,
-                                  const std::vector<std::size_t>& vehicles);
-
 /// summary.json as text: what happened, without wall-clock figures.
 std::string summary_json(const Simulation& simulation);
 

@@ -75,8 +75,12 @@ void remove_earlier_run(const fs::path& folder) {
 
 }  // namespace
 
+std::string staging_of(const std::string& folder) {
+  return (fs::path(folder) / kStaging).string();
+}
+
 RunFolder::RunFolder(std::string path, Existing existing)
-    : path_(std::move(path)), staging_((fs::path(path_) / kStaging).string()) {
+    : path_(std::move(path)), staging_(staging_of(path_)) {
   made_ = make_folder(path_);
   lock_.emplace(path_);
   std::error_code error;

@@ -10,6 +10,9 @@ namespace pointflight {
 /// What to do where an output is there already.
 enum class Existing { kRefuse, kReplace };
 
+/// Where the files of a run are until it is whole: a folder within the run's.
+std::string staging_of(const std::string& folder);
+
 /// The folder of a run while it is written: locked, and filled beside what lies there.
 ///
 /// Files go to `staging()`, a folder within. `commit()` takes away what an earlier run left (its

@@ -96,11 +96,14 @@ Simulation::Simulation(const Scenario& scenario,
 }
 
 SimTime Simulation::end_time() const {
-  const SimTime own = setup_->scenario.duration > 0.0
-                          ? setup_->end_time
-                          : std::max(setup_->end_time + state_.skipped, state_.busy_until);
   if (others_ != nullptr && others_->decides_together()) return met_.end_time;
-  return own;
+  return own_end_time();
+}
+
+/// As far as this process is concerned.
+SimTime Simulation::own_end_time() const {
+  if (setup_->scenario.duration > 0.0) return setup_->end_time;
+  return std::max(setup_->end_time + state_.skipped, state_.busy_until);
 }
 
 void Simulation::require_vehicle(std::size_t number) const {

@@ -186,6 +186,7 @@ class Simulation {
                                              SimTime from,
                                              SimTime until) const;
   void for_own(const std::function<void(std::size_t)>& action) const;
+  [[nodiscard]] SimTime own_end_time() const;
   [[nodiscard]] SharedStep shared_step(bool is_verdict) const;
   void meet_others();
   void place_other(std::size_t number);

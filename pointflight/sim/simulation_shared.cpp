@@ -28,9 +28,7 @@ bool Simulation::is_own(std::size_t vehicle) const {
 SharedStep Simulation::shared_step(bool is_verdict) const {
   SharedStep step;
   step.time = state_.time;
-  step.end_time = setup_->scenario.duration > 0.0
-                      ? setup_->end_time
-                      : std::max(setup_->end_time + state_.skipped, state_.busy_until);
+  step.end_time = own_end_time();
   step.is_landing = setup_->scenario.duration <= 0.0 && lands();
   step.is_verdict = is_verdict;
   for (const std::size_t i : own_) {

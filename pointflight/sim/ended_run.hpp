@@ -1,0 +1,28 @@
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "pointflight/sim/simulation.hpp"
+
+namespace pointflight {
+
+/// Beside the trajectories of a shared run while it is written: how much of its time was jumped
+/// over so far, ns.
+inline constexpr const char* kSkippedFile = "skipped.txt";
+
+/// Where the trajectories stop of a run that was killed while other processes shared it.
+struct EndedRun {
+  SimTime time;                                ///< Of the states.
+  Duration skipped{0};                         ///< Of it, jumped over.
+  std::map<std::size_t, VehicleState> states;  ///< By number.
+};
+/// The latest instant that all of these vehicles (by number) have in what such a run left in
+/// `folder`; nothing where it left nothing of the kind.
+std::optional<EndedRun> ended_run(const std::string& folder,
+                                  const Simulation& simulation,
+                                  const std::vector<std::size_t>& vehicles);
+
+}  // namespace pointflight

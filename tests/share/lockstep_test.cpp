@@ -1,0 +1,204 @@
+// Processes that share a run step by step: the bytes of one process, however it is divided.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <thread>
+
+#include "tests/share/members.hpp"
+
+namespace pointflight {
+namespace {
+
+using testing::Bus;
+using testing::hall;
+using testing::Member;
+using testing::PerVehicle;
+using testing::with_share;
+
+std::int64_t wall() {
+  return std::chrono::steady_clock::now().time_since_epoch().count();
+}
+
+/// Three that fly past each other among obstacles.
+Scenario three(ShareTime time) {
+  Scenario s;
+  s.path = "s.yaml";
+  s.duration = testing::kSanitized ? 0.4 : 1.2;
+  s.vehicles.resize(3);
+  for (std::size_t i = 0; i < 3; ++i) {
+    VehicleSetup& v = s.vehicles[i];
+    v.start = {6.0 + 1.5 * static_cast<double>(i), 6, 3};
+    v.mission.waypoints = {{6.0 + 1.5 * static_cast<double>(i), 9, 3}};
+    v.lidars.front().model = i == 1 ? "mid360" : "marsim_grid";
+    v.name = std::string(1, static_cast<char>('a' + i));
+  }
+  s.vehicles[1].start.y() = 8.0;
+  s.vehicles[1].mission.waypoints = {{6.4, 4, 3}};
+  ObstacleSettings balls;
+  balls.count = 10;
+  balls.radius = 0.2;
+  balls.speed = 1.0;
+  s.obstacles = {balls};
+  ShareSetup setup;
+  setup.time = time;
+  return with_share(s, setup);
+}
+
+/// In lockstep, a thread each.
+std::vector<std::unique_ptr<Member>> fly_in_step(const Scenario& scenario,
+                                                 const std::vector<std::vector<std::size_t>>& who) {
+  Bus bus(wall);
+  std::vector<std::unique_ptr<Member>> members;
+  for (const auto& vehicles : who) {
+    members.push_back(std::make_unique<Member>(bus, scenario, vehicles, wall, members.size() + 1));
+  }
+  std::vector<std::thread> threads;
+  for (const auto& member : members) {
+    threads.emplace_back([&m = *member] {
+      while (!m.link->is_ready()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      while (m.simulation.step(m.sink)) m.obey_share();
+      m.share->leave();
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  return members;
+}
+
+PerVehicle fly_alone(const Scenario& scenario, RunEnd& end, SimTime& time) {
+  const Executor executor(2);
+  Simulation simulation(scenario, hall(), executor);
+  PerVehicle sink;
+  while (simulation.step(sink)) {
+  }
+  end = simulation.end();
+  time = simulation.time();
+  return sink;
+}
+
+void expect_as_one_process(const Scenario& scenario,
+                           const std::vector<std::vector<std::size_t>>& who) {
+  RunEnd end{};
+  SimTime time;
+  const PerVehicle alone = fly_alone(scenario, end, time);
+  for (const auto& member : fly_in_step(scenario, who)) {
+    EXPECT_EQ(member->simulation.end(), end);
+    EXPECT_EQ(member->simulation.time(), time);
+    for (const auto& [vehicle, sink] : member->sink.sinks) {
+      EXPECT_TRUE(member->simulation.is_own(vehicle));
+      EXPECT_EQ(sink.hash(), alone.sinks.at(vehicle).hash()) << vehicle;
+    }
+    EXPECT_EQ(member->sink.sinks.size(), member->simulation.own_vehicles().size());
+    for (const VehicleEvent& event : member->sink.events) {
+      EXPECT_TRUE(member->simulation.is_own(event.vehicle)) << event.kind << ": " << event.words;
+    }
+  }
+}
+
+TEST(FleetShare, LockstepGivesTheBytesOfOneProcess) {
+  const Scenario scenario = three(ShareTime::kLockstep);
+  RunEnd end{};
+  SimTime time;
+  PerVehicle alone = fly_alone(scenario, end, time);
+  int seen = 0;  // else nothing is shown
+  for (auto& [vehicle, sink] : alone.sinks) {
+    for (Label label = 1; label <= 3; ++label) seen += sink.labels[label];
+  }
+  EXPECT_GT(seen, 100);
+  expect_as_one_process(scenario, {{0}, {1}, {2}});
+  expect_as_one_process(scenario, {{0, 2}, {1}});
+}
+
+TEST(FleetShare, LockstepEndsForAllAtOnce) {
+  Scenario scenario = three(ShareTime::kLockstep);
+  scenario.duration = 0.0;
+  scenario.obstacles.clear();
+  for (VehicleSetup& v : scenario.vehicles) v.lidars.clear();
+  scenario.vehicles[1].start = {6, 11, 3};
+  scenario.vehicles[1].mission.waypoints = {{4.6, 12, 3}};  // into a pillar at (5, 12)
+  scenario.vehicles[1].on_collision = CollisionReaction::kStop;
+  expect_as_one_process(scenario, {{0}, {1}, {2}});
+  scenario.vehicles[1].on_collision =
+      CollisionReaction::kCrash;  // the mission is not finished then
+  expect_as_one_process(scenario, {{1}, {0, 2}});
+  scenario.vehicles[1].mission.waypoints = {{7, 10, 3}};
+  expect_as_one_process(scenario, {{0, 1}, {2}});
+}
+
+TEST(FleetShare, LockstepGoesOnWithoutWhoIsLostAndTakesItBack) {
+  Scenario scenario = three(ShareTime::kLockstep);
+  scenario.obstacles.clear();
+  for (VehicleSetup& v : scenario.vehicles) v.lidars.clear();
+  scenario.duration = 1.5;
+  Bus bus(wall);
+  std::atomic<bool> cut = false;
+  bus.loses = [&cut](std::size_t from, std::size_t to, ShareChannel) {
+    return cut && (from == 2) != (to == 2);
+  };
+  std::vector<std::unique_ptr<Member>> members;
+  for (std::size_t i = 0; i < 3; ++i) {
+    members.push_back(std::make_unique<Member>(bus, scenario, std::vector{i}, wall, i + 1));
+  }
+  std::atomic<std::int64_t> reached[3] = {};
+  std::vector<std::thread> threads;
+  for (std::size_t i = 0; i < 3; ++i) {
+    threads.emplace_back([&, i, &m = *members[i]] {
+      while (!m.link->is_ready()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      while (m.simulation.step(m.sink)) {
+        m.obey_share();
+        reached[i] = m.simulation.time().time_since_epoch().count();
+        std::this_thread::sleep_for(std::chrono::milliseconds(i == 2 ? 2 : 1));
+      }
+      m.share->leave();
+    });
+  }
+  const auto wait_for = [&](std::size_t member, double seconds) {
+    while (reached[member] < std::llround(1e9 * seconds)) std::this_thread::yield();
+  };
+  wait_for(2, 0.3);
+  cut = true;
+  for (const std::size_t i : {0, 1}) {
+    bus.lose(2, i);
+    bus.lose(i, 2);
+  }
+  wait_for(0, 0.8);  // the third one is slower, alone as well
+  cut = false;
+  bus.tell_crew();
+  for (std::thread& thread : threads) thread.join();
+  for (const auto& member : members) {
+    EXPECT_EQ(to_seconds(member->simulation.time()), 1.5);
+    EXPECT_EQ(member->simulation.end(), RunEnd::kMissionUnfinished);
+    const auto kinds = member->sink.kinds();
+    EXPECT_EQ(std::count(kinds.begin(), kinds.end(), "lost"), member == members[2] ? 2 : 1);
+    EXPECT_EQ(std::count(kinds.begin(), kinds.end(), "back"), member == members[2] ? 2 : 1);
+    for (const ApartSummary& other : member->share->apart()) {
+      EXPECT_EQ(other.losses, member == members[2] || other.vehicle == 2 ? 1u : 0u);
+    }
+  }
+  // the one that was slower has jumped to where the others were
+  EXPECT_GT(to_seconds(members[2]->simulation.state().skipped), 0.05);
+  EXPECT_EQ(members[0]->simulation.state().skipped, Duration{0});
+}
+
+TEST(FleetShare, StepsAheadComeOutTheSameEachTime) {
+  Scenario scenario = three(ShareTime::kLockstep);
+  ShareSetup setup;
+  setup.time = ShareTime::kLockstep;
+  setup.ahead = 8;
+  scenario = with_share(scenario, setup);
+  std::map<std::size_t, std::uint64_t> first;
+  for (int k = 0; k < 2; ++k) {
+    for (const auto& member : fly_in_step(scenario, {{0}, {1}, {2}})) {
+      for (const auto& [vehicle, sink] : member->sink.sinks) {
+        if (k == 0) first[vehicle] = sink.hash();
+        EXPECT_EQ(sink.hash(), first[vehicle]);
+      }
+    }
+  }
+  RunEnd end{};
+  SimTime time;
+  const PerVehicle alone = fly_alone(scenario, end, time);
+  EXPECT_NE(alone.sinks.at(0).hash(), first[0]);
+}
+
+}  // namespace
+}  // namespace pointflight
