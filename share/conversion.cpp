@@ -6,8 +6,8 @@ namespace pointflight {
 namespace {
 
 // what a vehicle never exceeds
-constexpr double kFarthest = 1e7;  // m
-constexpr double kFastest = 1e4;   // m/s, rad/s
+constexpr double kPlaceMost = 1e7;  // m
+constexpr double kSpeedMost = 1e4;  // m/s, rad/s
 
 }  // namespace
 
@@ -52,8 +52,8 @@ SharedVehicle vehicle_of(std::uint32_t number, std::uint32_t flags, const RigidB
 }
 
 bool is_plausible(const RigidBodyState& body) {
-  return body.is_finite() && body.p_world.cwiseAbs().maxCoeff() < kFarthest &&
-         body.v_world.norm() < kFastest && body.omega_body.norm() < kFastest &&
+  return body.is_finite() && body.p_world.cwiseAbs().maxCoeff() < kPlaceMost &&
+         body.v_world.norm() < kSpeedMost && body.omega_body.norm() < kSpeedMost &&
          std::abs(body.q_world_body.norm() - 1.0) < 1e-3;
 }
 

@@ -18,6 +18,9 @@ inline std::int64_t to_ns(SimTime time) {
 }
 ///@}
 
+/// ns, of clocks and waits.
+inline constexpr std::int64_t kMillisecond = 1'000'000;
+
 /// A message as it is sent.
 template <class M>
 Bytes bytes_of(const M& message) {

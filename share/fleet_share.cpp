@@ -16,7 +16,6 @@ namespace {
 using share_msg::Kind;
 using share_msg::Phase;
 
-constexpr std::int64_t kMillisecond = 1'000'000;  // ns
 constexpr std::int64_t kSayWaiting = 2000 * kMillisecond;
 constexpr std::int64_t kClockPatience = 3000 * kMillisecond;
 constexpr std::int64_t kIntroducePeriod = 500 * kMillisecond;  // while joining

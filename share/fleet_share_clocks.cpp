@@ -13,7 +13,6 @@ namespace {
 using share_msg::Kind;
 using share_msg::Phase;
 
-constexpr std::int64_t kMillisecond = 1'000'000;  // ns
 constexpr std::int64_t kClockPeriod = 100 * kMillisecond;
 constexpr std::int64_t kMostAdjustment = 5 * kMillisecond;  // of the pace, per clock message
 constexpr std::int64_t kLeastAdjustment = kMillisecond;

@@ -12,9 +12,8 @@ namespace {
 
 using share_msg::Phase;
 
-constexpr std::int64_t kMillisecond = 1'000'000;     // ns
 constexpr std::int64_t kResend = 50 * kMillisecond;  // in lockstep, while nothing comes
-constexpr std::int64_t kSayWaiting = 2000 * kMillisecond;
+constexpr std::int64_t kSaySlow = 2000 * kMillisecond;
 
 }  // namespace
 
@@ -80,7 +79,7 @@ void FleetShare::wait_for_steps(const SharedStep& own, SimTime needed) {
       sent = now;
       for (const Bytes& bytes : last_sent_) transport_.send(ShareChannel::kStates, bytes);
     }
-    if (!said && now - began > kSayWaiting) {
+    if (!said && now - began > kSaySlow) {
       said = true;
       say_slow(needed, own.is_verdict);
     }
