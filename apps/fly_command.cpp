@@ -27,6 +27,7 @@
 #include "pointflight/sim/flight_recorder.hpp"
 #include "pointflight/sim/scenario_maker.hpp"
 #include "pointflight/sim/start_check.hpp"
+#include "share/common_ground.hpp"
 #include "view/view_link.hpp"
 
 namespace pointflight::apps {
@@ -255,6 +256,12 @@ void resume(const FlyFlags& flags, Simulation& simulation) {
   if (!wanted || flags.output.empty()) return;
   const auto ended = ended_run(flags.output, simulation, simulation.own_vehicles());
   if (!ended) return;
+  if (!was_run_of(ended->scenario, simulation)) {
+    log(fmt::format(
+        "{}: what an earlier run left there is of another scenario; begins at the start",
+        flags.output));
+    return;
+  }
   simulation.resume_at(ended->time, ended->skipped, ended->states);
   log(fmt::format("{}: goes on where an earlier run's trajectories end, at {:.2f} s",
                   flags.output,

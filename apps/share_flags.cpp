@@ -6,7 +6,6 @@
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
-#include <algorithm>
 #include <array>
 #include <chrono>
 #include <random>
@@ -15,6 +14,7 @@
 #include "apps/terminal.hpp"
 #include "pointflight/core/input_error.hpp"
 #include "ros_common/ros_names.hpp"
+#include "share/vehicle_list.hpp"
 
 namespace pointflight::apps {
 namespace {
@@ -39,42 +39,16 @@ std::uint64_t random_id() {
   return (high << 32 | device()) | 1;  // never 0
 }
 
-/// A number in the fleet, given as such or by name.
-std::size_t vehicle_from(const std::string& word, const Simulation& simulation) {
-  const std::size_t count = simulation.vehicle_count();
-  for (std::size_t v = 0; v < count; ++v) {
-    if (simulation.vehicle(v).setup().name == word) return v;
+std::vector<std::size_t> vehicles_of(const ShareFlags& flags, const Simulation& simulation) {
+  std::vector<std::string> names;
+  for (std::size_t v = 0; v < simulation.vehicle_count(); ++v) {
+    names.push_back(simulation.vehicle(v).setup().name);
   }
-  const bool digits = !word.empty() && word.find_first_not_of("0123456789") == std::string::npos;
-  const std::size_t number = digits && word.size() < 6 ? std::stoul(word) : count;
-  if (number >= count) {
-    throw InputError(
-        fmt::format("--vehicles: '{}' is no vehicle of the scenario; it has 0 to {} ({} to {})",
-                    word,
-                    count - 1,
-                    simulation.vehicle(0).setup().name,
-                    simulation.vehicle(count - 1).setup().name));
+  try {
+    return vehicles_from(flags.vehicles, names);
+  } catch (const InputError& error) {
+    throw InputError(fmt::format("--vehicles: {}", error.what()));
   }
-  return number;
-}
-
-std::vector<std::size_t> vehicles_from(const std::vector<std::string>& words,
-                                       const Simulation& simulation) {
-  std::vector<std::size_t> vehicles;
-  for (const std::string& word : words) {
-    const auto dash = word.find('-');
-    if (dash == std::string::npos || dash == 0) {
-      vehicles.push_back(vehicle_from(word, simulation));
-      continue;
-    }
-    const std::size_t first = vehicle_from(word.substr(0, dash), simulation);
-    const std::size_t last = vehicle_from(word.substr(dash + 1), simulation);
-    if (first > last) throw InputError(fmt::format("--vehicles: {}: from low to high", word));
-    for (std::size_t v = first; v <= last; ++v) vehicles.push_back(v);
-  }
-  std::sort(vehicles.begin(), vehicles.end());
-  vehicles.erase(std::unique(vehicles.begin(), vehicles.end()), vehicles.end());
-  return vehicles;
 }
 
 }  // namespace
@@ -126,7 +100,7 @@ SharedRun::SharedRun(const ShareFlags& flags,
   options.run = flags.name;
   options.process = process_name();
   options.id = random_id();
-  options.vehicles = vehicles_from(flags.vehicles, simulation);
+  options.vehicles = vehicles_of(flags, simulation);
   options.rate = rate;
   options.steady = steady_ns;
   options.clock = [&loop](std::int64_t steady) {

@@ -7,6 +7,7 @@
 
 #include "pointflight/core/hash.hpp"
 #include "pointflight/core/version.hpp"
+#include "share/share_setup.hpp"
 
 namespace pointflight {
 namespace {
@@ -17,8 +18,9 @@ std::string hash_of(std::string_view text) {
   return fmt::format("{:016x}", hash64(std::as_bytes(std::span(text.data(), text.size()))));
 }
 
-void forget_folder(std::string& path) {
-  path = fs::path(path).filename().string();
+/// A copy of a sensor may lie in another format.
+void keep_stem(std::string& path) {
+  path = fs::path(path).stem().string();
 }
 
 template <class Settings>
@@ -38,13 +40,17 @@ std::string rest_of(Scenario scenario) {
   scenario.duration = 0.0;
   scenario.output = {};
   scenario.sections.erase("ros");
+  ShareSetup share = share_setup_of(scenario);
+  share.on_return = OnReturn::kStart;  // each process for itself
+  scenario.sections["share"] = share;
   for (VehicleSetup& vehicle : scenario.vehicles) {
-    forget_folder(vehicle.model);
-    for (LidarMount& mount : vehicle.lidars) forget_folder(mount.model);
+    keep_stem(vehicle.model);
+    for (LidarMount& mount : vehicle.lidars) keep_stem(mount.model);
+    for (CommandSettings& command : vehicle.commands) keep_stem(command.file);
   }
   for (ObstacleSettings& obstacles : scenario.obstacles) {
-    forget_folder(obstacles.file);
-    forget_folder(obstacles.keyframes);
+    keep_stem(obstacles.file);
+    keep_stem(obstacles.keyframes);
   }
   return scenario_yaml(scenario);
 }
@@ -81,6 +87,12 @@ std::vector<share_msg::Part> common_ground(const Simulation& simulation, double 
           {"vehicles or sensors", hash_of(vehicles_of(simulation))},
           {"obstacles", hash_of(obstacles_of(simulation))},
           {"scenario", hash_of(rest_of(scenario))}};
+}
+
+bool was_run_of(const Scenario& earlier, const Simulation& simulation) {
+  const Scenario& scenario = simulation.scenario();
+  return earlier.map_hash == simulation.map().hash() && earlier.seed == scenario.seed &&
+         rest_of(earlier) == rest_of(scenario);
 }
 
 bool describes_alike(const std::vector<share_msg::Part>& theirs,

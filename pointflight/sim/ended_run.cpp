@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "pointflight/core/input_error.hpp"
 #include "pointflight/sim/run_folder.hpp"
 
 namespace pointflight {
@@ -65,10 +66,15 @@ std::optional<EndedRun> ended_run(const std::string& folder,
   constexpr std::size_t kRead = 1 << 17;
   const fs::path staging = staging_of(folder);
   std::map<std::size_t, std::map<SimTime, VehicleState>> known;
-  EndedRun ended{SimTime::max(), Duration{0}, {}};
+  EndedRun ended{{}, SimTime::max(), Duration{0}, {}};
   std::int64_t skipped = 0;
   if (!(std::ifstream(staging / kSkippedFile) >> skipped)) return std::nullopt;
   ended.skipped = Duration(skipped);
+  try {
+    ended.scenario = load_scenario((staging / "scenario.yaml").string());
+  } catch (const InputError&) {
+    return std::nullopt;  // killed before it was written, or by another version
+  }
   for (const std::size_t v : vehicles) {
     const VehicleAgent& agent = simulation.vehicle(v);
     const std::string name = simulation.vehicle_count() == 1 ? "" : agent.setup().name;

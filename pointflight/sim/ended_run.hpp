@@ -15,6 +15,7 @@ inline constexpr const char* kSkippedFile = "skipped.txt";
 
 /// Where the trajectories stop of a run that was killed while other processes shared it.
 struct EndedRun {
+  Scenario scenario;                           ///< As it was flown.
   SimTime time;                                ///< Of the states.
   Duration skipped{0};                         ///< Of it, jumped over.
   std::map<std::size_t, VehicleState> states;  ///< By number.

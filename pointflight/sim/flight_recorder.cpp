@@ -57,6 +57,14 @@ std::string row_of(const RigidBodyState& b) {
                      csv(b.omega_body));
 }
 
+/// `vehicle_name`: of a vehicle by number.
+template <class VehicleName>
+std::string label_name(Label label, const VehicleName& vehicle_name) {
+  if (label == kMapLabel) return "map";
+  if (label >= kFirstObstacle) return fmt::format("obstacle {}", label - kFirstObstacle);
+  return vehicle_name(label - kFirstVehicle);
+}
+
 constexpr Duration kFlushPeriod = std::chrono::milliseconds(100);
 constexpr const char* kStateColumns = "px,py,pz,qw,qx,qy,qz,vx,vy,vz,wx,wy,wz";
 constexpr const char* kTrueStateColumns =
@@ -183,9 +191,7 @@ void FlightRecorder::add_sensor_files(const VehicleAgent& vehicle, VehicleFiles&
 }
 
 std::string label_name(const Simulation& simulation, Label label) {
-  if (label == kMapLabel) return "map";
-  if (label >= kFirstObstacle) return fmt::format("obstacle {}", label - kFirstObstacle);
-  return simulation.vehicle(label - kFirstVehicle).setup().name;
+  return label_name(label, [&](std::size_t v) { return simulation.vehicle(v).setup().name; });
 }
 
 FlightRecorder::FlightRecorder(const std::string& folder,
@@ -333,9 +339,7 @@ void FlightRecorder::write(const ScanSample& sample) {
 }
 
 std::string FlightRecorder::partner_name(Label label) const {
-  if (label == kMapLabel) return "map";
-  if (label >= kFirstObstacle) return fmt::format("obstacle {}", label - kFirstObstacle);
-  return names_[label - kFirstVehicle];
+  return label_name(label, [this](std::size_t v) { return names_[v]; });
 }
 
 void FlightRecorder::write(const CollisionEvent& event) {

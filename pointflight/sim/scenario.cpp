@@ -21,6 +21,9 @@ constexpr Named<LowBatteryReaction> kLowBattery[] = {{LowBatteryReaction::kLand,
                                                      {LowBatteryReaction::kReport, "report"}};
 constexpr Named<YawMode> kYawModes[] = {{YawMode::kAlongPath, "along_path"},
                                         {YawMode::kFixed, "fixed"}};
+/// Sections of pointflight's higher floors: no mistake in a program that is built on the core
+/// alone.
+constexpr const char* kHigherSections[] = {"ros", "share"};
 
 Key required(Key key) {
   key.required = true;
@@ -207,8 +210,9 @@ void describe(SettingsVisitor& v, Scenario& s) {
     std::any& settings = s.sections.try_emplace(row.name, row.settings).first->second;
     v.section({row.name, "", row.help}, [&](SettingsVisitor& w) { row.describe(w, settings); });
   }
-  // in a program without it
-  if (scenario_sections().find("ros") == nullptr) v.leave_as_is("ros", s.ros_as_is);
+  for (const char* name : kHigherSections) {
+    if (scenario_sections().find(name) == nullptr) v.leave_as_is(name, s.sections_as_is[name]);
+  }
 }
 
 std::vector<VehicleSetup> Scenario::fleet() const {

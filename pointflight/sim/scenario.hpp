@@ -130,7 +130,8 @@ struct Scenario {
   OutputSetup output;  ///< What is written.
   /// What other floors and programs read (`scenario_sections`), by name.
   std::map<std::string, std::any> sections;
-  std::string ros_as_is;  ///< YAML of `ros`, in a program that does not read it.
+  /// YAML of `ros` and `share`, by name, in a program that does not read them.
+  std::map<std::string, std::string> sections_as_is;
 
   /// Of the file: what relative paths are taken from. Empty for a scenario made by a program, which
   /// stands for the working folder.

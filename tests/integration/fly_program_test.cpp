@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "pointflight/core/resources.hpp"
+#include "pointflight/sim/scenario.hpp"
 #include "tests/integration/program.hpp"
 
 namespace pointflight {
@@ -31,6 +32,25 @@ TEST_F(Program, FliesAMapWithoutAScenario) {
   const Result fly = run(fmt::format("fly {} -o {}", small, folder / "run"));
   EXPECT_EQ(fly.code, 0) << fly.err;
   EXPECT_FALSE(read_file(folder / "run/summary.json").empty());
+}
+
+// these tests are built on the core alone, as a planner of somebody else is
+TEST_F(Program, ItsScenariosAreReadByProgramsOfTheCoreAlone) {
+  const TemporaryFolder folder;
+  const std::string yaml = folder / "s.yaml";
+  ASSERT_EQ(run(fmt::format("scenario new {} -o {}", map(), yaml)).code, 0);
+  const Scenario scenario = load_scenario(yaml);
+  ASSERT_EQ(scenario.sections.size(), 0u);  // nothing of this program reads what it keeps
+  const std::string again = scenario_yaml(scenario);
+  for (const char* section : {"ros", "share"}) {
+    EXPECT_NE(again.find(fmt::format("\n{}:\n", section)), std::string::npos) << section;
+    write_file(folder / "again.yaml", again);
+    EXPECT_EQ(load_scenario(folder / "again.yaml").sections_as_is.at(section),
+              scenario.sections_as_is.at(section));
+  }
+  // and the program takes what such a program wrote
+  const Result check = run(fmt::format("scenario check {}", folder / "again.yaml"));
+  EXPECT_EQ(check.code, 0) << check.err;
 }
 
 TEST_F(Program, ScenarioNewCheckAndFly) {
