@@ -233,9 +233,15 @@ int finish(const Campaign& campaign,
   print_results(campaign, results, failed, flags.json);
   const std::size_t left = campaign.plan().runs.size() - results.size();
   if (left > 0) {
-    log(fmt::format("{} flights are left ({}); the same command goes on",
-                    left,
-                    was_stopped ? "it was ended" : "they were killed from outside"));
+    std::string why = "it was ended";
+    if (!was_stopped && flags.engine == "slurm") {
+      why = fmt::format("their tasks have ended; what these said: {}/slurm", campaign.folder());
+    } else if (!was_stopped) {
+      why =
+          "somebody outside killed them: a batch system, or the system for want of memory, which "
+          "limits: {memory} would have made a failure of";
+    }
+    log(fmt::format("{} flights are left ({}); the same command goes on", left, why));
     return was_stopped ? kInterrupted : kWrongInput;
   }
   int code = kDone;
@@ -335,6 +341,7 @@ void check_flags(const CampaignFlags& flags) {
   if (is_worker && (flags.retry || flags.json || !flags.fail_if.empty())) {
     throw InputError("--share flies only; --fail-if, --retry-failed and --json go without it");
   }
+  if (is_worker) parse_share(flags.share);  // before there is a folder
 }
 
 int run_campaign(const CampaignFlags& flags) {

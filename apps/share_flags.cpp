@@ -135,6 +135,7 @@ void SharedRun::say() const {
     line += fmt::format("; {} messages, {} lost", peer.received, peer.missing);
     log(line);
   }
+  if (share_->peers().empty()) log("nobody else took part");
   if (share_->foreign() > 0) {
     log(fmt::format("{} messages were of somebody else and left out", share_->foreign()));
   }

@@ -91,12 +91,16 @@ std::optional<std::string> recording_in(const std::string& folder) {
   std::error_code ignored;
   if (!fs::exists(fs::path(folder) / "metadata.yaml", ignored)) return std::nullopt;
   const std::vector<std::string> found = recordings_in(folder);
-  if (found.size() != 1) {
+  if (found.empty()) {
+    throw InputError(fmt::format(
+        "{}: is a recording without an .mcap file; ros2 bag convert makes one", folder));
+  }
+  if (found.size() > 1) {
     throw InputError(
         fmt::format("{}: is a recording in {} .mcap files: give one of them, such as {}",
                     folder,
                     found.size(),
-                    found.empty() ? "an .mcap" : found.front()));
+                    found.front()));
   }
   return found.front();
 }

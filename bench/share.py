@@ -6,6 +6,7 @@ vehicle (a Mid-360 on it), the median of differences; what a host with one vehic
 put on the cable (all of it: Ethernet, discovery, clocks)."""
 import os
 import pathlib
+import shutil
 import statistics
 import subprocess
 import sys
@@ -44,11 +45,12 @@ def cost(with_others):
     others = fly("eight", "1-8") if with_others else None
     before, began = [sent(host) for host in ("one", "eight")], time.monotonic()
     own = fly("one", "0")
-    _, _, usage = os.wait4(own.pid, 0)
+    _, status, usage = os.wait4(own.pid, 0)
+    assert os.waitstatus_to_exitcode(status) in (0, 1), "the process with one vehicle did not fly"
     passed = time.monotonic() - began
     rates = [1e-3 * (sent(host) - b) / passed for host, b in zip(("one", "eight"), before)]
     if others:
-        others.wait()
+        assert others.wait() in (0, 1), "the process with eight did not fly"
     return usage.ru_utime + usage.ru_stime, rates
 
 
@@ -64,3 +66,4 @@ try:
     print(f"median: {100 * statistics.median(differences):.2f} % of a core per vehicle")
 finally:
     network.close()
+    shutil.rmtree(work, ignore_errors=True)

@@ -7,6 +7,7 @@
 #include <array>
 #include <cerrno>
 #include <csignal>
+#include <cstdio>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -15,6 +16,7 @@
 #include "campaign/process.hpp"
 #include "pointflight/core/hash.hpp"
 #include "pointflight/core/input_error.hpp"
+#include "pointflight/core/locked_file.hpp"
 #include "pointflight/core/mapped_file.hpp"
 #include "pointflight/core/output_file.hpp"
 #include "pointflight/core/resources.hpp"
@@ -60,6 +62,8 @@ fs::path make_attempt(const fs::path& run) {
 void keep(const fs::path& attempt, const fs::path& final_folder, const RunRecord& record) {
   write_text(attempt / kResult, record_json(record));
   std::error_code error;
+  // what has no result is none: half taken away
+  if (!fs::exists(final_folder / kResult, error)) fs::remove_all(final_folder, error);
   fs::rename(attempt, final_folder, error);
   if (error && !fs::exists(final_folder)) {  // else somebody else has flown it meanwhile: the same
     throw InputError(fmt::format("{}: {}", final_folder.string(), error.message()));
@@ -89,7 +93,9 @@ void replace_all(std::string& text, std::string_view what, const std::string& by
 
 void judge(const ProcessResult& ended, const Study& study, RunRecord& record) {
   record.wall_seconds = ended.wall_seconds;
-  if (ended.timed_out) {
+  if (ended.exit_code < 0 && ended.signal == 0) {
+    record.reason = "nobody knows how it ended";
+  } else if (ended.timed_out) {
     record.reason = fmt::format("took longer than {:g} s", study.time_limit);
   } else if (ended.signal != 0) {
     record.reason = fmt::format("signal {}", ended.signal);
@@ -108,18 +114,48 @@ Campaign::Campaign(Study study, std::string folder, std::string program)
       program_(std::move(program)),
       plan_(plan_of(study_)),
       scenario_path_(resolve_path(study_.scenario, fs::path(study_.path).parent_path().string())),
-      scenario_text_(MappedFile(scenario_path_).text()),
-      map_(load_scenario(scenario_path_).open_map()) {
+      scenario_text_(MappedFile(scenario_path_).text()) {
+  take_inputs(load_scenario(scenario_path_));
   check_values();
   check_folder();
 }
 
+/// Its map, and what else it takes from files.
+void Campaign::take_inputs(const Scenario& scenario) {
+  std::shared_ptr<const SurfelMap>& map = maps_[scenario.map];
+  if (!map) map = scenario.open_map();
+  for (const std::string& path : files_of(scenario)) {
+    if (inputs_.contains(path)) continue;
+    inputs_[path] = hash64(MappedFile(path).bytes());
+  }
+}
+
+/// A value fits beside those of the first flight that has it (an end of a draw: beside the first
+/// flight's).
+bool Campaign::fits_in_a_flight(const std::string& key, const std::string& value) const {
+  const auto found = std::find(plan_.keys.begin(), plan_.keys.end(), key);
+  if (found == plan_.keys.end()) return false;
+  const auto place = static_cast<std::size_t>(found - plan_.keys.begin());
+  const auto run = std::find_if(plan_.runs.begin(), plan_.runs.end(), [&](const PlannedRun& r) {
+    return r.values[place] == value;
+  });
+  PlannedRun flown = run == plan_.runs.end() ? plan_.runs.front() : *run;
+  flown.values[place] = value;
+  try {
+    parse_scenario(scenario_text_of(flown), scenario_path_);
+    return true;
+  } catch (const InputError&) {
+    return false;
+  }
+}
+
 /// Each value of each axis, and the ends of each draw, fit the scenario.
-void Campaign::check_values() const {
+void Campaign::check_values() {
   const auto check = [&](const std::string& key, const std::string& value, int line) {
     try {
-      parse_scenario(edited_scenario(scenario_text_, {key}, {value}), scenario_path_);
+      take_inputs(parse_scenario(edited_scenario(scenario_text_, {key}, {value}), scenario_path_));
     } catch (const InputError& error) {
+      if (fits_in_a_flight(key, value)) return;  // it makes sense beside other keys' values only
       // lines are of the edited text, which nobody sees
       std::string why = error.what();
       if (why.starts_with(scenario_path_ + ":")) {
@@ -154,25 +190,40 @@ std::string Campaign::identity() const {
   };
   std::string command;
   for (const std::string& word : study_.command) command += word + '\0';
+  std::string maps;
+  for (const auto& [path, map] : maps_) maps += map->hash() + "\n";
+  std::string inputs;  // by what they hold: where they lie may differ from host to host
+  for (const auto& [path, content] : inputs_) {
+    inputs += fmt::format("{} {:016x}\n", fs::path(path).filename().string(), content);
+  }
   const nlohmann::ordered_json identity = {{"pointflight", kVersion},
                                            {"flights", plan_.runs.size()},
                                            {"plan_hash", hash(all)},
                                            {"scenario_hash", hash(scenario_text_)},
                                            {"command_hash", hash(command)},
-                                           {"map_hash", map_->hash()}};
+                                           {"maps_hash", hash(maps)},
+                                           {"inputs_hash", hash(inputs)},
+                                           {"figures", study_.figures}};
   return identity.dump(1) + "\n";
 }
 
 /// Several processes may come at once: all write the same.
 void Campaign::check_folder() const {
   std::error_code error;
-  fs::create_directories(fs::path(folder_) / "runs", error);
-  if (error) throw InputError(fmt::format("{}: {}", folder_, error.message()));
+  const fs::path runs = fs::path(folder_) / "runs";
   const std::string path = (fs::path(folder_) / "campaign.json").string();
+  const bool is_one = fs::exists(path, error) || fs::exists(runs, error);
+  if (!is_one && fs::exists(folder_, error) && !fs::is_empty(folder_, error)) {
+    throw InputError(
+        fmt::format("{}: is not empty, and no campaign; choose another folder", folder_));
+  }
+  fs::create_directories(runs, error);
+  if (error) throw InputError(fmt::format("{}: {}", folder_, error.message()));
   if (fs::exists(path, error)) {
     if (MappedFile(path).text() == identity()) return;
     throw InputError(fmt::format(
-        "{}: is the campaign of another study, scenario, map or version; choose another folder",
+        "{}: is the campaign of another study, scenario, map, input or version; choose another "
+        "folder",
         folder_));
   }
   const std::string own = fmt::format("{}.{}-{}", path, host_name(), getpid());
@@ -191,7 +242,9 @@ std::vector<std::size_t> Campaign::missing() const {
   for (fs::directory_iterator at(fs::path(folder_) / "runs", error);
        !error && at != fs::directory_iterator();
        at.increment(error)) {
-    there.insert(at->path().filename().string());
+    std::error_code ignored;
+    const bool is_over = fs::exists(at->path() / kResult, ignored);
+    if (is_over) there.insert(at->path().filename().string());
   }
   std::vector<std::size_t> missing;
   for (const PlannedRun& run : plan_.runs) {
@@ -205,9 +258,11 @@ std::size_t Campaign::forget_failed() {
   for (const PlannedRun& run : plan_.runs) {
     const auto record = result(run.number);
     if (!record || record->status != RunStatus::kFailed) continue;
+    // at one stroke: whoever is killed meanwhile leaves no half of a result
     std::error_code error;
-    fs::remove_all(run_folder(run.number), error);
+    fs::remove(fs::path(run_folder(run.number)) / kResult, error);
     if (error) throw InputError(fmt::format("{}: {}", run_folder(run.number), error.message()));
+    fs::remove_all(run_folder(run.number), error);
     ++count;
   }
   return count;
@@ -222,11 +277,23 @@ void Campaign::remove_leftovers() const {
     const std::string name = at->path().filename().string();
     const std::size_t found = name.find(ours);
     if (found == std::string::npos) continue;
-    const long pid = std::strtol(name.c_str() + found + ours.size(), nullptr, 10);
+    // a process and a count, and no more: else another host's name begins as this one's
+    const std::string rest = name.substr(found + ours.size());
+    int pid = 0;
+    int attempt = 0;
+    int read = 0;
+    // NOLINTNEXTLINE(cert-err34-c): names are made by `make_attempt`; others are left alone
+    const int fields = std::sscanf(rest.c_str(), "%d-%d%n", &pid, &attempt, &read);
+    if (fields != 2 || rest.size() != static_cast<std::size_t>(read)) continue;
     if (pid <= 0 || pid == getpid()) continue;
-    std::error_code ignored;
-    if (kill(static_cast<pid_t>(pid), 0) != 0 && errno == ESRCH)
+    if (kill(static_cast<pid_t>(pid), 0) == 0 || errno != ESRCH) continue;
+    try {
+      const FolderLock lock(
+          at->path().string());  // processes of containers have numbers of their own
+      std::error_code ignored;
       fs::remove_all(at->path(), ignored);
+    } catch (const InputError&) {  // somebody flies there
+    }
   }
 }
 
@@ -268,6 +335,10 @@ std::string Campaign::repeating_command(std::size_t number) const {
        command_of(plan_.runs[number], (folder / "scenario.yaml").string(), "again")) {
     line += (line.empty() ? "" : " ") + shell_word(word);
   }
+  if (!study_.command.empty()) {  // it runs in the study's folder, and its output is there
+    const fs::path home = fs::absolute(study_.path).parent_path();
+    line = fmt::format("cd {} && mkdir -p again && {}", shell_word(home.string()), line);
+  }
   return line;
 }
 
@@ -289,19 +360,26 @@ std::optional<RunRecord> Campaign::fly(std::size_t number, const std::atomic<boo
   const fs::path final_folder = run_folder(number);
   const fs::path attempt = fs::absolute(make_attempt(final_folder));
   const AttemptGuard guard(attempt);
+  const FolderLock lock(attempt.string());
   Scenario scenario;
+  std::string text;
   try {
-    scenario = parse_scenario(scenario_text_of(run), scenario_path_);
+    text = scenario_text_of(run);
+    scenario = parse_scenario(text, scenario_path_);
   } catch (const InputError& problem) {  // values that fit the scenario one by one
     RunRecord record;
     record.status = RunStatus::kFailed;
     record.reason = "values that do not fit together";
-    write_text(attempt / "scenario.yaml", scenario_text_of(run));
+    if (!text.empty()) write_text(attempt / "scenario.yaml", text);
     write_text(attempt / "log.txt", std::string(problem.what()) + "\n");
     keep(attempt, final_folder, record);
     return record;
   }
-  write_scenario_copy(scenario, *map_, attempt.string(), final_folder.string());
+  const auto map = maps_.find(scenario.map);
+  write_scenario_copy(scenario,
+                      map != maps_.end() ? *map->second : *scenario.open_map(),
+                      attempt.string(),
+                      final_folder.string());
   const std::string output = (attempt / "output").string();
   std::error_code error;
   fs::create_directory(output, error);
@@ -312,9 +390,12 @@ std::optional<RunRecord> Campaign::fly(std::size_t number, const std::atomic<boo
   request.time_limit = study_.time_limit;
   request.memory_limit = study_.memory_limit;
   const ProcessResult ended = run_process(request, stop);
-  // killed from outside, as by an operator or a batch system: no result of the run's own
-  const bool was_killed = ended.signal == SIGKILL || ended.signal == SIGTERM;
-  if (ended.interrupted || (was_killed && !ended.timed_out)) return std::nullopt;
+  // killed from outside, as by an operator or a batch system: no result of the run's own; `fly`
+  // takes SIGTERM and says so
+  constexpr int kFlyInterrupted = 130;
+  const bool was_killed = ended.signal == SIGKILL || ended.signal == SIGTERM ||
+                          (study_.command.empty() && ended.exit_code == kFlyInterrupted);
+  if (!ended.timed_out && (ended.interrupted || was_killed || stop)) return std::nullopt;
   RunRecord record;
   judge(ended, study_, record);
   try {

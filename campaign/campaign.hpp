@@ -21,7 +21,7 @@ namespace pointflight {
 /// appears when it is over; until then what it writes lies beside it under a name that only its
 /// attempt has, so that whoever was killed leaves nothing that counts. Any number of processes on
 /// any number of machines may fly parts of one campaign. `campaign.json` says of what study,
-/// scenario and map it is.
+/// scenario, maps and other files it is.
 class Campaign {
  public:
   /// Opens or makes the folder. `program`: our own, for flights without a command of the user's.
@@ -55,7 +55,9 @@ class Campaign {
 
  private:
   void check_folder() const;
-  void check_values() const;
+  void take_inputs(const Scenario& scenario);
+  void check_values();
+  [[nodiscard]] bool fits_in_a_flight(const std::string& key, const std::string& value) const;
   [[nodiscard]] std::string scenario_text_of(const PlannedRun& run) const;
   [[nodiscard]] std::vector<std::string> command_of(const PlannedRun& run,
                                                     const std::string& scenario,
@@ -69,7 +71,9 @@ class Campaign {
   Plan plan_;
   std::string scenario_path_;
   std::string scenario_text_;
-  std::shared_ptr<const SurfelMap> map_;
+  std::map<std::string, std::shared_ptr<const SurfelMap>>
+      maps_;                                     ///< By path, as scenarios have it.
+  std::map<std::string, std::uint64_t> inputs_;  ///< Hashes of other files, by path.
 };
 
 }  // namespace pointflight

@@ -66,4 +66,20 @@ std::vector<std::size_t> share_of(const std::vector<std::size_t>& numbers, const
   return own;
 }
 
+std::size_t even_shares(const std::vector<std::size_t>& numbers, std::size_t most) {
+  const std::size_t first = std::max<std::size_t>(1, most);
+  std::size_t best = first;
+  std::size_t least = numbers.size() + 1;
+  for (std::size_t of = first; of > first / 2; --of) {
+    std::vector<std::size_t> loads(of, 0);
+    for (const std::size_t number : numbers) ++loads[number % of];
+    const std::size_t load = *std::max_element(loads.begin(), loads.end());
+    if (load < least) {
+      least = load;
+      best = of;
+    }
+  }
+  return best;
+}
+
 }  // namespace pointflight

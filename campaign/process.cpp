@@ -19,6 +19,7 @@
 #include <system_error>
 #include <thread>
 
+#include "pointflight/core/child_process.hpp"
 #include "pointflight/core/input_error.hpp"
 
 namespace pointflight {
@@ -52,7 +53,7 @@ struct Start {
   const char* program;
   char* const* arguments;
   const char* folder;
-  int log, null, failure;
+  int log, errors, null, failure;
   double memory_limit;
   pid_t parent;
 };
@@ -66,6 +67,7 @@ struct Start {
   // it is not to outlive who would take its results
   prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (getppid() != start.parent) _exit(127);
+  restore_default_signals();
   if (start.memory_limit > 0.0) {
     const auto bytes = static_cast<rlim_t>(start.memory_limit);
     const rlimit limit{bytes, bytes};
@@ -74,7 +76,7 @@ struct Start {
   if (start.folder[0] != '\0' && chdir(start.folder) != 0) fail(errno);
   dup2(start.null, STDIN_FILENO);
   dup2(start.log, STDOUT_FILENO);
-  dup2(start.log, STDERR_FILENO);
+  dup2(start.errors, STDERR_FILENO);
   execv(start.program, start.arguments);
   fail(errno);
   _exit(127);
@@ -94,6 +96,12 @@ std::string found_program(const std::string& name) {
   throw InputError(fmt::format("{}: there is no such program", name));
 }
 
+int opened_log(const std::string& path) {
+  const int file = open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+  if (file < 0) throw InputError(fmt::format("{}: {}", path, reason(errno)));
+  return file;
+}
+
 pid_t start_process(const ProcessRequest& request) {
   const std::string program = found_program(request.command.front());
   std::vector<char*> arguments;
@@ -101,9 +109,8 @@ pid_t start_process(const ProcessRequest& request) {
   for (const std::string& word : request.command)
     arguments.push_back(const_cast<char*>(word.c_str()));
   arguments.push_back(nullptr);
-  const Descriptor log_file(
-      open(request.log.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
-  if (log_file.get() < 0) throw InputError(fmt::format("{}: {}", request.log, reason(errno)));
+  const Descriptor log_file(opened_log(request.log));
+  const Descriptor error_file(request.errors.empty() ? -1 : opened_log(request.errors));
   const Descriptor null(open("/dev/null", O_RDONLY | O_CLOEXEC));
   std::array<int, 2> ends = {-1, -1};
   if (pipe2(ends.data(), O_CLOEXEC) != 0) {
@@ -115,6 +122,7 @@ pid_t start_process(const ProcessRequest& request) {
                     arguments.data(),
                     request.folder.c_str(),
                     log_file.get(),
+                    request.errors.empty() ? log_file.get() : error_file.get(),
                     null.get(),
                     ends[1],
                     request.memory_limit,
@@ -158,6 +166,7 @@ ProcessResult run_process(const ProcessRequest& request, const std::atomic<bool>
       if (WIFSIGNALED(status)) result.signal = WTERMSIG(status);
       break;
     }
+    if (ended < 0 && errno == ECHILD) break;  // the kernel took it where SIGCHLD is ignored
     const Clock::time_point now = Clock::now();
     const std::chrono::duration<double> taken = now - begin;
     const bool is_late = request.time_limit > 0.0 && taken.count() > request.time_limit;

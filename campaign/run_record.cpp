@@ -22,17 +22,9 @@ constexpr Named<RunStatus> kStatuses[] = {{RunStatus::kCompleted, "completed"},
                                           {RunStatus::kEnded, "ended"},
                                           {RunStatus::kFailed, "failed"}};
 
-/// Numbers of a record that summaries have, by their names in its JSON.
-struct Figure {
-  const char* name;
-  std::optional<double> RunRecord::*value;
-};
-constexpr std::array<Figure, 6> kFigures = {{{"closest_approach", &RunRecord::closest_approach},
-                                             {"simulated_time", &RunRecord::simulated_time},
-                                             {"distance_flown", &RunRecord::distance_flown},
-                                             {"tracking_error_rms", &RunRecord::tracking_error_rms},
-                                             {"tracking_error_max", &RunRecord::tracking_error_max},
-                                             {"real_time_factor", &RunRecord::real_time_factor}}};
+/// Columns of runs.csv that no figure may fill.
+constexpr std::array<std::string_view, 8> kReserved = {
+    "run", "point", "seed", "status", "reason", "end", "wall_seconds", "real_time_factor"};
 
 json parsed(std::string_view text, const std::string& name) {
   json value = json::parse(text.begin(), text.end(), nullptr, false);
@@ -84,6 +76,28 @@ void read_summary(const json& summary, RunRecord& record) {
   }
 }
 
+/// A figure of the user's; one that a summary has as well fills its column where there is none.
+void take_figure(const std::string& name, double value, RunRecord& record) {
+  if (std::find(kReserved.begin(), kReserved.end(), name) != kReserved.end()) {
+    throw InputError(name + ": is a column of runs.csv; give the figure another name");
+  }
+  const auto has_already = [&] {
+    throw InputError(name + ": is said by summary.json; give the figure another name");
+  };
+  if (name == "collisions") {
+    if (record.collisions) has_already();
+    record.collisions = static_cast<std::int64_t>(value);
+    return;
+  }
+  for (const SummaryFigure& figure : kSummaryFigures) {
+    if (name != figure.name) continue;
+    if (record.*figure.value) has_already();
+    record.*figure.value = value;
+    return;
+  }
+  record.figures[name] = value;
+}
+
 }  // namespace
 
 std::string_view name_of(RunStatus status) {
@@ -97,7 +111,8 @@ std::string record_json(const RunRecord& record) {
                 {"wall_seconds", record.wall_seconds},
                 {"figures", record.figures}};
   if (record.collisions) value["collisions"] = *record.collisions;
-  for (const Figure& figure : kFigures) {
+  if (record.real_time_factor) value["real_time_factor"] = *record.real_time_factor;
+  for (const SummaryFigure& figure : kSummaryFigures) {
     if (const auto& number = record.*figure.value) value[figure.name] = *number;
   }
   return value.dump(1, ' ', false, json::error_handler_t::replace) + "\n";
@@ -125,7 +140,10 @@ RunRecord parse_record(std::string_view text, const std::string& name) {
   if (const auto collisions = number_in(value, "collisions")) {
     record.collisions = static_cast<std::int64_t>(*collisions);
   }
-  for (const Figure& figure : kFigures) record.*figure.value = number_in(value, figure.name);
+  for (const SummaryFigure& figure : kSummaryFigures) {
+    record.*figure.value = number_in(value, figure.name);
+  }
+  record.real_time_factor = number_in(value, "real_time_factor");
   const auto figures = value.find("figures");
   if (figures != value.end() && figures->is_object()) {
     for (const auto& [key, number] : figures->items()) {
@@ -150,7 +168,11 @@ void read_results(const std::string& folder, const std::string& figures, RunReco
     if (!value.is_number()) {
       throw InputError(fmt::format("{}: {}: figures are numbers", path.string(), key));
     }
-    record.figures[key] = value.get<double>();
+    try {
+      take_figure(key, value.get<double>(), record);
+    } catch (const InputError& problem) {
+      throw InputError(fmt::format("{}: {}", path.string(), problem.what()));
+    }
   }
 }
 

@@ -1,6 +1,7 @@
 // What one flight of a campaign came to.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <map>
 #include <optional>
@@ -39,14 +40,28 @@ struct RunRecord {
   std::optional<double> real_time_factor;  ///< What timing.json says.
 };
 
+/// A number of a record that summaries have.
+struct SummaryFigure {
+  const char* name;                         ///< In files.
+  std::optional<double> RunRecord::*value;  ///< Where it lies.
+};
+/// All of them but `collisions`, in the order of runs.csv.
+inline constexpr std::array<SummaryFigure, 5> kSummaryFigures = {
+    {{"closest_approach", &RunRecord::closest_approach},
+     {"simulated_time", &RunRecord::simulated_time},
+     {"distance_flown", &RunRecord::distance_flown},
+     {"tracking_error_rms", &RunRecord::tracking_error_rms},
+     {"tracking_error_max", &RunRecord::tracking_error_max}}};
+
 /// As the text of a file.
 std::string record_json(const RunRecord& record);
 /// Throws InputError where it is no record; `name` stands for the path.
 RunRecord parse_record(std::string_view json, const std::string& name);
 
 /// Takes from a run's folder what its files say: summary.json, timing.json, and `figures` (a JSON
-/// object of numbers; empty: none). What is not there stays open. Throws InputError where a file
-/// is none.
+/// object of numbers; empty: none), in which a name of the above fills what no summary has. What is
+/// not there stays open. Throws InputError where a file is none, or a figure has the name of a
+/// column that is filled.
 void read_results(const std::string& folder, const std::string& figures, RunRecord& record);
 
 }  // namespace pointflight

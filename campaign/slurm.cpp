@@ -24,21 +24,31 @@ constexpr auto kAskBetween = std::chrono::seconds(2);
 struct Answer {
   int exit_code = 0;
   std::string text;
+  std::string errors;  ///< And warnings: clusters' plugins say all kinds of things.
 };
 
 /// What a command of Slurm's says.
-Answer ask(const fs::path& folder, const std::vector<std::string>& command) {
+Answer ask(const fs::path& folder,
+           const std::vector<std::string>& command,
+           const std::atomic<bool>& stop) {
   ProcessRequest request;
   request.command = command;
   request.log = (folder / ("." + command.front() + ".txt")).string();
+  request.errors = (folder / ("." + command.front() + ".errors.txt")).string();
   request.time_limit = 120.0;
-  const std::atomic<bool> never = false;
-  const ProcessResult ended = run_process(request, never);
-  Answer answer{ended.timed_out ? -1 : ended.exit_code, {}};
+  const ProcessResult ended = run_process(request, stop);
+  Answer answer{ended.timed_out ? -1 : ended.exit_code, {}, {}};
   answer.text = MappedFile(request.log).text();
+  answer.errors = MappedFile(request.errors).text();
   std::error_code ignored;
   fs::remove(request.log, ignored);
+  fs::remove(request.errors, ignored);
   return answer;
+}
+
+std::string reason_of(const Answer& answer) {
+  const std::string& text = answer.errors.empty() ? answer.text : answer.errors;
+  return text.substr(0, text.find('\n'));
 }
 
 std::string first_line(const std::string& text) {
@@ -51,25 +61,28 @@ bool is_job(const std::string& text) {
 
 /// True while some of its tasks wait or run. A job that Slurm has forgotten is over; a controller
 /// that does not answer for a while is asked again.
-bool is_there(const fs::path& folder, const std::string& job) {
+bool is_there(const fs::path& folder, const std::string& job, const std::atomic<bool>& stop) {
   for (int tries = 0;; ++tries) {
-    const Answer answer = ask(folder, {"squeue", "--noheader", "--format=%T", "--jobs=" + job});
-    if (answer.exit_code == 0) return !answer.text.empty();
-    if (answer.text.find("Invalid job id") != std::string::npos) return false;
-    constexpr int kMostTries = 30;
-    if (tries == kMostTries) {
-      throw InputError(fmt::format("squeue: {}", first_line(answer.text)));
+    const Answer answer =
+        ask(folder, {"squeue", "--noheader", "--format=%T", "--jobs=" + job}, stop);
+    if (stop) return true;  // nobody knows
+    if (answer.exit_code == 0) {
+      return answer.text.find_first_not_of(" \t\r\n") != std::string::npos;
     }
+    if (answer.errors.find("Invalid job id") != std::string::npos) return false;
+    constexpr int kMostTries = 30;
+    if (tries == kMostTries) throw InputError(fmt::format("squeue: {}", reason_of(answer)));
     std::this_thread::sleep_for(kAskBetween);
   }
 }
 
 std::string submit(const Campaign& campaign,
                    const fs::path& folder,
-                   std::size_t count,
+                   const std::vector<std::size_t>& numbers,
                    const SlurmOptions& options) {
-  const std::size_t tasks =
-      std::min(count, options.tasks > 0 ? options.tasks : std::min(count, kMostTasks));
+  const std::size_t count = numbers.size();
+  const std::size_t tasks = even_shares(
+      numbers, std::min(count, options.tasks > 0 ? options.tasks : std::min(count, kMostTasks)));
   const auto word = [](const std::string& path) { return shell_word(fs::absolute(path).string()); };
   std::vector<std::string> command = {
       "sbatch",
@@ -84,11 +97,12 @@ std::string submit(const Campaign& campaign,
                                 word(campaign.study().path),
                                 word(campaign.folder()),
                                 tasks));
-  const Answer answer = ask(folder, command);
+  const std::atomic<bool> never = false;  // a job that nobody knows of would be the worse end
+  const Answer answer = ask(folder, command, never);
   // "123" or "123;cluster"
   const std::string job = first_line(answer.text).substr(0, answer.text.find_first_of(";\n"));
   if (answer.exit_code != 0 || !is_job(job)) {
-    throw InputError(fmt::format("sbatch: {}", first_line(answer.text)));
+    throw InputError(fmt::format("sbatch: {}", reason_of(answer)));
   }
   return job;
 }
@@ -113,13 +127,13 @@ std::string fly_by_slurm(const Campaign& campaign,
   if (error) throw InputError(fmt::format("{}: {}", folder.string(), error.message()));
   const fs::path note = folder / "job";
   std::optional<std::string> job = job_in(note);
-  if (!job || !is_there(folder, *job)) {
-    job = submit(campaign, folder, numbers.size(), options);
+  if (!job || !is_there(folder, *job, stop)) {
+    job = submit(campaign, folder, numbers, options);
     OutputFile file(note.string());
     file.write(*job + "\n");
     file.commit();
   }
-  while (!stop && is_there(folder, *job)) {
+  while (!stop && is_there(folder, *job, stop)) {
     const auto left = static_cast<double>(campaign.missing().size());
     const auto all = static_cast<double>(campaign.plan().runs.size());
     report(progress, fmt::format("Slurm's job {}", *job), 1.0 - left / all);

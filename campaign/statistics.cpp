@@ -19,18 +19,6 @@ constexpr Named<Counted> kCounted[] = {{Counted::kCompleted, "completed_rate"},
                                        {Counted::kCollision, "collision_rate"},
                                        {Counted::kFailed, "failed_rate"}};
 
-/// Columns of runs.csv that follow from scenario and seed.
-struct Column {
-  const char* name;
-  std::optional<double> RunRecord::*value;
-};
-constexpr std::array<Column, 5> kColumns = {
-    {{"closest_approach", &RunRecord::closest_approach},
-     {"simulated_time", &RunRecord::simulated_time},
-     {"distance_flown", &RunRecord::distance_flown},
-     {"tracking_error_rms", &RunRecord::tracking_error_rms},
-     {"tracking_error_max", &RunRecord::tracking_error_max}}};
-
 /// Of a sorted list.
 double quantile(const std::vector<double>& sorted, double share) {
   const double at = share * static_cast<double>(sorted.size() - 1);
@@ -120,7 +108,7 @@ Rate rate_of(const std::vector<const RunRecord*>& runs, Counted counted) {
 }
 
 std::optional<double> number_of(const RunRecord& run, const std::string& column) {
-  for (const Column& known : kColumns) {
+  for (const SummaryFigure& known : kSummaryFigures) {
     if (column == known.name) return run.*known.value;
   }
   if (column == "collisions") {
@@ -135,7 +123,7 @@ std::optional<double> number_of(const RunRecord& run, const std::string& column)
 
 std::vector<std::string> number_columns(const std::vector<const RunRecord*>& runs) {
   std::vector<std::string> names = {"collisions"};
-  for (const Column& column : kColumns) names.emplace_back(column.name);
+  for (const SummaryFigure& column : kSummaryFigures) names.emplace_back(column.name);
   names.emplace_back("wall_seconds");
   names.emplace_back("real_time_factor");
   std::set<std::string> own;
@@ -170,7 +158,7 @@ std::string runs_csv(const Plan& plan, const Results& results) {
   std::string csv = "run,point,seed";
   for (const std::string& key : plan.keys) csv += "," + cell(key);
   csv += ",status,reason,end,collisions";
-  for (const Column& column : kColumns) csv += fmt::format(",{}", column.name);
+  for (const SummaryFigure& column : kSummaryFigures) csv += fmt::format(",{}", column.name);
   for (const std::string& name : figures) csv += "," + cell(name);
   csv += "\n";
   for (const auto& [number, run] : results) {
@@ -182,8 +170,11 @@ std::string runs_csv(const Plan& plan, const Results& results) {
                        cell(run.reason),
                        cell(run.end),
                        run.collisions ? std::to_string(*run.collisions) : "");
-    for (const Column& column : kColumns) csv += "," + cell(run.*column.value);
-    for (const std::string& name : figures) csv += "," + cell(number_of(run, name));
+    for (const SummaryFigure& column : kSummaryFigures) csv += "," + cell(run.*column.value);
+    for (const std::string& name : figures) {
+      const auto figure = run.figures.find(name);
+      csv += "," + (figure == run.figures.end() ? std::string() : cell(figure->second));
+    }
     csv += "\n";
   }
   return csv;
@@ -210,7 +201,7 @@ std::string points_csv(const Plan& plan, const Results& results) {
   for (const Named<Counted>& row : kCounted) {
     csv += fmt::format(",{0},{0}_low,{0}_high", row.name);
   }
-  for (const Column& column : kColumns) csv += fmt::format(",median_{}", column.name);
+  for (const SummaryFigure& column : kSummaryFigures) csv += fmt::format(",median_{}", column.name);
   csv += "\n";
   const auto points = by_point(plan, results);
   for (std::size_t point = 0; point < points.size(); ++point) {
@@ -222,7 +213,7 @@ std::string points_csv(const Plan& plan, const Results& results) {
       csv += rate.of == 0 ? ",,,"
                           : fmt::format(",{:.6g},{:.6g},{:.6g}", rate.value, rate.low, rate.high);
     }
-    for (const Column& column : kColumns) {
+    for (const SummaryFigure& column : kSummaryFigures) {
       const Spread spread = spread_of(points[point], column.name);
       csv += "," + (spread.count == 0 ? std::string() : fmt::format("{:.9g}", spread.median));
     }
@@ -260,7 +251,14 @@ Condition::Condition(std::string text) : text_(std::move(text)) {
 
 double Condition::value(const std::vector<const RunRecord*>& runs) const {
   for (const Named<Counted>& row : kCounted) {
-    if (function_ == row.name) return rate_of(runs, row.value).value;
+    if (function_ != row.name) continue;
+    const Rate rate = rate_of(runs, row.value);
+    if (rate.of == 0) {
+      throw InputError(fmt::format(
+          "--fail-if {}: no run tells of it (a planner of yours has to leave summary.json)",
+          text_));
+    }
+    return rate.value;
   }
   const Spread spread = spread_of(runs, column_);
   if (spread.count == 0) {

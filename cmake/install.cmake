@@ -4,7 +4,7 @@ include(CMakePackageConfigHelpers)
 get_property(modules GLOBAL PROPERTY POINTFLIGHT_MODULES)
 install(TARGETS ${modules} EXPORT pointflight ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
 install(TARGETS pointflight RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
-install(DIRECTORY pointflight ros_common recording campaign view DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}
+install(DIRECTORY pointflight ros_common recording campaign share view DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}
         FILES_MATCHING PATTERN "*.hpp" PATTERN "*-inl.hpp" EXCLUDE)
 install(FILES ${PROJECT_BINARY_DIR}/generated/pointflight/core/version.hpp
         DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/pointflight/core)

@@ -25,7 +25,10 @@ using ChannelId = std::uint16_t;
 /// Of unpacked chunks that are merged by time; a recorder's overlap by one or two.
 constexpr std::size_t kMostUnpacked = std::size_t{512} << 20;
 
-/// Texts of all channels' types, each counted: a few KiB in truth.
+/// Messages of a file without chunks are loaded so many bytes at a time.
+constexpr std::size_t kLoosePiece = std::size_t{4} << 20;
+
+/// Texts of types, each channel's counted: a few KiB in truth.
 constexpr std::size_t kMostSchemas = std::size_t{64} << 20;
 
 /// Times count from here on as ns of an int64 that differences fit into.
@@ -79,7 +82,7 @@ struct Piece {
   std::int64_t start = 0, end = 0;         ///< ns
   std::optional<mcap::PackedChunk> chunk;  ///< Nothing: messages of the file itself.
   std::span<const std::byte> records;      ///< These, then.
-  std::vector<ChannelId> channels;         ///< That its index says it has.
+  std::vector<ChannelId> channels;         ///< That it has; none: there is no index.
 };
 
 /// What is known of a file without its messages.
@@ -95,6 +98,9 @@ class Outline {
     end_loose();
     // a summary repeats all channels; without one they are said where they are first used
     if (!has_summary_) look_into_chunks(progress);
+    std::erase_if(pieces_, [](const Piece& piece) {  // so says a chunk without messages
+      return piece.start == 0 && piece.end == 0 && piece.channels.empty();
+    });
     std::stable_sort(pieces_.begin(), pieces_.end(), [](const Piece& a, const Piece& b) {
       return a.start < b.start;
     });
@@ -140,7 +146,9 @@ class Outline {
       schema.name = reader.text();
       schema.encoding = reader.text();
       schema.text = reader.text();
-      if (reader.ok()) schemas_.emplace(id, std::move(schema));
+      if (!reader.ok()) return;
+      const std::size_t size = schema.text.size();
+      if (schemas_.emplace(id, std::move(schema)).second) count_schema(size);
     } else if (opcode == Opcode::kChannel) {
       const auto id = reader.number<std::uint16_t>();
       const Schema& schema = schemas_[reader.number<std::uint16_t>()];
@@ -154,12 +162,16 @@ class Outline {
       if (!reader.ok()) return;
       has_summary_ = has_summary_ || data_ended_;
       if (!numbers_.emplace(id, channels_.size()).second) return;
-      schema_bytes_ += channel.schema.size();
-      if (schema_bytes_ > kMostSchemas) {
-        throw InputError(fmt::format(
-            "{}: the types of its topics are longer than {} MiB", name_, kMostSchemas >> 20));
-      }
+      count_schema(channel.schema.size());
       channels_.push_back(std::move(channel));
+    }
+  }
+
+  void count_schema(std::size_t bytes) {
+    schema_bytes_ += bytes;
+    if (schema_bytes_ > kMostSchemas) {
+      throw InputError(fmt::format(
+          "{}: the types of its topics are longer than {} MiB", name_, kMostSchemas >> 20));
     }
   }
 
@@ -174,6 +186,11 @@ class Outline {
     loose_.start = std::min(loose_.start, message->time);
     loose_.end = std::max(loose_.end, message->time);
     loose_.records = {loose_.records.data(), content.data() + content.size()};
+    auto& channels = loose_.channels;
+    if (std::find(channels.begin(), channels.end(), message->channel) == channels.end()) {
+      channels.push_back(message->channel);
+    }
+    if (loose_.records.size() > kLoosePiece) end_loose();
   }
   void end_loose() {
     if (!loose_.records.empty()) pieces_.push_back(std::exchange(loose_, {}));
@@ -259,18 +276,34 @@ class McapTimeline : public TimedRecording {
       if (channels()[i].latched) wanted.insert(i);
     }
     const std::vector<Piece>& pieces = outline_.pieces();
-    for (auto piece = pieces.rbegin(); piece != pieces.rend() && !wanted.empty(); ++piece) {
-      if (piece->start > time || !has_one_of(*piece, wanted)) continue;
-      std::map<std::size_t, Message> last;
-      const auto bytes = unpack(*piece);
-      each_message(*piece, bytes.get(), [&](const Message& message) {
-        const auto channel = outline_.number_of(message.channel);
-        if (channel && wanted.contains(*channel) && message.time < time) last[*channel] = message;
+    std::vector<std::int64_t> reach;  // the latest end of each piece and all before it
+    for (const Piece& piece : pieces) {
+      reach.push_back(reach.empty() ? piece.end : std::max(reach.back(), piece.end));
+    }
+    struct Last {
+      Message message;
+      Unpacked bytes;
+    };
+    std::map<std::size_t, Last> last;
+    for (std::size_t i = pieces.size(); i-- > 0 && !wanted.empty();) {
+      // pieces overlap: one is the last where none that is left comes up to it
+      std::erase_if(wanted, [&](std::size_t channel) {
+        const auto found = last.find(channel);
+        return found != last.end() && found->second.message.time > reach[i];
       });
-      for (const auto& [channel, message] : last) {
-        take({channel, message.time, message.data});
-        wanted.erase(channel);
-      }
+      if (pieces[i].start > time || !has_one_of(pieces[i], wanted)) continue;
+      const Unpacked bytes = unpack(pieces[i]);
+      each_message(pieces[i], bytes.get(), [&](const Message& message) {
+        const auto channel = outline_.number_of(message.channel);
+        if (!channel || !wanted.contains(*channel) || message.time >= time) return;
+        const auto known = last.find(*channel);
+        if (known == last.end() || message.time >= known->second.message.time) {
+          last[*channel] = {message, bytes};
+        }
+      });
+    }
+    for (const auto& [channel, found] : last) {
+      take({channel, found.message.time, found.message.data});
     }
   }
 
@@ -296,6 +329,7 @@ class McapTimeline : public TimedRecording {
   }
 
   [[nodiscard]] bool has_one_of(const Piece& piece, const std::set<std::size_t>& wanted) const {
+    if (piece.channels.empty()) return true;  // who knows
     return std::any_of(piece.channels.begin(), piece.channels.end(), [&](ChannelId id) {
       const auto number = outline_.number_of(id);
       return number && wanted.contains(*number);

@@ -55,6 +55,10 @@ Node::Node(std::string name, const DiscoverySettings& discovery)
   const std::string configuration = cyclone_configuration(discovery, user == nullptr ? "" : user);
   const auto refuse = [&](dds_return_t code) {
     if (domain_ > 0) dds_delete(domain_);
+    if (code == DDS_RETCODE_PRECONDITION_NOT_MET) {  // this process has one there already
+      throw std::runtime_error("ROS 2: domain " + std::to_string(discovery.domain) +
+                               " is that of --share; set POINTFLIGHT_DOMAIN_ID to another");
+    }
     throw std::runtime_error(
         "ROS 2: no DDS participant could be made in domain " + std::to_string(discovery.domain) +
         " (" + dds_strretcode(-code) + "); is CYCLONEDDS_URI right, are there network interfaces," +

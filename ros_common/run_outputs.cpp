@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <future>
+#include <map>
 #include <numeric>
 
 #include "pointflight/core/constants.hpp"
@@ -184,26 +185,29 @@ msg::PointCloud2 obstacle_points(const OutputStream& stream, const ObstacleSampl
   return points_message(stream, points, sample.time);
 }
 
+/// Viewers tell markers apart by namespace and number: each vehicle has its own, whoever flies it.
 class CollisionMarkers : public Output {
  public:
   using Output::Output;
   void on_sample(const Sample& sample) override {
     const auto* event = std::get_if<CollisionEvent>(&sample);
     if (event == nullptr || !event->entered) return;
+    const std::int32_t number = counts_[event->vehicle]++;
     if (stream_.is_wanted()) {
+      const bool is_one = stream_.ros.run.vehicles.size() == 1;
+      const std::string name = stream_.ros.names(event->vehicle).vehicle;
       stream_.send(msg::MarkerArray{{marker_of(Solid{Ball{kCollisionRadius}},
                                                {Quaterniond::Identity(), event->place_world},
                                                stream_.header(event->time),
-                                               "collisions",
-                                               count_,
+                                               is_one ? "collisions" : "collisions/" + name,
+                                               number,
                                                kCollisionColor)}},
                    event->time);
     }
-    ++count_;
   }
 
  private:
-  std::int32_t count_ = 0;
+  std::map<std::uint32_t, std::int32_t> counts_;  ///< By vehicle.
 };
 
 /// In position.x the mean seconds that the last scans took.

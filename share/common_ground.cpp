@@ -6,6 +6,8 @@
 #include <filesystem>
 
 #include "pointflight/core/hash.hpp"
+#include "pointflight/core/mapped_file.hpp"
+#include "pointflight/core/resources.hpp"
 #include "pointflight/core/version.hpp"
 #include "share/share_setup.hpp"
 
@@ -16,6 +18,12 @@ namespace fs = std::filesystem;
 
 std::string hash_of(std::string_view text) {
   return fmt::format("{:016x}", hash64(std::as_bytes(std::span(text.data(), text.size()))));
+}
+
+/// Hash of a file that the scenario names; empty for none.
+std::string content_of(const std::string& path, const Scenario& scenario) {
+  if (path.empty()) return {};
+  return hash_of(MappedFile(resolve_path(path, scenario.folder())).text());
 }
 
 /// A copy of a sensor may lie in another format.
@@ -60,14 +68,21 @@ std::string vehicles_of(const Simulation& simulation) {
   for (std::size_t v = 0; v < simulation.vehicle_count(); ++v) {
     const VehicleAgent& agent = simulation.vehicle(v);
     text += agent.setup().name + "\n" + text_of(agent.settings());
+    for (const CommandSettings& command : agent.setup().commands) {
+      text += content_of(command.file, simulation.scenario());
+    }
     for (const MountedLidar* mounted : agent.lidars()) text += text_of(mounted->lidar().settings());
   }
   return text;
 }
 
-/// Where they begin: functions of seed, map and files.
+/// Their files, and where they begin: functions of seed, map and files.
 std::string obstacles_of(const Simulation& simulation) {
+  const Scenario& scenario = simulation.scenario();
   std::string text;
+  for (const ObstacleSettings& obstacles : scenario.obstacles) {
+    text += content_of(obstacles.file, scenario) + content_of(obstacles.keyframes, scenario) + "\n";
+  }
   for (const Body& body : simulation.obstacles(SimTime{}, SimTime{})) {
     const Vector3d p = body.T_world_body(std::max(SimTime{}, body.from)).translation;
     text += fmt::format(
@@ -84,8 +99,8 @@ std::vector<share_msg::Part> common_ground(const Simulation& simulation, double 
           {"map", simulation.map().hash()},
           {"seed", std::to_string(scenario.seed)},
           {"rate", fmt::format("{}", rate)},
-          {"vehicles or sensors", hash_of(vehicles_of(simulation))},
-          {"obstacles", hash_of(obstacles_of(simulation))},
+          {"set of vehicles or sensors", hash_of(vehicles_of(simulation))},
+          {"set of obstacles", hash_of(obstacles_of(simulation))},
           {"scenario", hash_of(rest_of(scenario))}};
 }
 

@@ -139,13 +139,15 @@ bool FleetShare::is_older(const Peer& peer) const {
 }
 
 bool FleetShare::has_sane_shape(const share_msg::Introduction& intro) const {
+  const auto is_step = [this](std::int64_t time) {  // lockstep begins and waits with a whole one
+    return share_msg::is_time(time) && (!decides_together() || time % step_.count() == 0);
+  };
   std::vector<char> named(others_.size(), 0);
   for (const std::uint32_t v : intro.vehicles) {
     if (v >= named.size() || std::exchange(named[v], 1) != 0) return false;
   }
   return !intro.vehicles.empty() && intro.phase <= Phase::kLeft &&
-         intro.parts.size() <= kPartsMost && share_msg::is_time(intro.begins_at) &&
-         share_msg::is_time(intro.waits_at) &&
+         intro.parts.size() <= kPartsMost && is_step(intro.begins_at) && is_step(intro.waits_at) &&
          (intro.ends_at == -1 || share_msg::is_time(intro.ends_at));
 }
 
@@ -162,7 +164,7 @@ void FleetShare::take_introduction(const ShareArrival& arrival) {
     note_foreign(arrival.writer, "an introduction in another process' name");
     return;
   }
-  if (is_new && !describes_alike(intro->parts, parts_)) {
+  if (!describes_alike(intro->parts, parts_)) {
     note_foreign(arrival.writer, "an introduction that describes no run of ours");
     return;
   }
@@ -270,17 +272,7 @@ bool FleetShare::has_company() const {
   });
 }
 
-/// Each vehicle of the fleet has its process.
-bool FleetShare::has_everybody() const {
-  std::size_t count = options_.vehicles.size();
-  for (const auto& [id, peer] : peers_) {
-    if (peer.fits && !peer.lost && peer.intro.phase != Phase::kLeft) {
-      count += peer.intro.vehicles.size();
-    }
-  }
-  return count >= others_.size();
-}
-
+/// Names of those that have no process.
 std::vector<std::string> FleetShare::missing_vehicles() const {
   std::vector<char> there(others_.size(), 0);
   for (const std::size_t v : options_.vehicles) there[v] = 1;
@@ -309,7 +301,9 @@ bool FleetShare::is_ready() {
   const std::int64_t looked = now - first_look_;
   if (looked < options_.settle.count()) return false;
   for (const auto& [id, peer] : peers_) {
-    if (peer.flies() && !peer.clock.at(now) && looked < kClockPatience) return false;
+    // who is started again is not heard before the others have given its predecessor up
+    const std::int64_t patience = std::max(kClockPatience, lease_.count() + kClockPatience / 3);
+    if (peer.flies() && !peer.clock.at(now) && looked < patience) return false;
   }
   return true;
 }
@@ -326,12 +320,11 @@ bool FleetShare::may_join_steps() {
     own_.begins_at = std::max(own_.begins_at, peer.intro.waits_at);
   }
   const bool settled = options_.steady() - first_look_ >= options_.settle.count();
+  const auto missing = missing_vehicles();
   // before the first step nobody may be missing, or it would not be that of one process
-  const bool complete = has_everybody() || own_.begins_at > 0;
-  if (complete && (!any_flies || (all_wait && settled))) return true;
+  if (any_flies ? all_wait && settled : flown_ || missing.empty()) return true;
   if (options_.steady() - said_waiting_ > kSayWaiting) {
     said_waiting_ = std::numeric_limits<std::int64_t>::max() / 2;
-    const auto missing = missing_vehicles();
     if (!missing.empty() && !any_flies) {
       options_.log(fmt::format("--share {}: waiting for a process that flies {}",
                                options_.run,
@@ -358,6 +351,12 @@ void FleetShare::begin() {
   own_.begins_at = to_ns(simulation_.time());
   next_sent_ = schedule_.first_from(simulation_.time());
   introduce(Phase::kFlying);
+  const bool is_alone = std::none_of(peers_.begin(), peers_.end(), [](const auto& entry) {
+    return entry.second.fits && !entry.second.lost && entry.second.intro.phase != Phase::kLeft;
+  });
+  if (is_alone && !decides_together()) {
+    options_.log(fmt::format("--share {}: flies, and hears nobody else yet", options_.run));
+  }
 }
 
 void FleetShare::leave() {
@@ -387,8 +386,6 @@ std::vector<ApartSummary> FleetShare::apart() const {
 
 std::vector<FleetShare::PeerReport> FleetShare::peers() const {
   std::vector<PeerReport> reports;
-  const std::int64_t now = options_.steady();
-  const auto own = options_.clock(now);
   for (const auto& [id, peer] : peers_) {
     if (!peer.fits) continue;
     PeerReport& report = reports.emplace_back();
@@ -396,10 +393,9 @@ std::vector<FleetShare::PeerReport> FleetShare::peers() const {
     report.vehicles.assign(peer.intro.vehicles.begin(), peer.intro.vehicles.end());
     report.received = peer.received;
     report.missing = peer.missing;
-    if (const auto reading = peer.clock.at(now); reading && own) {
-      report.offset = 1e-9 * static_cast<double>(reading->clock - to_ns(*own));
-      report.offset_error = 1e-9 * static_cast<double>(reading->error);
-    }
+    if (!peer.offset) continue;
+    report.offset = 1e-9 * static_cast<double>(peer.offset->first);
+    report.offset_error = 1e-9 * static_cast<double>(peer.offset->second);
   }
   return reports;
 }

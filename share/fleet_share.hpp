@@ -70,7 +70,7 @@ class FleetShare : public FleetExchange {
   struct PeerReport {
     std::string process;
     std::vector<std::size_t> vehicles;
-    std::optional<double> offset;  ///< Of its clock to this one's, s.
+    std::optional<double> offset;  ///< Of its clock to this one's, s, as it was last.
     double offset_error = 0.0;     ///< s
     std::uint64_t received = 0;    ///< Messages with states.
     std::uint64_t missing = 0;     ///< That never came, by their counters.
@@ -93,9 +93,10 @@ class FleetShare : public FleetExchange {
     std::uint32_t counter = 0;
     std::uint64_t received = 0, missing = 0;
     ClockEstimate clock{1.0};
-    std::int64_t its_sent = 0, its_arrival = 0;  ///< Of its last clock message.
-    bool owes_past = false;                      ///< To it: it was lost, and is back.
-    std::optional<share_msg::Past> past;         ///< What it said then, until its states have come.
+    std::optional<std::pair<std::int64_t, std::int64_t>> offset;  ///< Last, with its error, ns.
+    std::int64_t its_sent = 0, its_arrival = 0;                   ///< Of its last clock message.
+    bool owes_past = false;               ///< To it: it was lost, and is back.
+    std::optional<share_msg::Past> past;  ///< What it said then, until its states have come.
     SimTime lost_at;
     std::deque<share_msg::States> steps;  ///< Lockstep: those that are still to be used.
     SimTime newest;                       ///< Of its states.
@@ -139,7 +140,6 @@ class FleetShare : public FleetExchange {
   void look_again_at_the_rest();
   void keep_introducing();
   [[nodiscard]] bool has_sane_shape(const share_msg::Introduction& intro) const;
-  [[nodiscard]] bool has_everybody() const;
   [[nodiscard]] std::vector<std::string> missing_vehicles() const;
   [[nodiscard]] bool may_join_steps();
 
@@ -170,6 +170,7 @@ class FleetShare : public FleetExchange {
   void say_offset(std::uint64_t id, const Peer& peer, std::int64_t offset, std::int64_t error);
 
   void send_past(Peer& peer);
+  void look_back_if_asked(Peer& peer);
   void look_back(Peer& peer);
   void find_missed(std::uint32_t number, const OtherTrack& track);
   void give_up_past();

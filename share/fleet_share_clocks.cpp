@@ -70,6 +70,7 @@ FleetShare::Adjustment FleetShare::keep_time() {
     if (!reading) continue;
     const std::int64_t offset = reading->clock - to_ns(*own);
     ahead = std::max(ahead, offset - reading->error);
+    peer.offset.emplace(offset, reading->error);
     say_offset(id, peer, offset, reading->error);
   }
   // who has stood still, or began while nothing was heard of the others, goes on where they are

@@ -81,7 +81,14 @@ void FleetShare::wait_for_steps(const SharedStep& own, SimTime needed) {
     }
     if (!said && now - began > kSaySlow) {
       said = true;
-      say_slow(needed, own.is_verdict);
+      if (joins != 0) {
+        options_.log(fmt::format("--share {}: at {:.3f} s, standing still until {} has joined",
+                                 options_.run,
+                                 to_seconds(own.time),
+                                 peers_.at(joins).intro.name));
+      } else {
+        say_slow(needed, own.is_verdict);
+      }
     }
     transport_.wait(kMillisecond);
   }
@@ -132,6 +139,7 @@ OtherVehicles FleetShare::meet_in_step(const SharedStep& own) {
       met.vehicles[state.number]->jumped = std::exchange(others_[state.number].jumped, false);
     }
     if (std::exchange(peer.owes_past, false)) send_past(peer);
+    look_back_if_asked(peer);
   }
   for (std::size_t v = 0; v < others_.size(); ++v) {
     if (!others_[v].there) place(met, v);

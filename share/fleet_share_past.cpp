@@ -13,25 +13,35 @@ namespace {
 using share_msg::Kind;
 
 constexpr Duration kPastPatience = std::chrono::seconds(2);
-constexpr std::size_t kPastMost = 4000;  // states in one message
+constexpr std::size_t kPastMost = 24'000;                         // states in one message
+constexpr Duration kPastSpacing = std::chrono::milliseconds(50);  // at most, where there are more
 
 }  // namespace
 
+/// Its newest states; thinned out so that more time is in them, but not so far that what flies fast
+/// would jump.
 void FleetShare::send_past(Peer& peer) {
   const SimTime from = peer.lost_at - 2 * lease_;
-  std::vector<share_msg::PastState> states;
-  for (const OwnPast& past : past_) {
-    if (past.time >= from) states.push_back({to_ns(past.time), past.state});
-  }
-  const std::size_t stride = states.size() / kPastMost + 1;
+  const auto first = std::find_if(
+      past_.begin(), past_.end(), [from](const OwnPast& past) { return past.time >= from; });
+  const std::size_t vehicles = options_.vehicles.size();  // an instant has all of them
+  const std::size_t instants = static_cast<std::size_t>(past_.end() - first) / vehicles;
   share_msg::Past message;
   message.head.kind = Kind::kPast;
   message.head.process = options_.id;
   message.to = peer.intro.head.process;
-  // whole instants: all vehicles of one, then the next
-  const std::size_t vehicles = options_.vehicles.size();
-  for (std::size_t i = 0; i < states.size(); ++i) {
-    if ((i / vehicles) % stride == 0) message.states.push_back(states[i]);
+  if (instants > 0) {
+    const std::size_t most = std::max<std::size_t>(1, kPastMost / vehicles);
+    const auto spacing =
+        std::max(step_, (past_.back().time - first->time) / static_cast<std::int64_t>(instants));
+    const auto widest = static_cast<std::size_t>(std::max<std::int64_t>(1, kPastSpacing / spacing));
+    const std::size_t stride = std::min((instants + most - 1) / most, widest);
+    for (std::size_t i = instants - std::min(instants, most * stride); i < instants; i += stride) {
+      for (std::size_t k = 0; k < vehicles; ++k) {
+        const OwnPast& past = first[static_cast<std::ptrdiff_t>(i * vehicles + k)];
+        message.states.push_back({to_ns(past.time), past.state});
+      }
+    }
   }
   transport_.send(ShareChannel::kPast, bytes_of(message));
 }
@@ -48,6 +58,13 @@ void FleetShare::take_past(const ShareArrival& arrival) {
   look_back(*peer);
 }
 
+/// It may have come before the states that it is asked for by.
+void FleetShare::look_back_if_asked(Peer& peer) {
+  if (!peer.past) return;
+  look_back(peer);
+  peer.past.reset();
+}
+
 /// What a process says of its past, of those of its vehicles that were lost and are back.
 void FleetShare::look_back(Peer& peer) {
   std::map<std::uint32_t, OtherTrack> tracks;
@@ -60,6 +77,7 @@ void FleetShare::look_back(Peer& peer) {
   }
   for (auto& [number, track] : tracks) {
     Other& other = others_[number];
+    if (track.empty() || past_.empty()) continue;
     if (std::exchange(other.asks_past, false)) find_missed(number, track);
   }
 }
@@ -67,6 +85,9 @@ void FleetShare::look_back(Peer& peer) {
 /// Contacts of own vehicles with one that was not heard of.
 void FleetShare::find_missed(std::uint32_t number, const OtherTrack& track) {
   Other& other = others_[number];
+  // what is forgotten by now may have had contacts in it
+  const SimTime known_from = std::max(past_.front().time, track.oldest());
+  if (known_from > other.lost_at + lease_) ++other.summary.unknown_contacts;
   const VehicleAgent& agent = simulation_.vehicle(number);
   std::map<std::uint32_t, bool> inside;
   for (const OwnPast& past : past_) {

@@ -15,6 +15,7 @@ using share_msg::Phase;
 constexpr std::size_t kResentMost = 8;  // messages
 constexpr double kJump = 0.1;           // s moved on, after which a vehicle may be elsewhere
 constexpr Duration kPastKept = std::chrono::seconds(120);
+constexpr double kPastRate = 2000.0;  // states per second, of all vehicles
 
 }  // namespace
 
@@ -155,10 +156,7 @@ void FleetShare::take_states(const ShareArrival& arrival) {
     mark_present(state.number, *peer);
   }
   if (std::exchange(peer->owes_past, false)) send_past(*peer);
-  if (peer->past) {  // it may have come before the states
-    look_back(*peer);
-    peer->past.reset();
-  }
+  look_back_if_asked(*peer);
 }
 
 void FleetShare::send_states(const SharedStep& own) {
@@ -177,8 +175,11 @@ void FleetShare::send_states(const SharedStep& own) {
   transport_.send(ShareChannel::kStates, last_sent_.back());
 }
 
-/// For those who were apart: where own vehicles were.
+/// For those who were apart: where own vehicles were; of many vehicles at fewer instants.
 void FleetShare::remember(const SharedStep& own) {
+  const double states = static_cast<double>(own.vehicles.size());
+  const Duration apart = from_seconds(states / kPastRate) - step_;
+  if (!past_.empty() && own.time < past_.back().time + apart) return;
   for (const SharedVehicle& vehicle : own.vehicles) past_.push_back({own.time, state_of(vehicle)});
   while (past_.front().time < own.time - kPastKept) past_.pop_front();
 }

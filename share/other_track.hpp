@@ -43,6 +43,8 @@ class OtherTrack {
   [[nodiscard]] bool empty() const { return states_.empty(); }
   /// Of the newest; not of an empty one.
   [[nodiscard]] SimTime newest() const { return states_.back().time; }
+  /// Of the oldest; not of an empty one.
+  [[nodiscard]] SimTime oldest() const { return states_.front().time; }
   /// The newest.
   [[nodiscard]] const RigidBodyState& last() const { return states_.back().state; }
 

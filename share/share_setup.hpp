@@ -8,7 +8,7 @@ namespace pointflight {
 
 /// How processes that share a run keep time.
 enum class ShareTime {
-  kFree,      ///< Each by its wall clock; others' vehicles are moved on by their twist.
+  kFree,      ///< Each by its wall clock; others' vehicles are moved on at their velocities.
   kLockstep,  ///< Step by step together: the bytes of one process.
 };
 /// What becomes of a vehicle's body when nothing is heard of it any more.

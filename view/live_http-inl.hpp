@@ -80,7 +80,8 @@ class LiveServer::Impl::HttpSession : public std::enable_shared_from_this<HttpSe
   void serve(const Request& request) {
     const std::string_view target = as_view(request.target());
     net::post(server_.makers_,
-              [self = shared_from_this(), path = std::string(target.substr(0, target.find('?')))] {
+              [self = shared_from_this(),
+               path = std::string(target.substr(0, target.find('?')))]() mutable {
                 std::optional<WebContent> content;
                 std::string failure;
                 try {
@@ -89,10 +90,12 @@ class LiveServer::Impl::HttpSession : public std::enable_shared_from_this<HttpSe
                 } catch (const std::exception& error) {
                   failure = error.what();
                 }
-                net::post(self->server_.io_,
-                          [self, content = std::move(content), failure = std::move(failure)] {
-                            self->send(content, failure);
-                          });
+                // what it counts lives on the server's thread: it may not end on this one
+                net::io_context& io = self->server_.io_;
+                net::post(io,
+                          [self = std::move(self),
+                           content = std::move(content),
+                           failure = std::move(failure)] { self->send(content, failure); });
               });
   }
 

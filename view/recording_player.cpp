@@ -115,7 +115,7 @@ void RecordingPlayer::obey(const Order& order) {
   if (const auto* pause = std::get_if<PauseOrder>(&order)) {
     playing_ = !pause->pause;
     step_once_ = false;
-    if (playing_ && ended_) jump(SimTime{});
+    if (playing_ && (ended_ || time_ == end_)) jump(SimTime{});
   } else if (std::holds_alternative<StepOrder>(order)) {
     playing_ = step_once_ = !ended_;
   } else if (const auto* rate = std::get_if<RateOrder>(&order)) {

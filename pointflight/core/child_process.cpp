@@ -96,24 +96,7 @@ void restrict_child(const ChildLimits& limits, pid_t parent) {
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (::getppid() != parent) ::_exit(1);  // it ended before the line above
   ::prctl(PR_SET_DUMPABLE, 0);            // no core file, whatever core_pattern says
-  for (const int signal : {SIGINT,
-                           SIGTERM,
-                           SIGHUP,
-                           SIGSEGV,
-                           SIGBUS,
-                           SIGFPE,
-                           SIGILL,
-                           SIGABRT,
-                           SIGXCPU,
-                           SIGXFSZ,
-                           SIGPIPE,
-                           SIGTRAP,
-                           SIGCHLD}) {
-    std::signal(signal, SIG_DFL);
-  }
-  sigset_t none;
-  ::sigemptyset(&none);
-  ::pthread_sigmask(SIG_SETMASK, &none, nullptr);
+  restore_default_signals();
   set_limit(RLIMIT_CORE, 0, 0);
   const auto seconds = static_cast<rlim_t>(std::ceil(std::max(1.0, limits.cpu_seconds)));
   set_limit(RLIMIT_CPU, seconds, seconds + 1);  // SIGXCPU, then SIGKILL
@@ -283,6 +266,27 @@ ChildResult listen(Child& child,
 }
 
 }  // namespace
+
+void restore_default_signals() {
+  for (const int signal : {SIGINT,
+                           SIGTERM,
+                           SIGHUP,
+                           SIGSEGV,
+                           SIGBUS,
+                           SIGFPE,
+                           SIGILL,
+                           SIGABRT,
+                           SIGXCPU,
+                           SIGXFSZ,
+                           SIGPIPE,
+                           SIGTRAP,
+                           SIGCHLD}) {
+    std::signal(signal, SIG_DFL);
+  }
+  sigset_t none;
+  ::sigemptyset(&none);
+  ::pthread_sigmask(SIG_SETMASK, &none, nullptr);
+}
 
 void ChildOutput::write(std::span<const std::byte> bytes) {
   if (!bytes.empty()) write_record(pipe_, Record::kBytes, bytes);

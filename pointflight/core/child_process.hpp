@@ -33,6 +33,10 @@ struct ChildResult {
   std::string failure;           ///< Empty where the work was done, else why not: for a message.
 };
 
+/// Between fork and exec, or in a copy: signals do what they do in a program that was just started,
+/// whatever this one ignores or blocks.
+void restore_default_signals();
+
 /// Runs `work` in a copy of this process (fork), so that a library that crashes, hangs or takes all
 /// memory ends the copy and not the program. Of what `work` changes only what it writes comes back;
 /// what it throws comes back as `failure`. The copy has the calling thread only and nothing on

@@ -33,7 +33,7 @@ struct SeekOrder {
 struct SkipOrder {
   SimTime to;  ///< Of the run; later than it is.
 };
-/// The same, for less than a moment: from here on each instant is due so much earlier.
+/// Of a shared run that lags a little behind: from here on each instant is due so much earlier.
 struct HurryOrder {
   Duration by{0};  ///< Of the wall clock.
 };

@@ -271,13 +271,19 @@ void RunLoop::reset() {
 void RunLoop::say_behind() {
   const auto behind = pace_.fallen_behind(simulation_.time());
   if (!behind) return;
+  // others' rates are the same, and would have to be changed with this one's
+  const std::string instead =
+      simulation_.others() != nullptr
+          ? std::string("share: {time: lockstep}")
+          : fmt::format("--rate {:.1f}, or --lockstep",
+                        std::max(0.1, std::floor(9.0 * behind->rate) / 10.0));
   say(
       fmt::format("warning: {:.1f} s behind: this machine manages a rate of {:.2f}, not {}; "
-                  "use fewer LiDARs, a coarser map or --rate {:.1f}, or --lockstep",
+                  "use fewer LiDARs, a coarser map or {}",
                   behind->seconds,
                   behind->rate,
                   pace_.rate(),
-                  std::max(0.1, std::floor(9.0 * behind->rate) / 10.0)));
+                  instead));
 }
 
 void RunLoop::say(const std::string& line) const {

@@ -64,7 +64,7 @@ std::optional<EndedRun> ended_run(const std::string& folder,
                                   const Simulation& simulation,
                                   const std::vector<std::size_t>& vehicles) {
   constexpr std::size_t kRead = 1 << 17;
-  const fs::path staging = staging_of(folder);
+  const fs::path staging = killed_run_in(folder);
   std::map<std::size_t, std::map<SimTime, VehicleState>> known;
   EndedRun ended{{}, SimTime::max(), Duration{0}, {}};
   std::int64_t skipped = 0;

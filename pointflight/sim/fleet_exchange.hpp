@@ -49,9 +49,8 @@ struct ApartSummary {
   Duration apart{0};          ///< How long it was lost altogether.
   std::uint64_t missed_contacts = 0;   ///< With own vehicles meanwhile, as found afterwards.
   std::uint64_t unknown_contacts = 0;  ///< Losses of which nobody could say afterwards.
-  double extrapolation_bound =
-      0.0;  ///< Upper bound on the position error of any point of its hull then, m.
-  double extrapolated_max = 0.0;  ///< Longest time that its state was moved on, s.
+  double extrapolated_max = 0.0;       ///< Longest time that its state was moved on, s.
+  double extrapolation_bound = 0.0;    ///< How far off any point of its hull was then at most, m.
 };
 
 /// The other processes, as a simulation sees them. Called from the thread that steps it.

@@ -201,6 +201,7 @@ FlightRecorder::FlightRecorder(const std::string& folder,
       write_scans_(simulation.scenario().output.scans),
       shared_(simulation.others() != nullptr ? &simulation : nullptr),
       events_(path_for("events.csv")) {
+  if (shared_ == nullptr) folder_.forget_killed();  // nobody goes on from it
   write_scenario_copy(simulation.scenario(), simulation.map(), folder_.staging(), folder_.path());
   const OutputSetup& output = simulation.scenario().output;
   events_.write(
@@ -279,6 +280,8 @@ void FlightRecorder::write(const StateSample& sample) {
 void FlightRecorder::keep_up(VehicleFiles& files, SimTime time) {
   if (time < files.flushed + kFlushPeriod) return;
   files.trajectory.flush();
+  // the first rows of all vehicles are there: from now on this run is what one goes on from
+  if (files.flushed > SimTime{}) folder_.forget_killed();
   files.flushed = time;
   if (skipped_ == shared_->state().skipped) return;
   skipped_ = shared_->state().skipped;

@@ -17,6 +17,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kStaging = ".partial";
+constexpr const char* kKilled = ".killed";
 constexpr const char* kManifest = "files.txt";
 constexpr const char* kLast = "summary.json";
 
@@ -79,6 +80,12 @@ std::string staging_of(const std::string& folder) {
   return (fs::path(folder) / kStaging).string();
 }
 
+std::string killed_run_in(const std::string& folder) {
+  const fs::path aside = fs::path(folder) / kKilled;
+  std::error_code ignored;
+  return fs::exists(aside, ignored) ? aside.string() : staging_of(folder);
+}
+
 RunFolder::RunFolder(std::string path, Existing existing)
     : path_(std::move(path)), staging_(staging_of(path_)) {
   made_ = make_folder(path_);
@@ -87,7 +94,10 @@ RunFolder::RunFolder(std::string path, Existing existing)
   if (existing == Existing::kRefuse && !fs::is_empty(path_, error)) {
     throw InputError(fmt::format("{}: is not empty; choose another folder or give --force", path_));
   }
-  fs::remove_all(staging_, error);  // of a run that was killed
+  // where something is set aside already, the run that did it had no time to begin
+  const fs::path aside = fs::path(path_) / kKilled;
+  if (!fs::exists(aside, error)) fs::rename(staging_, aside, error);
+  fs::remove_all(staging_, error);
   make_folder(staging_);
 }
 
@@ -97,7 +107,13 @@ RunFolder::~RunFolder() {
   if (open_ && made_) fs::remove(path_, ignored);
 }
 
+void RunFolder::forget_killed() {
+  std::error_code ignored;
+  fs::remove_all(fs::path(path_) / kKilled, ignored);
+}
+
 void RunFolder::commit() {
+  forget_killed();
   const fs::path from = staging_;
   const fs::path to = path_;
   std::vector<fs::path> files = files_below(from);

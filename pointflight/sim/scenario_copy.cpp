@@ -95,7 +95,10 @@ class Inputs {
   std::set<std::string> taken_;
 };
 
-void take_files(Scenario& scenario, Inputs& inputs) {
+/// `inputs` takes settings that name files: `take` each, `take_model` and `take_lidar` those that
+/// may be a shipped one's name.
+template <class Taker>
+void take_files(Scenario& scenario, Taker& inputs) {
   for (VehicleSetup& vehicle : scenario.vehicles) {
     inputs.take_model(vehicle.model);
     for (LidarMount& mount : vehicle.lidars) inputs.take_lidar(mount.model);
@@ -112,6 +115,20 @@ void take_files(Scenario& scenario, Inputs& inputs) {
   }
 }
 
+/// Where the files are.
+struct Paths {
+  std::string from;
+  std::vector<std::string> paths;
+
+  void take(const std::string& setting) {
+    if (!setting.empty()) paths.push_back(resolve_path(setting, from));
+  }
+  void take_model(const std::string& setting) {
+    if (is_model_path(setting)) take(setting);
+  }
+  void take_lidar(const std::string& setting) { take_model(setting); }
+};
+
 /// A link to the map in the folder, or its path where the file system has no links.
 std::string link_to_map(const std::string& map_path,
                         const std::string& folder,
@@ -126,6 +143,13 @@ std::string link_to_map(const std::string& map_path,
 }
 
 }  // namespace
+
+std::vector<std::string> files_of(const Scenario& scenario) {
+  Scenario copy = scenario;
+  Paths paths{scenario.folder(), {}};
+  take_files(copy, paths);
+  return std::move(paths.paths);
+}
 
 void write_scenario_copy(const Scenario& scenario,
                          const SurfelMap& map,

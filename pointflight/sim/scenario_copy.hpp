@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "pointflight/sim/scenario.hpp"
 
@@ -18,5 +19,9 @@ void write_scenario_copy(const Scenario& scenario,
                          const SurfelMap& map,
                          const std::string& folder,
                          const std::string& final_folder);
+
+/// Paths of the files that a scenario names: sensors, vehicles and profiles that are given by path,
+/// obstacles' clouds, keyframes, trajectories; not of the map, nor of tables that sensors name.
+std::vector<std::string> files_of(const Scenario& scenario);
 
 }  // namespace pointflight

@@ -43,6 +43,7 @@ struct SimulationState {
   RunEnd end = RunEnd::kRunning;          ///< How it ended; no step is done after that.
   SimTime busy_until;   ///< That commands from the program last and what is waited after them.
   Duration skipped{0};  ///< Time that was jumped over (`Simulation::skip_to`).
+  Duration earlier{0};  ///< Time that an earlier process simulated (`Simulation::resume_at`).
   std::vector<VehicleStatus> vehicles;  ///< By number.
 };
 
@@ -101,8 +102,9 @@ class Simulation {
   void skip_to(SimTime time);
 
   /// Before the first step: as if the run had come to `time`, of which `skipped` was jumped over,
-  /// with these states of vehicles (by
-  /// number), and with what the scenario told them until then under way. Controllers, batteries and
+  /// with these states of vehicles (by number), and with what the scenario told them until then
+  /// under way. Rotors that stand are those of a wreck, unless the scenario told the vehicle to
+  /// land, to disarm, or to start on the ground and it is there. Controllers, batteries and
   /// what sensors remember are as at the start. Throws as `skip_to`.
   void resume_at(SimTime time, Duration skipped, const std::map<std::size_t, VehicleState>& states);
 
@@ -119,9 +121,9 @@ class Simulation {
 
   /// Of the states that `status` has: the start of the next step.
   [[nodiscard]] SimTime time() const { return state_.time; }
-  /// How much of `time` was simulated: without what was skipped.
+  /// How much of `time` was simulated: without what was skipped, and before `resume_at`.
   [[nodiscard]] Duration simulated() const {
-    return state_.time.time_since_epoch() - state_.skipped;
+    return state_.time.time_since_epoch() - state_.skipped - state_.earlier;
   }
   /// When the run ends by itself: the scenario's duration, or else the end of missions and
   /// commands, which moves as a program gives more; then a landing under way is waited for.

@@ -136,6 +136,7 @@ void Simulation::resume_at(SimTime time,
                            const std::map<std::size_t, VehicleState>& states) {
   move_schedules_to(time);
   state_.skipped = skipped;
+  state_.earlier = time.time_since_epoch() - skipped;
   for (const std::size_t i : own_) state_.vehicles[i].skipped = skipped;
   for (const auto& [number, state] : states) {
     require_vehicle(number);

@@ -242,7 +242,6 @@ void VehicleAgent::resume(VehicleStatus& status, const VehicleState& state, SimT
   const bool rotors_stand = std::all_of(
       state.rotors.begin(), state.rotors.end(), [](const RotorState& r) { return r.speed < 1.0; });
   status.landed = setup_.landed && (state.body.p_world - setup_.start).norm() < kTouchdown;
-  if (rotors_stand && !status.landed) crash(status);  // it lies where it fell
   while (status.next_command < commands_.size() &&
          commands_[status.next_command].time + status.skipped <= time) {
     const TimedCommand& given = commands_[status.next_command++];
@@ -250,6 +249,13 @@ void VehicleAgent::resume(VehicleStatus& status, const VehicleState& state, SimT
     const bool is_given = std::holds_alternative<TrajectoryCommand>(given.command);
     command(status, given.command, is_given ? given.time + status.skipped : time);
     status.scripted = true;
+  }
+  if (!rotors_stand || status.landed) return;
+  const Command& last = status.autopilot.command;
+  if (std::holds_alternative<LandCommand>(last) || std::holds_alternative<DisarmCommand>(last)) {
+    status.landed = true;  // as it was told
+  } else {
+    crash(status);  // it lies where it fell
   }
 }
 

@@ -40,15 +40,40 @@ TEST(Process, EndsWithItsCodeOrItsSignal) {
   EXPECT_EQ(shell(folder, "read x; exit $?").exit_code, 1);  // nothing on its input
 }
 
+TEST(Process, StartsWithTheSignalsOfAnyProgram) {
+  const TemporaryFolder folder;
+  const auto before = std::signal(SIGPIPE, SIG_IGN);  // as our own programs have it
+  EXPECT_EQ(shell(folder, "kill -PIPE $$; exit 3").signal, SIGPIPE);
+  std::signal(SIGPIPE, before);
+  // where somebody ignores the end of children, how they ended is not known; that it is over is
+  const auto child = std::signal(SIGCHLD, SIG_IGN);
+  const ProcessResult ended = shell(folder, "exit 0");
+  std::signal(SIGCHLD, child);
+  EXPECT_EQ(ended.exit_code, -1);
+  EXPECT_EQ(ended.signal, 0);
+}
+
+TEST(Process, ErrorsMayGoElsewhere) {
+  const TemporaryFolder folder;
+  const std::atomic<bool> never = false;
+  ProcessRequest request;
+  request.command = {"sh", "-c", "echo out; echo err >&2"};
+  request.log = folder / "log";
+  request.errors = folder / "errors";
+  EXPECT_EQ(run_process(request, never).exit_code, 0);
+  EXPECT_EQ(read_file(folder / "log"), "out\n");
+  EXPECT_EQ(read_file(folder / "errors"), "err\n");
+}
+
 TEST(Process, IsEndedAfterItsTimeWithAllItStarted) {
   const TemporaryFolder folder;
   const ProcessResult late =
-      shell(folder, "sleep 300 & echo $! >" + (folder / "pid") + "; wait", 0.3);
+      shell(folder, "sleep 300 & echo $! >" + (folder / "pid") + "; wait", 5.0);
   EXPECT_TRUE(late.timed_out);
-  EXPECT_GE(late.wall_seconds, 0.3);
+  EXPECT_GE(late.wall_seconds, 5.0);
   const pid_t left = std::stoi(read_file(folder / "pid"));
   // it may take the system a moment to take it away
-  for (int i = 0; i < 500 && kill(left, 0) == 0; ++i) {
+  for (int i = 0; i < 10'000 && kill(left, 0) == 0; ++i) {
     const std::string state = read_file("/proc/" + std::to_string(left) + "/stat");
     if (state.find(") Z") != std::string::npos) break;
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
@@ -106,6 +131,10 @@ TEST(Share, IsEachFlightOnce) {
   std::sort(all.begin(), all.end());
   EXPECT_EQ(all, numbers);
   EXPECT_EQ(parse_share("3/16").index, 3u);
+  // what the fourth of eight left is spread over seven
+  EXPECT_EQ(even_shares({3, 11, 19, 27, 35, 43, 51}, 8), 7u);
+  EXPECT_EQ(even_shares({0, 1, 2, 3, 4, 5, 6, 7}, 8), 8u);
+  EXPECT_EQ(even_shares({5}, 1), 1u);
   for (const char* wrong : {"", "3", "3/", "/3", "3/3", "-1/3", "0/0", "1.5/3", "a/b"}) {
     expect_contains(error_of([&] { parse_share(wrong); }), "--share");
   }

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
 
 #include "tests/support.hpp"
 
@@ -99,6 +100,14 @@ TEST(Condition, ComparesRatesAndStatistics) {
   }
   expect_contains(error_of([&] { static_cast<void>(Condition("mean(nothing) > 1").holds(runs)); }),
                   "no run tells of nothing");
+  // a planner that leaves no summary.json has no rate that is below anything
+  std::vector<const RunRecord*> silent;
+  const RunRecord untold;
+  silent.push_back(&untold);
+  expect_contains(
+      error_of([&] { static_cast<void>(Condition("collision_rate > 0.02").holds(silent)); }),
+      "no run tells of it");
+  EXPECT_TRUE(Condition("failed_rate > 0.5").holds(silent));
 }
 
 TEST(Tables, HaveTheRunsInTheOrderOfThePlan) {
@@ -150,6 +159,19 @@ TEST(RunRecord, TakesWhatARunLeaves) {
   EXPECT_EQ(r.distance_flown, 5.0);
   EXPECT_EQ(r.tracking_error_rms, 0.3);
   EXPECT_EQ(r.figures.at("latency"), 20.5);
+  // names of columns: those that a summary has not filled
+  testing::write_file(folder / "f.json", R"({"collisions": 3})");
+  expect_contains(error_of([&] { read_results(folder.path(), "f.json", r); }),
+                  "f.json: collisions: ");
+  RunRecord own;
+  std::filesystem::create_directory(folder / "own");
+  testing::write_file(folder / "own/f.json", R"({"collisions": 3, "closest_approach": 0.5})");
+  read_results(folder / "own", "f.json", own);
+  EXPECT_EQ(own.collisions, 3);
+  EXPECT_EQ(own.closest_approach, 0.5);
+  EXPECT_TRUE(own.figures.empty());
+  testing::write_file(folder / "own/f.json", R"({"wall_seconds": 3})");
+  expect_contains(error_of([&] { read_results(folder / "own", "f.json", own); }), "another name");
   testing::write_file(folder / "f.json", R"({"latency": "much"})");
   expect_contains(error_of([&] { read_results(folder.path(), "f.json", r); }),
                   "figures are numbers");

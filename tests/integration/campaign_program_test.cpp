@@ -2,6 +2,7 @@
 #include <csignal>
 #include <filesystem>
 
+#include "pointflight/core/resources.hpp"
 #include "tests/integration/program.hpp"
 
 namespace pointflight::testing {
@@ -68,6 +69,51 @@ TEST_F(Campaigns, ValuesThatDoNotFitTogetherAreAFlightThatFailed) {
   expect_contains(read_file(here_ / "c/runs/000003/log.txt"), "ahead");
 }
 
+TEST_F(Campaigns, TakeKeysThatOnlyMakeSenseTogetherAndOtherMaps) {
+  // gusts of one's own need turbulence: custom, which the scenario does not have
+  const std::string gusts = study(
+      "seeds: 1\ngrid: {air.wind.turbulence: [custom], air.wind.gust_sigma: [[1, 1, 1], [2, 2, "
+      "2]]}\n");
+  const Result windy = run(fmt::format("campaign {} -o {}", gusts, here_ / "windy"));
+  EXPECT_EQ(windy.code, 0) << windy.err;
+  expect_contains(windy.out, "2 of 2 flights");
+  EXPECT_EQ(table("windy").find(",failed,"), std::string::npos);
+  // nothing says that the second map is the first
+  fs::copy(map(), here_ / "same.pfmap");
+  ASSERT_EQ(
+      run(fmt::format("map crop {} -o {} --box 0,0,-50,100,100,8", map(), here_ / "low.pfmap"))
+          .code,
+      0);
+  const std::string maps = study(fmt::format("seeds: 1\ngrid: {{map: [same.pfmap, low.pfmap]}}\n"));
+  const Result result = run(fmt::format("campaign {} -o {}", maps, here_ / "maps"));
+  EXPECT_EQ(result.code, 0) << result.err;
+  EXPECT_EQ(table("maps").find(",failed,"), std::string::npos) << table("maps");
+  EXPECT_NE(read_file(here_ / "maps/runs/000000/scenario.yaml"),
+            read_file(here_ / "maps/runs/000001/scenario.yaml"));
+}
+
+TEST_F(Campaigns, WhatIsHalfTakenAwayIsFlownAgain) {
+  const std::string file = study("seeds: 3\n");
+  ASSERT_EQ(run(fmt::format("campaign {} -o {}", file, here_ / "c")).code, 0);
+  const std::string runs = table("c");
+  fs::remove(here_ / "c/runs/000001/result.json");  // as a --retry-failed that was killed leaves it
+  const Result again = run(fmt::format("campaign {} -o {}", file, here_ / "c"));
+  EXPECT_EQ(again.code, 0) << again.err;
+  EXPECT_EQ(table("c"), runs);
+}
+
+TEST_F(Campaigns, OfAnotherInputAreRefused) {
+  const std::string file = study("seeds: 1\ngrid: {mission.speed: [1]}\n");
+  fs::copy(data_folder() + "/vehicles/quad_330.yaml", here_ / "mine.yaml");
+  std::string text = read_file(here_ / "s.yaml");
+  write_file(here_ / "s.yaml", text.insert(text.find("start:"), "model: mine.yaml, "));
+  ASSERT_EQ(run(fmt::format("campaign {} -o {}", file, here_ / "c")).code, 0);
+  write_file(here_ / "mine.yaml", read_file(here_ / "mine.yaml") + "\n# heavier now\n");
+  const Result other = run(fmt::format("campaign {} -o {}", file, here_ / "c"));
+  EXPECT_EQ(other.code, 2);
+  expect_contains(other.err, "another study, scenario, map, input or version");
+}
+
 TEST_F(Campaigns, GoOnAfterAKillAndComeToTheSame) {
   const std::string file = study("seeds: 12\ngrid: {mission.speed: [1, 2]}\n");
   ASSERT_EQ(run(fmt::format("campaign {} -o {}", file, here_ / "whole")).code, 0);
@@ -121,7 +167,8 @@ TEST_F(Campaigns, AUsersProgramIsJudgedByItsCodeItsFiguresAndItsLimits) {
   expect_contains(result.out, "failed            4 of 6");
   expect_contains(result.out,
                   "flight 2 failed: exit code 7; log: " + (here_ / "c") + "/runs/000002/log.txt");
-  expect_contains(result.out, "again: " + (here_ / "own.sh"));
+  expect_contains(result.out,
+                  fmt::format("again: cd {0} && mkdir -p again && {0}/own.sh", here_.path()));
   EXPECT_EQ(table("c"),
             "run,point,seed,status,reason,end,collisions,closest_approach,simulated_time,"
             "distance_flown,tracking_error_rms,tracking_error_max,latency\n"
@@ -158,7 +205,12 @@ TEST_F(Campaigns, MistakesAreSaidBeforeAnythingFlies) {
   expect_user_error(fly("grid:\n  obstacles[0].count: [1]\n"), "the scenario has 0 of these");
   expect_user_error(fly("draws:\n  count: 1\n  mission.speed: {uniform: [1, 1e6]}\n"),
                     "study.yaml:4: mission.speed:");
+  const std::string good = study("seeds: 1\n");
+  expect_user_error(run(fmt::format("campaign {} -o {} --share 3/3", good, here_ / "c")),
+                    "write it like 0/16");
   EXPECT_FALSE(fs::exists(here_ / "c"));
+  expect_user_error(run(fmt::format("campaign {} -o {}", good, here_.path())),
+                    "is not empty, and no campaign");
   ASSERT_EQ(fly("seeds: 1\n").code, 0);
   expect_user_error(fly("seeds: 2\n"), "is the campaign of another study");
   expect_user_error(

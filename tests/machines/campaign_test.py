@@ -42,7 +42,7 @@ def run(words, **options):
 
 
 def table(folder):
-    return "\n".join(sorted((work / folder / "runs.csv").read_text().splitlines()))
+    return (work / folder / "runs.csv").read_bytes()
 
 
 def fly_and_kill(words, most, longest, **options):

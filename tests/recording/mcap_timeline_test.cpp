@@ -55,8 +55,8 @@ class RawFile {
     append(bytes_, opcode, content);
     return *this;
   }
-  RawFile& describe(std::uint16_t id, const std::string& topic) {
-    return add(Opcode::kSchema, schema(id)).add(Opcode::kChannel, channel(id, topic));
+  RawFile& describe(std::uint16_t id, const std::string& topic, bool latched = false) {
+    return add(Opcode::kSchema, schema(id)).add(Opcode::kChannel, channel(id, topic, latched));
   }
   /// A chunk of messages of a channel, not packed.
   RawFile& chunk(std::uint16_t id, const std::vector<std::uint64_t>& times) {
@@ -79,9 +79,11 @@ class RawFile {
     content.number(id).text("a/msg/B").text("ros2msg").text(text);
     return content;
   }
-  static RecordWriter channel(std::uint16_t id, const std::string& topic) {
+  static RecordWriter channel(std::uint16_t id, const std::string& topic, bool latched = false) {
+    mcap::StringMap metadata;
+    if (latched) metadata["offered_qos_profiles"] = "- durability: 1";
     RecordWriter content;
-    content.number(id).number(id).text(topic).text("cdr").map({});
+    content.number(id).number(id).text(topic).text("cdr").map(metadata);
     return content;
   }
   [[nodiscard]] const std::vector<std::byte>& bytes() const { return bytes_; }
@@ -181,6 +183,56 @@ TEST(McapTimeline, MergesChunksThatOverlap) {
   EXPECT_EQ(times_of(*recording), (std::vector<std::int64_t>{80, 85, 90, 200}));
 }
 
+/// Times of what latched topics held.
+std::vector<std::int64_t> held_before(TimedRecording& recording, std::int64_t time) {
+  std::vector<std::int64_t> times;
+  recording.latched_before(time, [&](const TimedMessage& m) { times.push_back(m.time); });
+  return times;
+}
+
+TEST(McapTimeline, KnowsWhatLatchedTopicsHeldInFilesWithoutIndex) {
+  using Times = std::vector<std::int64_t>;
+  RawFile loose;  // no chunks, as rosbag2 writes with storage preset "fastwrite"
+  loose.describe(1, "/tf_static", true).describe(2, "/a");
+  loose.add(Opcode::kMessage, RawFile::message(1, 30));
+  for (std::uint64_t t = 40; t < 90; ++t) loose.add(Opcode::kMessage, RawFile::message(2, t));
+  EXPECT_EQ(held_before(*timed_mcap(loose.bytes(), "raw"), 80), Times({30}));
+  EXPECT_EQ(held_before(*timed_mcap(loose.bytes(), "raw"), 30), Times());
+  RawFile chunks;  // that overlap: the one that begins later does not hold what is latest
+  chunks.describe(1, "/tf_static", true).describe(2, "/a");
+  chunks.chunk(1, {20, 95, 70}).chunk(2, {30, 40}).chunk(1, {50, 60});
+  const auto recording = timed_mcap(chunks.bytes(), "raw");
+  EXPECT_EQ(held_before(*recording, 100), Times({95}));
+  EXPECT_EQ(held_before(*recording, 95), Times({70}));
+  EXPECT_EQ(held_before(*recording, 65), Times({60}));
+  EXPECT_EQ(held_before(*recording, 50), Times({20}));
+}
+
+TEST(McapTimeline, LongFilesWithoutChunksAreTakenInPieces) {
+  RawFile file;
+  file.describe(1, "/a");
+  std::vector<std::byte> large(std::size_t{1} << 20);
+  for (std::uint64_t t = 100; t < 112; ++t) {
+    RecordWriter content = RawFile::message(1, t);
+    content.raw(large);
+    file.add(Opcode::kMessage, content);
+  }
+  const auto recording = timed_mcap(file.bytes(), "raw");
+  EXPECT_EQ(times_of(*recording).size(), 12u);
+  recording->seek(109);
+  EXPECT_EQ(times_of(*recording), (std::vector<std::int64_t>{109, 110, 111}));
+}
+
+TEST(McapTimeline, AChunkWithoutMessagesHasNoTime) {
+  RawFile file;
+  RecordWriter nothing;  // as the specification has it: both times are 0
+  nothing.number<std::uint64_t>(0).number<std::uint64_t>(0);
+  nothing.number<std::uint64_t>(0).number<std::uint32_t>(0).text("").number<std::uint64_t>(0);
+  file.describe(1, "/a").add(Opcode::kChunk, nothing).chunk(1, {1000, 2000});
+  EXPECT_EQ(timed_mcap(file.bytes(), "raw")->range(),
+            std::pair(std::int64_t{1000}, std::int64_t{2000}));
+}
+
 TEST(McapTimeline, TakesMessagesBesideChunks) {
   RawFile file;
   file.describe(1, "/a");
@@ -206,6 +258,11 @@ TEST(McapTimeline, RefusesWhatIsNone) {
     bomb.add(Opcode::kChannel, channel);
   }
   expect_contains(error_of([&] { timed_mcap(bomb.bytes(), "x.mcap"); }), "longer than 64 MiB");
+  RawFile types;  // a hundred of them that nobody uses
+  for (std::uint16_t id = 1; id < 100; ++id) {
+    types.add(Opcode::kSchema, RawFile::schema(id, std::string(std::size_t{1} << 20, 'x')));
+  }
+  expect_contains(error_of([&] { timed_mcap(types.bytes(), "x.mcap"); }), "longer than 64 MiB");
 }
 
 TEST(McapTimeline, LeavesOutTimesThatNoClockShows) {

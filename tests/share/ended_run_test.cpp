@@ -22,6 +22,13 @@ using testing::TemporaryFolder;
 using testing::through_each_other;
 using testing::write_file;
 
+/// A scenario's copy names its map.
+Scenario of_a_map() {
+  Scenario scenario = through_each_other();
+  scenario.map = "hall.pfmap";
+  return scenario;
+}
+
 /// Where the vehicles were at each instant, beside the files.
 class Truth : public SampleSink {
  public:
@@ -42,7 +49,7 @@ class EndedRunTest : public ::testing::Test {
   EndedRunTest()
       : bus_([this] { return now_; }),
         member_(
-            bus_, through_each_other(), {0, 1}, [this] { return now_; }, 1),
+            bus_, of_a_map(), {0, 1}, [this] { return now_; }, 1),
         killed_(folder_ / "killed") {
     FlightRecorder recorder(folder_ / "run", member_.simulation, Existing::kRefuse);
     Truth truth(recorder);
@@ -51,6 +58,7 @@ class EndedRunTest : public ::testing::Test {
     }
     truth_ = std::move(truth.states);
     // as a kill leaves it: the recorder has had no time to take its files away
+    fs::create_directory(killed_);
     fs::copy(staging_of(folder_ / "run"), staging_of(killed_), fs::copy_options::recursive);
   }
 
@@ -103,6 +111,33 @@ TEST_F(EndedRunTest, IsTheLatestInstantThatAllHave) {
   EXPECT_GT(run->time, SimTime(std::chrono::milliseconds(1000)));
   EXPECT_LT(run->time, SimTime(std::chrono::milliseconds(2000)));
   expect_truth(*run);
+}
+
+TEST_F(EndedRunTest, IsThereUntilTheNextProcessHasBegun) {
+  const auto before = ended();
+  ASSERT_TRUE(before);
+  const auto is_the_same = [&] {
+    const auto now = ended();
+    return now && now->time == before->time;
+  };
+  {
+    const FlightRecorder refused(killed_, member_.simulation, Existing::kReplace);
+    EXPECT_TRUE(is_the_same());
+  }
+  EXPECT_TRUE(is_the_same());
+  // one that was killed while it waited for the others
+  fs::create_directory(staging_of(killed_));
+  Member next(
+      bus_, of_a_map(), {0, 1}, [this] { return now_; }, 2);
+  next.simulation.resume_at(before->time, before->skipped, before->states);
+  FlightRecorder recorder(killed_, next.simulation, Existing::kReplace);
+  EXPECT_TRUE(is_the_same());
+  next.simulation.advance_to(before->time + std::chrono::milliseconds(500), recorder);
+  const auto now = ended();
+  ASSERT_TRUE(now);
+  EXPECT_GT(now->time, before->time);
+  recorder.finish(next.simulation);
+  EXPECT_FALSE(ended());
 }
 
 TEST_F(EndedRunTest, RowsThatAreCutOrNoStatesAreLeftOut) {

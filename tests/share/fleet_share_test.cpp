@@ -153,6 +153,25 @@ TEST(FleetShare, WhoIsSilentIsLostAndWhatWasMissedIsSaidAfterwards) {
   }
 }
 
+TEST(FleetShare, WhatIsForgottenWhenTheyMeetAgainIsUnknown) {
+  if (testing::kSanitized) GTEST_SKIP() << "two minutes of flight, step by step";
+  World world;
+  Scenario scenario = through_each_other();
+  scenario.duration = 150.0;
+  for (VehicleSetup& v : scenario.vehicles) v.mission.waypoints.resize(1);  // then they hover
+  Member& a = world.add(scenario, {0});
+  Member& b = world.add(scenario, {1});
+  world.pass(2.2);
+  world.bus.loses = [](std::size_t, std::size_t, ShareChannel) { return true; };
+  world.pass(130.0);  // they remember two minutes
+  world.bus.loses = nullptr;
+  world.pass(0.5);
+  for (const Member* member : {&a, &b}) {
+    EXPECT_EQ(member->share->apart().front().losses, 1u);
+    EXPECT_EQ(member->share->apart().front().unknown_contacts, 1u);
+  }
+}
+
 TEST(FleetShare, WhoHasStoodStillGoesOnWhereTheOthersAre) {
   World world;
   const Scenario scenario = through_each_other();
@@ -249,7 +268,7 @@ TEST(FleetShare, WhoDoesNotFitIsRefusedOrLeftOut) {
   world.members.pop_back();
   other = through_each_other();
   other.vehicles[1].model = "quad_250";
-  expect_contains(joins(other, {1}), "another vehicles or sensors");
+  expect_contains(joins(other, {1}), "another set of vehicles or sensors");
   world.members.pop_back();
   // what a process writes and where its files lie does not matter
   other = through_each_other();
@@ -344,7 +363,15 @@ TEST(FleetShare, WhoSpeaksInAnothersNameIsNotHeardAndNoNumberIsTooLarge) {
   EXPECT_LT((a.simulation.status(1).state.body.p_world - b.simulation.status(1).state.body.p_world)
                 .norm(),
             0.01);
-  // the process itself, out of its mind
+  // the process itself, with less in its introduction than it said at first
+  left.phase = share_msg::Phase::kFlying;
+  left.parts.clear();
+  const std::uint64_t foreign = a.share->foreign();
+  world.bus.shout(ShareChannel::kCrew, encode<Wire::kCdr>(left), 1);
+  world.pass(0.1);
+  EXPECT_EQ(a.share->foreign(), foreign + 1);
+  EXPECT_TRUE(a.simulation.status(1).present);
+  // out of its mind
   constexpr std::int64_t kEnds[] = {std::numeric_limits<std::int64_t>::max(),
                                     std::numeric_limits<std::int64_t>::min()};
   for (const std::int64_t end : kEnds) {

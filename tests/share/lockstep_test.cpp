@@ -146,7 +146,9 @@ TEST(FleetShare, LockstepGoesOnWithoutWhoIsLostAndTakesItBack) {
       while (m.simulation.step(m.sink)) {
         m.obey_share();
         reached[i] = m.simulation.time().time_since_epoch().count();
-        std::this_thread::sleep_for(std::chrono::milliseconds(i == 2 ? 2 : 1));
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+        // the third one is slower, alone
+        while (i == 2 && cut && reached[0] < reached[2] + 200'000'000) std::this_thread::yield();
       }
       m.share->leave();
     });
@@ -160,7 +162,7 @@ TEST(FleetShare, LockstepGoesOnWithoutWhoIsLostAndTakesItBack) {
     bus.lose(2, i);
     bus.lose(i, 2);
   }
-  wait_for(0, 0.8);  // the third one is slower, alone as well
+  wait_for(0, 0.8);
   cut = false;
   bus.tell_crew();
   for (std::thread& thread : threads) thread.join();
@@ -172,11 +174,35 @@ TEST(FleetShare, LockstepGoesOnWithoutWhoIsLostAndTakesItBack) {
     EXPECT_EQ(std::count(kinds.begin(), kinds.end(), "back"), member == members[2] ? 2 : 1);
     for (const ApartSummary& other : member->share->apart()) {
       EXPECT_EQ(other.losses, member == members[2] || other.vehicle == 2 ? 1u : 0u);
+      EXPECT_EQ(other.unknown_contacts, 0u);  // they have told each other where they were
     }
   }
   // the one that was slower has jumped to where the others were
   EXPECT_GT(to_seconds(members[2]->simulation.state().skipped), 0.05);
   EXPECT_EQ(members[0]->simulation.state().skipped, Duration{0});
+}
+
+TEST(FleetShare, LockstepThatGoesOnFromALogWaitsForTheOthersAsAnyDoes) {
+  Scenario scenario = three(ShareTime::kLockstep);
+  scenario.obstacles.clear();
+  for (VehicleSetup& v : scenario.vehicles) v.lidars.clear();
+  std::int64_t now = 1'000'000'000;
+  const auto clock = [&now] { return now; };
+  Bus bus(clock);
+  Member a(bus, scenario, {0, 1}, clock, 1);
+  const auto is_ready_within = [&](Member& member, double seconds) {
+    for (const std::int64_t end = now + std::llround(1e9 * seconds); now < end; now += 10'000'000) {
+      if (member.link->is_ready()) return true;
+    }
+    return false;
+  };
+  a.simulation.resume_at(SimTime(std::chrono::milliseconds(500)), Duration{0}, {});
+  EXPECT_FALSE(is_ready_within(a, 5.0));
+  ASSERT_FALSE(a.lines.empty());
+  EXPECT_EQ(a.lines.back(), "--share test: waiting for a process that flies c");
+  Member b(bus, scenario, {2}, clock, 2);
+  EXPECT_TRUE(is_ready_within(b, 0.1));
+  EXPECT_TRUE(is_ready_within(a, 0.1));
 }
 
 TEST(FleetShare, StepsAheadComeOutTheSameEachTime) {

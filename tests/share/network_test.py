@@ -46,18 +46,30 @@ class Swarm:
         return path
 
     def fly(self, host, scenario, output, run, vehicles, *flags):
-        process = self.network.on(host, [self.program, "fly", str(scenario), "-o", str(self.folder / output),
-                                         "--share", run, "--vehicles", vehicles, "--no-picture", *flags],
-                                  stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+        log = self.folder / f"{output}.log"
+        with log.open("w") as stderr:
+            process = self.network.on(host, [self.program, "fly", str(scenario), "-o", str(self.folder / output),
+                                             "--share", run, "--vehicles", vehicles, "--no-picture", *flags],
+                                      stdout=subprocess.DEVNULL, stderr=stderr)
+        process.log = log
         self.running.append(process)
         return process
 
+    def wait_for(self, process, words):
+        """Until it has said so; for a hang, not for a slow machine."""
+        until = time.monotonic() + 120
+        while words not in process.log.read_text():
+            check(process.poll() is None and time.monotonic() < until,
+                  f"never said '{words}': {process.log.read_text()[-2000:]}")
+            time.sleep(0.02)
+
     def end(self, process, codes=(0, 1)):
         try:
-            _, said = process.communicate(timeout=120)
+            process.wait(timeout=120)
         except subprocess.TimeoutExpired:
             process.kill()
-            raise AssertionError("hangs: " + process.communicate()[1][-2000:])
+            raise AssertionError("hangs: " + process.log.read_text()[-2000:])
+        said = process.log.read_text()
         check(process.returncode in codes, f"exit {process.returncode}: {said}")
         return said
 
@@ -69,6 +81,7 @@ class Swarm:
         noise = None
         if stranger:
             noise = self.network.on("three", [stranger, "50", "steps", "60", "1"])
+            self.running.append(noise)
             time.sleep(1)
         # any order, any host, two vehicles or one
         c = self.fly("one", scenario, "c", "steps", "c", "--record", str(self.folder / "c.mcap"))
@@ -106,26 +119,32 @@ class Swarm:
         return {topic["name"]: topic["messages"] for topic in json.loads(info.stdout)["topics"]}
 
     def free(self):
-        scenario = self.scenario("free.yaml", 6, "free")
+        scenario = self.scenario("free.yaml", 600, "free")  # nobody ends by itself
         a = self.fly("one", scenario, "fa", "free", "a")
-        time.sleep(2.5)
+        self.wait_for(a, "hears nobody else")
+        time.sleep(1.5)  # so that who comes now comes late
         thief = self.fly("two", scenario, "thief", "free", "a,b")
         said = self.end(thief, (2,))
         check("flies a (vehicle 0) too" in said and not (self.folder / "thief").exists(), said)
         world = self.fly("three", scenario, "world", "free", "b", "--seed", "5")
         check("another seed (1 there, 5 here)" in self.end(world, (2,)), "another seed flies")
-        other = self.scenario("lease.yaml", 6, "free")
+        other = self.scenario("lease.yaml", 600, "free")
         other.write_text(other.read_text().replace("lease: 5", "lease: 1"))
         lease = self.fly("three", other, "lease", "free", "b")
         check("another scenario" in self.end(lease, (2,)), "another lease flies")
         b = self.fly("two", scenario, "fb", "free", "b")
         c = self.fly("three", scenario, "fc", "free", "c")
-        time.sleep(2)
+        for process in (a, c):
+            self.wait_for(process, "flies b")
+        for process in (a, b):
+            self.wait_for(process, "flies c")
+        self.wait_for(c, "flying")
         c.send_signal(signal.SIGINT)
-        said = self.end(c, (130,))
-        said = self.end(a)
-        check("has left" in said and "flies b" in said, said)
-        self.end(b)
+        self.end(c, (130,))
+        for process in (a, b):
+            self.wait_for(process, "has left")
+            process.send_signal(signal.SIGINT)
+            self.end(process, (130,))
         summary = json.loads((self.folder / "fa" / "summary.json").read_text())
         others = {other["name"]: other for other in summary["others"]}
         check(set(others) == {"b", "c"} and others["b"]["losses"] == 0, f"{others}")

@@ -42,6 +42,10 @@ TEST(Simulation, TimeThatIsSkippedHasNotPassedForVehicles) {
     EXPECT_TRUE(gap == std::chrono::milliseconds(100) ||
                 times.scans[i] == SimTime(std::chrono::milliseconds(7800)));
   }
+  // the first scan after the jump begins with the next turn
+  EXPECT_EQ(
+      std::count(times.scans.begin(), times.scans.end(), SimTime(std::chrono::milliseconds(7800))),
+      1);
   EXPECT_TRUE(std::is_sorted(times.states.begin(), times.states.end()));
   EXPECT_THROW(simulation.skip_to(SimTime{}), std::invalid_argument);
   Simulation other(scenario, hall(), executor);
@@ -64,6 +68,40 @@ TEST(Simulation, GoesOnWhereALogEnds) {
   EXPECT_LT((resumed.status(0).state.body.p_world - whole.status(0).state.body.p_world).norm(),
             0.02);
   EXPECT_LT(resumed.summary(0).tracking_error_max, 0.2);
+  EXPECT_EQ(resumed.simulated(), Duration(std::chrono::seconds(5)));
+}
+
+TEST(Simulation, WhoHasLandedIsNoWreckWhereALogEnds) {
+  Scenario scenario = through_each_other();
+  scenario.vehicles.resize(1);
+  VehicleSetup& v = scenario.vehicles[0];
+  v.mission.waypoints.clear();
+  v.start.z() = 0.6;
+  v.commands.resize(2);
+  v.commands[0].kind = CommandKind::kLand;
+  v.commands[0].time = 0.5;
+  v.commands[1].kind = CommandKind::kTakeOff;
+  v.commands[1].time = 9.0;
+  scenario.duration = 14.0;
+  const Executor executor(1);
+  Simulation whole(scenario, hall(), executor);
+  ByteSink sink;
+  const SimTime logged(std::chrono::seconds(8));
+  whole.advance_to(logged, sink);
+  ASSERT_TRUE(whole.status(0).landed);
+  ASSERT_LT(whole.status(0).state.rotors[0].speed, 1.0);
+  Simulation resumed(scenario, hall(), executor);
+  resumed.resume_at(logged, Duration{0}, {{0, whole.status(0).state}});
+  EXPECT_TRUE(resumed.status(0).landed);
+  while (resumed.step(sink)) {
+  }
+  EXPECT_FALSE(resumed.status(0).crashed);
+  EXPECT_GT(resumed.status(0).state.body.p_world.z(), 0.8);  // it has taken off again
+  // nobody told this one to stop its rotors
+  scenario.vehicles[0].commands.clear();
+  Simulation fallen(scenario, hall(), executor);
+  fallen.resume_at(logged, Duration{0}, {{0, whole.status(0).state}});
+  EXPECT_TRUE(fallen.status(0).crashed);
 }
 
 }  // namespace
