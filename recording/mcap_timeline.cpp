@@ -277,6 +277,7 @@ class McapTimeline : public TimedRecording {
     }
     const std::vector<Piece>& pieces = outline_.pieces();
     std::vector<std::int64_t> reach;  // the latest end of each piece and all before it
+    reach.reserve(pieces.size());
     for (const Piece& piece : pieces) {
       reach.push_back(reach.empty() ? piece.end : std::max(reach.back(), piece.end));
     }

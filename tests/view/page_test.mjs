@@ -292,6 +292,7 @@ try {
     const row = table.reduce((best, r) => (Math.abs(r[0] - to) < Math.abs(best[0] - to) ? r : best));
     await wait(`its place at ${to} s, ${row.slice(1, 4)}`,
       (place) => place.every((v, i) => Math.abs(window.pointflight.state.vehicles[0].state.p[i] - v) < 0.1), row.slice(1, 4));
+    await wait("a scan of then", () => window.pointflight.state.recording.trails.some((t) => !t.byHeight && t.scans.length > 0));
     // scans lie in the world where the walls are
     const world = await film.evaluate(() => {
       const { THREE, state } = window.pointflight;
