@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <csignal>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -346,6 +347,7 @@ void check_flags(const CampaignFlags& flags) {
 
 int run_campaign(const CampaignFlags& flags) {
   check_flags(flags);
+  std::signal(SIGCHLD, SIG_DFL);  // whoever started us may ignore it: no child's end would be known
   std::vector<Condition> conditions;
   for (const std::string& text : flags.fail_if) conditions.emplace_back(text);
   if (flags.engine == "mpi") return fly_by_mpi(flags, conditions);

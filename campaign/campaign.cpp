@@ -149,13 +149,10 @@ bool Campaign::fits_in_a_flight(const std::string& key, const std::string& value
   }
 }
 
-/// Each value of each axis, and the ends of each draw, fit the scenario.
+/// Each value of each axis, and the ends of each draw, fit the scenario, and their files are there.
 void Campaign::check_values() {
   const auto check = [&](const std::string& key, const std::string& value, int line) {
-    try {
-      take_inputs(parse_scenario(edited_scenario(scenario_text_, {key}, {value}), scenario_path_));
-    } catch (const InputError& error) {
-      if (fits_in_a_flight(key, value)) return;  // it makes sense beside other keys' values only
+    const auto refuse = [&](const InputError& error) {
       // lines are of the edited text, which nobody sees
       std::string why = error.what();
       if (why.starts_with(scenario_path_ + ":")) {
@@ -163,6 +160,18 @@ void Campaign::check_values() {
       }
       if (why.find(key) == std::string::npos) why.insert(0, key + ": ");
       throw InputError(fmt::format("{}:{}: {}", study_.path, line, why));
+    };
+    Scenario scenario;
+    try {
+      scenario = parse_scenario(edited_scenario(scenario_text_, {key}, {value}), scenario_path_);
+    } catch (const InputError& error) {
+      if (fits_in_a_flight(key, value)) return;  // it makes sense beside other keys' values only
+      refuse(error);
+    }
+    try {
+      take_inputs(scenario);
+    } catch (const InputError& error) {
+      refuse(error);
     }
   };
   constexpr std::size_t kMost = 1000;  // of a long list: a second
@@ -288,8 +297,8 @@ void Campaign::remove_leftovers() const {
     if (pid <= 0 || pid == getpid()) continue;
     if (kill(static_cast<pid_t>(pid), 0) == 0 || errno != ESRCH) continue;
     try {
-      const FolderLock lock(
-          at->path().string());  // processes of containers have numbers of their own
+      // containers have process numbers of their own: whoever flies there holds the folder
+      const FolderLock lock(at->path().string());
       std::error_code ignored;
       fs::remove_all(at->path(), ignored);
     } catch (const InputError&) {  // somebody flies there

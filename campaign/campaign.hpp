@@ -71,8 +71,8 @@ class Campaign {
   Plan plan_;
   std::string scenario_path_;
   std::string scenario_text_;
-  std::map<std::string, std::shared_ptr<const SurfelMap>>
-      maps_;                                     ///< By path, as scenarios have it.
+  /// By path, as scenarios have it.
+  std::map<std::string, std::shared_ptr<const SurfelMap>> maps_;
   std::map<std::string, std::uint64_t> inputs_;  ///< Hashes of other files, by path.
 };
 

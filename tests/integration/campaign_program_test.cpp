@@ -205,6 +205,9 @@ TEST_F(Campaigns, MistakesAreSaidBeforeAnythingFlies) {
   expect_user_error(fly("grid:\n  obstacles[0].count: [1]\n"), "the scenario has 0 of these");
   expect_user_error(fly("draws:\n  count: 1\n  mission.speed: {uniform: [1, 1e6]}\n"),
                     "study.yaml:4: mission.speed:");
+  expect_user_error(fly("grid: {map: [nowhere.pfmap]}\n"), "study.yaml:2: map: ");
+  expect_user_error(fly("grid: {vehicle.model: [./nowhere.yaml]}\n"),
+                    "study.yaml:2: vehicle.model: ");
   const std::string good = study("seeds: 1\n");
   expect_user_error(run(fmt::format("campaign {} -o {} --share 3/3", good, here_ / "c")),
                     "write it like 0/16");
