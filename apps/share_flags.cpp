@@ -75,7 +75,8 @@ void check_share_flags(const ShareFlags& flags) {
     return;
   }
   if (!is_ros_word(flags.name) || flags.name.size() > kNameMost) {
-    throw InputError(fmt::format("--share: '{}'; letters, digits and _ only", flags.name));
+    throw InputError(fmt::format(
+        "--share: '{}'; letters, digits and _ only, {} at most", flags.name, kNameMost));
   }
   if (flags.vehicles.empty()) {
     throw InputError("--share: say which vehicles this process flies with --vehicles 0-3");

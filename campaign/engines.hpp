@@ -32,8 +32,8 @@ struct Share {
 Share parse_share(const std::string& text);
 /// Of these, the flights whose number leaves `index` when divided by `of`.
 std::vector<std::size_t> share_of(const std::vector<std::size_t>& numbers, const Share& share);
-/// Into how many shares, half of `most` to `most`, these flights are divided most evenly: what one
-/// of eight tasks has left is all of one share of eight.
+/// Into how many shares, `most` or a few less, these flights are divided most evenly: what one of
+/// eight tasks has left is all of one share of eight.
 std::size_t even_shares(const std::vector<std::size_t>& numbers, std::size_t most);
 
 /// How Slurm is asked.

@@ -97,6 +97,7 @@ RunFolder::RunFolder(std::string path, Existing existing)
   // where something is set aside already, the run that did it had no time to begin
   const fs::path aside = fs::path(path_) / kKilled;
   if (!fs::exists(aside, error)) fs::rename(staging_, aside, error);
+  has_killed_ = fs::exists(aside, error);
   fs::remove_all(staging_, error);
   make_folder(staging_);
 }
@@ -108,6 +109,7 @@ RunFolder::~RunFolder() {
 }
 
 void RunFolder::forget_killed() {
+  if (!std::exchange(has_killed_, false)) return;
   std::error_code ignored;
   fs::remove_all(fs::path(path_) / kKilled, ignored);
 }

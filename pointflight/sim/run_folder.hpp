@@ -49,6 +49,7 @@ class RunFolder {
   std::string staging_;
   bool made_ = false;  ///< The folder was not there.
   bool open_ = true;
+  bool has_killed_ = false;  ///< Something is set aside.
   std::optional<FolderLock> lock_;
 };
 

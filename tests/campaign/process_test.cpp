@@ -135,6 +135,7 @@ TEST(Share, IsEachFlightOnce) {
   EXPECT_EQ(even_shares({3, 11, 19, 27, 35, 43, 51}, 8), 7u);
   EXPECT_EQ(even_shares({0, 1, 2, 3, 4, 5, 6, 7}, 8), 8u);
   EXPECT_EQ(even_shares({5}, 1), 1u);
+  EXPECT_EQ(even_shares(std::vector<std::size_t>(100'000, 7), 100'000), 100'000u);  // at once
   for (const char* wrong : {"", "3", "3/", "/3", "3/3", "-1/3", "0/0", "1.5/3", "a/b"}) {
     expect_contains(error_of([&] { parse_share(wrong); }), "--share");
   }
