@@ -255,6 +255,17 @@ int finish(const Campaign& campaign,
   return code;
 }
 
+/// What attempts left that were killed.
+void clear(const Campaign& campaign) {
+  const std::size_t left = campaign.remove_leftovers();
+  if (left == 0) return;
+  log(fmt::format(
+      "{} interrupted flights left files of your program in {}/runs/*.attempt-*; they stay until "
+      "you remove them",
+      left,
+      campaign.folder()));
+}
+
 /// A worker's part: no tables, and nobody is kept out.
 int fly_share(const Campaign& campaign, const CampaignFlags& flags) {
   const StopWatch watch;
@@ -270,7 +281,7 @@ int coordinate(Campaign& campaign,
                const std::vector<Condition>& conditions) {
   const FolderLock lock(campaign.folder());
   const StopWatch watch;
-  campaign.remove_leftovers();
+  clear(campaign);
   if (flags.retry) campaign.forget_failed();
   const std::vector<std::size_t> missing = campaign.missing();
   if (!missing.empty() && flags.engine == "slurm") {
@@ -309,7 +320,7 @@ int fly_by_mpi(const CampaignFlags& flags, const std::vector<Condition>& conditi
   if (is_first) {
     campaign.emplace(load_study(flags.study), flags.folder, own_program());
     lock.emplace(flags.folder);
-    campaign->remove_leftovers();
+    clear(*campaign);
     if (flags.retry) campaign->forget_failed();
   }
   mpi.meet();  // the folder is there

@@ -20,6 +20,7 @@
 #include "apps/perspective.hpp"
 #include "apps/pictures.hpp"
 #include "pointflight/core/input_error.hpp"
+#include "pointflight/core/locked_file.hpp"
 
 namespace pointflight::apps {
 namespace {
@@ -172,7 +173,10 @@ std::size_t film_run(RecordedRun& run, const FilmOptions& options, const Progres
   return pictures;
 }
 
-void make_video(const FilmOptions& options, const std::string& path) {
+namespace {
+
+/// Runs ffmpeg over the pictures; `name` is what the user calls the film.
+void encode(const FilmOptions& options, const std::string& path, const std::string& name) {
   const std::string rate = fmt::format("{:g}", options.rate);
   const std::string input = (fs::path(options.frames) / "%06d.png").string();
   std::vector<std::string> words = {"ffmpeg",
@@ -202,8 +206,30 @@ void make_video(const FilmOptions& options, const std::string& path) {
   while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
   }
   if (!WIFEXITED(status) || WEXITSTATUS(status) != 0) {
-    throw InputError(fmt::format("--video {}: ffmpeg could not write it (above)", path));
+    throw InputError(fmt::format("--video {}: ffmpeg could not write it (above)", name));
   }
+}
+
+}  // namespace
+
+void make_video(const FilmOptions& options, const std::string& path) {
+  // under a name beside it until it is complete; ffmpeg goes by the extension
+  const OutputName name(path);
+  const fs::path end(path);
+  const std::string partial =
+      (end.parent_path() /
+       fmt::format(".{}.pointflight{}", end.stem().string(), end.extension().string()))
+          .string();
+  const int lock = open_locked(partial, path);
+  try {
+    encode(options, partial, path);
+    name.take(partial, lock);
+  } catch (...) {
+    remove_locked(lock, partial);
+    ::close(lock);
+    throw;
+  }
+  ::close(lock);
 }
 
 }  // namespace pointflight::apps

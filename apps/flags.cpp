@@ -1,6 +1,9 @@
 #include "apps/flags.hpp"
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -9,6 +12,7 @@
 
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/input_error.hpp"
+#include "pointflight/core/locked_file.hpp"
 #include "pointflight/geometry/rotation.hpp"
 #include "pointflight/io/byte_cursor.hpp"
 #include "pointflight/render/renderer.hpp"
@@ -58,17 +62,84 @@ void add_force_flag(CLI::App& app, bool& force) {
   app.add_flag("--force", force, "Replace outputs that are there already");
 }
 
-void refuse_to_overwrite(const std::string& output, bool force) {
-  if (output.empty()) return;
+namespace {
+
+namespace fs = std::filesystem;
+
+/// What a command may read of a folder: a file in it or below, but no map and no picture.
+bool is_read_from(const std::string& file, const std::string& folder) {
   std::error_code ignored;
-  const auto status = std::filesystem::status(output, ignored);
-  if (!std::filesystem::exists(status)) return;
-  if (!std::filesystem::is_regular_file(status)) {
-    throw InputError(
-        fmt::format("{}: is there and is not a regular file; give the path of a file", output));
-  }
-  if (!force) {
+  if (file.ends_with(".pfmap") || file.ends_with(".png")) return false;
+  if (!fs::is_directory(folder, ignored)) return false;
+  const fs::path relative = fs::weakly_canonical(fs::absolute(file, ignored), ignored)
+                                .lexically_relative(fs::canonical(folder, ignored));
+  return !relative.empty() && *relative.begin() != "..";
+}
+
+/// True if a killed program has left it, or it is somebody's: not if it is being written.
+bool is_left_over(const std::string& partial) {
+  const int file = ::open(partial.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
+  if (file < 0) return false;
+  struct stat status {};
+  const bool is_left = ::fstat(file, &status) == 0 && S_ISREG(status.st_mode) &&
+                       status.st_size > 0 && ::flock(file, LOCK_EX | LOCK_NB) == 0;
+  ::close(file);
+  return is_left;
+}
+
+/// Returns true if there is a file that the output will replace.
+bool check_output(const std::string& output, bool force) {
+  const OutputName name(output);  // refuses links, folders, devices
+  std::error_code ignored;
+  const bool is_there = fs::exists(output, ignored);
+  if (is_there && !force) {
     throw InputError(fmt::format("{}: is there already; give another name or --force", output));
+  }
+  if (!force && is_left_over(output + ".partial")) {
+    throw InputError(fmt::format(
+        "{0}.partial: is there already, left by a program that was killed or yours; move it away, "
+        "give another name, or --force",
+        output));
+  }
+  return is_there;
+}
+
+[[noreturn]] void refuse_twice(const std::string& output) {
+  throw InputError(
+      fmt::format("{}: this command reads or writes that file already; give another name", output));
+}
+
+}  // namespace
+
+bool is_same_file(const std::string& a, const std::string& b) {
+  std::error_code ignored;
+  const auto full = [&](const std::string& path) {
+    return fs::weakly_canonical(fs::absolute(path, ignored), ignored);
+  };
+  return fs::equivalent(a, b, ignored) || full(a) == full(b);
+}
+
+void check_outputs(const std::vector<std::string>& outputs,
+                   const std::vector<std::string>& inputs,
+                   bool force) {
+  std::vector<std::string> others;
+  for (const std::string& output : outputs) {
+    if (output.empty()) continue;
+    for (const std::string& input : inputs) {
+      if (!input.empty() && is_same_file(output, input)) refuse_twice(output);
+    }
+    for (const std::string& other : others) {
+      if (is_same_file(output, other) || is_same_file(output, other + ".partial") ||
+          is_same_file(output + ".partial", other)) {
+        refuse_twice(output);
+      }
+    }
+    if (check_output(output, force)) {
+      for (const std::string& input : inputs) {
+        if (!input.empty() && is_read_from(output, input)) refuse_twice(output);
+      }
+    }
+    others.push_back(output);
   }
 }
 
@@ -82,14 +153,6 @@ void make_picture_folder(const std::string& folder, bool force) {
   if (!force && !std::filesystem::is_empty(folder, error)) {
     throw InputError(
         fmt::format("{}: is not empty; choose another folder or give --force", folder));
-  }
-}
-
-void refuse_same_file(const std::string& output, const std::string& input) {
-  std::error_code ignored;
-  if (output == input || std::filesystem::equivalent(output, input, ignored)) {
-    throw InputError(fmt::format(
-        "{}: this command reads or writes that file already; give another name", output));
   }
 }
 

@@ -31,9 +31,16 @@ std::vector<std::string> renderer_names();
 /// --force: outputs may replace what is there.
 void add_force_flag(CLI::App& app, bool& force);
 
-/// Throws InputError where an output is there already, unless it may be replaced. An empty name is
-/// no output.
-void refuse_to_overwrite(const std::string& output, bool force);
+/// True if both paths mean one file, whether it is there or not.
+bool is_same_file(const std::string& a, const std::string& b);
+
+/// Looks at all files of a command before it begins; empty names are none. Throws InputError
+/// - if an output is there already and `force` is not given, or is a link, a folder or a device;
+/// - if two outputs are one file;
+/// - if an output would replace an input, or a file in a folder that is an input.
+void check_outputs(const std::vector<std::string>& outputs,
+                   const std::vector<std::string>& inputs,
+                   bool force);
 
 /// Makes a folder for a command's pictures. Throws InputError where it cannot be made, or where it
 /// holds anything that may not be replaced.
@@ -45,8 +52,5 @@ std::vector<CloudSource> cloud_sources(const std::vector<std::string>& inputs,
                                        const std::string& format,
                                        const std::string& scratch,
                                        const Progress& progress);
-
-/// Throws InputError where both names mean one file.
-void refuse_same_file(const std::string& output, const std::string& input);
 
 }  // namespace pointflight::apps

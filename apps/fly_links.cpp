@@ -55,7 +55,11 @@ FolderLink::FolderLink(const FolderOptions& options,
       loop_(loop),
       threads_(threads),
       draws_(options.draws),
-      recorder_(options.folder, simulation, options.existing) {}
+      recorder_(options.folder, simulation, options.existing) {
+  // whether their names are free is said before the flight
+  if (draws_) picture_path_ = recorder_.path_for("overview.png");
+  timing_path_ = recorder_.path_for("timing.json");
+}
 
 void FolderLink::on_sample(const Sample& sample) {
   if (ended_) return;
@@ -72,7 +76,7 @@ void FolderLink::close() {
   ended_ = true;
   if (draws_) {
     describe_run(simulation_, picture_);
-    draw_overview(simulation_.map(), picture_, recorder_.path_for("overview.png"));
+    draw_overview(simulation_.map(), picture_, picture_path_);
   }
   write_timing();
   recorder_.finish(simulation_);
@@ -87,7 +91,7 @@ void FolderLink::write_timing() const {
   json["threads"] = threads_;
   json["map"] = fs::weakly_canonical(resolve_path(scenario.map, scenario.folder())).string();
   json["command_line"] = command_line();
-  OutputFile file(recorder_.path_for("timing.json"));
+  OutputFile file(timing_path_);
   file.write(json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
   file.commit();
 }

@@ -54,6 +54,7 @@ class FolderLink : public Link {
   int threads_;
   bool draws_;
   FlightRecorder recorder_;
+  std::string picture_path_, timing_path_;  ///< In the run's folder.
   RunPicture picture_;
   bool ended_ = false;
 };

@@ -94,8 +94,7 @@ void print_statistics(const LidarSettings& s, const ScanStatistics& scan) {
 
 void show_lidar(const LidarFlags& flags) {
   LidarSettings s = load_lidar(flags.name);
-  refuse_same_file(flags.picture, s.path);
-  refuse_to_overwrite(flags.picture, flags.force);
+  check_outputs({flags.picture}, {s.path}, flags.force);
   const ScanStatistics scan = scan_statistics(s);
   if (flags.path) {
     fmt::print("{}\n", s.path);

@@ -166,7 +166,7 @@ void write_sensor(const SensorFitFlags& flags, const SensorFit& fit) {
   std::optional<OutputFile> rings;
   if (has_table) {
     const std::string rings_path = (path.parent_path() / table).string();
-    refuse_to_overwrite(rings_path, flags.force);
+    check_outputs({rings_path}, {flags.input, flags.output, flags.png}, flags.force);
     rings.emplace(rings_path);
     rings->write(rings_csv(*fit.turn));
   }
@@ -180,10 +180,7 @@ void write_sensor(const SensorFitFlags& flags, const SensorFit& fit) {
 }
 
 void fit_lidar(const SensorFitFlags& flags) {
-  for (const std::string& output : {flags.output, flags.png}) {
-    refuse_to_overwrite(output, flags.force);
-    refuse_same_file(output, flags.input);
-  }
+  check_outputs({flags.output, flags.png}, {flags.input}, flags.force);
   if (!flags.output.empty() && !flags.output.ends_with(".yaml")) {
     throw InputError(fmt::format("-o {}: a sensor file ends in .yaml", flags.output));
   }

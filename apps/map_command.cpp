@@ -190,7 +190,7 @@ void print_info(const SurfelMap& map, const InfoFlags& flags) {
 }
 
 void show_info(const InfoFlags& flags) {
-  refuse_to_overwrite(flags.png, flags.force);
+  check_outputs({flags.png}, {flags.map}, flags.force);
   const auto map = SurfelMap::open(flags.map);
   if (flags.verify) map->verify();
   print_info(*map, flags);
@@ -226,7 +226,7 @@ struct ForestFlags {
 };
 
 void make_forest_cloud(const ForestFlags& flags) {
-  refuse_to_overwrite(flags.output, flags.force);
+  check_outputs({flags.output}, {}, flags.force);
   const ShapeScene scene = make_forest(flags.options);
   std::vector<CloudPoint> points;
   scene.sample(flags.density, flags.noise, flags.options.seed, [&](const Vector3d& p) {

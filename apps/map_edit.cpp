@@ -53,10 +53,9 @@ bool is_map(const std::string& path) {
   return path.ends_with(".pfmap");
 }
 
-bool check_edit(const EditFlags& flags) {
+bool check_edit(const EditFlags& flags, const OtherFiles& more) {
   const bool makes_map = is_map(flags.output);
   for (const std::string& input : flags.inputs) {
-    refuse_same_file(flags.output, input);
     if (is_map(input) == makes_map) continue;
     throw InputError(
         makes_map
@@ -70,9 +69,11 @@ bool check_edit(const EditFlags& flags) {
                           flags.output));
   }
   if (!makes_map) require_writable_cloud(flags.output);
-  for (const std::string& output : {flags.output, flags.png}) {
-    if (!output.empty()) refuse_to_overwrite(output, flags.force);
-  }
+  std::vector<std::string> outputs = {flags.output, flags.png};
+  outputs.insert(outputs.end(), more.outputs.begin(), more.outputs.end());
+  std::vector<std::string> inputs = flags.inputs;
+  inputs.insert(inputs.end(), more.inputs.begin(), more.inputs.end());
+  check_outputs(outputs, inputs, flags.force);
   return makes_map;
 }
 

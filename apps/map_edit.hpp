@@ -35,9 +35,15 @@ CloudSource only_cloud(const EditFlags& flags, const Progress& progress);
 
 bool is_map(const std::string& path);
 
-/// Refuses outputs that are there or are inputs, and kinds that do not go together: a .pfmap makes
-/// a .pfmap, clouds make a cloud. Returns true for .pfmap.
-bool check_edit(const EditFlags& flags);
+/// Files of a command beside those of its EditFlags.
+struct OtherFiles {
+  std::vector<std::string> outputs;
+  std::vector<std::string> inputs;
+};
+
+/// Refuses outputs that are there or are inputs (`check_outputs`), and kinds that do not go
+/// together: a .pfmap makes a .pfmap, clouds make a cloud. Returns true for .pfmap.
+bool check_edit(const EditFlags& flags, const OtherFiles& more = {});
 
 /// The folder for what does not fit into memory.
 std::string scratch_of(const EditFlags& flags);

@@ -39,10 +39,7 @@ CloudColumns columns_of_map(const ExportFlags& flags, const SurfelMap& map) {
 
 void export_map(const ExportFlags& flags) {
   require_writable_cloud(flags.output);
-  for (const std::string& output : {flags.output, flags.png}) {
-    if (!output.empty()) refuse_to_overwrite(output, flags.force);
-  }
-  refuse_same_file(flags.output, flags.inputs.front());
+  check_outputs({flags.output, flags.png}, flags.inputs, flags.force);
   const Progress progress = interruptible_progress();
   if (!is_map(flags.inputs.front())) {
     if (!flags.what.empty() || flags.density > 0.0) {
@@ -173,11 +170,7 @@ void draw_diff(const DiffFlags& flags,
 }
 
 void diff(const DiffFlags& flags) {
-  for (const std::string& output : {flags.output, flags.png}) {
-    if (output.empty()) continue;
-    refuse_to_overwrite(output, flags.force);
-    for (const std::string& input : flags.inputs) refuse_same_file(output, input);
-  }
+  check_outputs({flags.output, flags.png}, flags.inputs, flags.force);
   if (!flags.output.empty()) require_writable_cloud(flags.output);
   const Progress progress = interruptible_progress();
   const Executor executor(flags.threads);

@@ -19,15 +19,9 @@ struct MapFitFlags : EditFlags {
 };
 
 void run_fit(const MapFitFlags& flags) {
-  if (!check_edit(flags)) throw InputError("map fit: a .pfmap in and a .pfmap out are wanted");
+  if (!check_edit(flags, {{flags.fit.ghosts_out}, survey_inputs(flags.fit)}))
+    throw InputError("map fit: a .pfmap in and a .pfmap out are wanted");
   if (!flags.format.empty()) throw InputError("map fit: --format is for clouds");
-  refuse_to_overwrite(flags.fit.ghosts_out, flags.force);
-  refuse_same_file(flags.output, flags.fit.files.poses);
-  refuse_same_file(flags.output, flags.fit.files.scans);
-  if (!flags.fit.ghosts_out.empty()) {
-    refuse_same_file(flags.fit.ghosts_out, flags.output);
-    refuse_same_file(flags.fit.ghosts_out, flags.inputs.front());
-  }
   const auto map = open_sound_map(flags.inputs.front());
   OutputFile output(flags.output);
   auto ghosts = open_ghosts(flags.fit);

@@ -71,16 +71,10 @@ void print_end(const ImportFlags& flags,
   fmt::print("{}\n", flags.output);
 }
 
-/// Outputs that are one another or an input.
-void refuse_same_files(const ImportFlags& flags) {
-  std::vector<std::string> others = flags.inputs;
-  others.push_back(flags.fit.files.poses);
-  others.push_back(flags.fit.files.scans);
-  for (const std::string& output : {flags.output, flags.outliers_out, flags.fit.ghosts_out}) {
-    if (output.empty()) continue;
-    for (const std::string& other : others) refuse_same_file(output, other);
-    others.push_back(output);
-  }
+void check_files(const ImportFlags& flags) {
+  std::vector<std::string> inputs = survey_inputs(flags.fit);
+  inputs.insert(inputs.end(), flags.inputs.begin(), flags.inputs.end());
+  check_outputs({flags.output, flags.outliers_out, flags.fit.ghosts_out}, inputs, flags.force);
 }
 
 /// What --reflectivity says of a map's intensities.
@@ -101,10 +95,7 @@ void import_survey(const ImportFlags& flags) {
         "--scans: --scale, --shift and --up would part points from rays; use 'map "
         "transform' afterwards");
   }
-  refuse_to_overwrite(flags.output, flags.force);
-  refuse_to_overwrite(flags.outliers_out, flags.force);
-  refuse_to_overwrite(flags.fit.ghosts_out, flags.force);
-  refuse_same_files(flags);
+  check_files(flags);
   OutputFile output(flags.output);
   auto ghosts = open_ghosts(flags.fit);
   std::optional<OutputFile> outliers;
@@ -146,15 +137,9 @@ void import_survey(const ImportFlags& flags) {
 void import_map(const ImportFlags& flags) {
   const auto start = std::chrono::steady_clock::now();
   const ImportOptions options = import_options(flags);
-  for (const std::string& input : flags.inputs) refuse_same_file(flags.output, input);
-  refuse_to_overwrite(flags.output, flags.force);
-  refuse_to_overwrite(flags.outliers_out, flags.force);
+  check_files(flags);
   std::optional<OutputFile> outliers;
-  if (!flags.outliers_out.empty()) {
-    refuse_same_file(flags.outliers_out, flags.output);
-    for (const std::string& input : flags.inputs) refuse_same_file(flags.outliers_out, input);
-    outliers.emplace(flags.outliers_out);
-  }
+  if (!flags.outliers_out.empty()) outliers.emplace(flags.outliers_out);
   OutputFile output(flags.output);  // first: a folder that is not there is said at once
   const Executor executor(flags.threads);
   const Progress progress = interruptible_progress();

@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
@@ -21,6 +22,7 @@
 #include "apps/terminal.hpp"
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/core/mapped_file.hpp"
+#include "pointflight/core/owned_files.hpp"
 #include "pointflight/io/cloud_reader.hpp"
 #include "pointflight/io/csv_table.hpp"
 
@@ -170,7 +172,7 @@ std::shared_ptr<const SurfelMap> map_of(const PictureFlags& flags,
   return scenario->open_map();
 }
 
-/// A folder without a name of its own, that goes with its pictures.
+/// A folder that goes with its pictures, among the system's temporary ones.
 class FrameFolder {
  public:
   FrameFolder() {
@@ -178,22 +180,40 @@ class FrameFolder {
     if (mkdtemp(name.data()) == nullptr) {
       throw InputError(fmt::format("{}: {}", name, std::generic_category().message(errno)));
     }
-    path_ = name;
+    folder_.emplace(name);
   }
   ~FrameFolder() {
-    std::error_code ignored;
-    fs::remove_all(path_, ignored);
+    for (const std::string& picture : folder_->names()) folder_->remove_file(picture);
+    ::rmdir(path().c_str());
   }
   FrameFolder(const FrameFolder&) = delete;
   FrameFolder& operator=(const FrameFolder&) = delete;
-  [[nodiscard]] const std::string& path() const { return path_; }
+  [[nodiscard]] const std::string& path() const { return folder_->path(); }
 
  private:
-  std::string path_;
+  std::optional<Folder> folder_;
 };
 
+constexpr const char* kOverview = "overview.png";
+
+/// True if the run's list of files has the picture.
+bool lists_picture(const std::string& run) {
+  const auto files = read_file_list(Folder(run));
+  return files &&
+         std::ranges::any_of(*files, [](const ListedFile& file) { return file.name == kOverview; });
+}
+
+/// The picture is a part of the run from now on: `fly --force` removes it with the rest.
+void list_picture(const std::string& run) {
+  const Folder folder(run);
+  auto files = read_file_list(folder);
+  if (!files || lists_picture(run)) return;
+  files->push_back({kOverview, false});
+  folder.write(kFileList, file_list_text(*files));
+}
+
 void film(const PictureFlags& flags) {
-  if (!flags.video.empty()) refuse_to_overwrite(flags.video, flags.force);
+  check_outputs({flags.video}, {flags.run, flags.map}, flags.force);
   if (!flags.frames.empty()) make_picture_folder(flags.frames, flags.force);
   const Executor executor(0);
   RecordedRun run(flags.run, executor);
@@ -229,8 +249,11 @@ void add_picture_command(CLI::App& parent, int& /*exit_code*/) {
   add_force_flag(*app, flags->force);
   app->callback([flags] {
     if (!flags->video.empty() || !flags->frames.empty()) return film(*flags);
+    const std::string own = (fs::path(flags->run) / kOverview).string();
+    const std::string path = flags->output.empty() ? own : flags->output;
+    const bool is_own = flags->output.empty() && lists_picture(flags->run);
     // the run's own picture may be drawn again
-    if (!flags->output.empty()) refuse_to_overwrite(flags->output, flags->force);
+    check_outputs({path}, {flags->run, flags->map}, flags->force || is_own);
     const auto scenario = scenario_of(*flags);
     const auto map = map_of(*flags, scenario);
     RunPicture picture = read_run(flags->run);
@@ -239,9 +262,8 @@ void add_picture_command(CLI::App& parent, int& /*exit_code*/) {
         picture.waypoints.push_back(vehicle.mission.waypoints);
       }
     }
-    const std::string path =
-        flags->output.empty() ? (fs::path(flags->run) / "overview.png").string() : flags->output;
     draw_overview(*map, picture, path);
+    if (flags->output.empty()) list_picture(flags->run);
     fmt::print("{}\n", path);
   });
 }

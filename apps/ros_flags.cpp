@@ -148,7 +148,7 @@ std::unique_ptr<Outlet> open_recording(const RosFlags& flags,
 void check_twice(const std::vector<std::string>& paths) {
   for (std::size_t i = 0; i < paths.size(); ++i) {
     for (std::size_t k = 0; k < i; ++k) {
-      if (fs::weakly_canonical(paths[k]) != fs::weakly_canonical(paths[i])) continue;
+      if (!is_same_file(paths[k], paths[i])) continue;
       throw InputError(fmt::format("--record: {} is given twice", paths[i]));
     }
   }

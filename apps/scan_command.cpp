@@ -85,11 +85,7 @@ void print_scan(const Scan& scan, const ScanFlags& flags) {
 
 void take_scan(const ScanFlags& flags) {
   const Pose pose = parse_pose(flags.pose, "--pose");
-  refuse_same_file(flags.output, flags.map);
-  refuse_same_file(flags.png, flags.map);
-  if (!flags.png.empty()) refuse_same_file(flags.png, flags.output);
-  refuse_to_overwrite(flags.output, flags.force);
-  refuse_to_overwrite(flags.png, flags.force);
+  check_outputs({flags.output, flags.png}, {flags.map, flags.lidar}, flags.force);
   const auto map = SurfelMap::open(flags.map);
   LidarSettings settings = load_lidar(flags.lidar);
   if (flags.sub_rays >= 0) settings.optics.sub_rays = flags.sub_rays;

@@ -43,8 +43,7 @@ struct NewFlags {
 
 void new_scenario(const NewFlags& flags) {
   const Executor executor;
-  refuse_same_file(flags.output, flags.map);
-  refuse_to_overwrite(flags.output, flags.force);
+  check_outputs({flags.output}, {flags.map, flags.lidar, flags.vehicle}, flags.force);
   // the scenario finds its files from its own folder
   const fs::path folder = fs::weakly_canonical(fs::absolute(flags.output).parent_path());
   const auto from_folder = [&](const std::string& path) {

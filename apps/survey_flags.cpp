@@ -233,10 +233,12 @@ void paint_by_signal(EditedMap& map,
                         : ""));
 }
 
+std::vector<std::string> survey_inputs(const FitFlags& flags) {
+  return {flags.files.scans, flags.files.poses, flags.files.free};
+}
+
 std::optional<OutputFile> open_ghosts(const FitFlags& flags) {
   if (flags.ghosts_out.empty()) return std::nullopt;
-  refuse_same_file(flags.ghosts_out, flags.files.poses);
-  refuse_same_file(flags.ghosts_out, flags.files.scans);
   return OutputFile(flags.ghosts_out);
 }
 

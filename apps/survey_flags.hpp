@@ -38,6 +38,9 @@ std::vector<std::string> recordings_in(const std::string& folder);
 /// without any. Throws InputError where it is neither a folder nor a recording.
 std::optional<RecordingOpener> recording_of(const std::string& path);
 
+/// Files and folders that these flags read.
+std::vector<std::string> survey_inputs(const FitFlags& flags);
+
 /// The survey of --scans: a folder of clouds, a recording or a folder of MCAP files. Throws
 /// InputError.
 std::unique_ptr<SurveySource> open_survey(const FitFlags& flags, const Progress& progress);

@@ -127,9 +127,8 @@ void print_vehicle(VehicleSettings& s, const std::vector<StepResponse>& response
 }
 
 void show_vehicle(const ShowFlags& flags) {
-  refuse_to_overwrite(flags.picture, flags.force);
   VehicleSettings s = load_vehicle(flags.name);
-  refuse_same_file(flags.picture, s.path);
+  check_outputs({flags.picture}, {s.path}, flags.force);
   if (!flags.controller.empty()) s.controller.kind = flags.controller;
   if (flags.path) {
     fmt::print("{}\n", s.path);

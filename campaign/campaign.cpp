@@ -11,6 +11,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <set>
+#include <system_error>
 #include <utility>
 
 #include "campaign/process.hpp"
@@ -19,9 +20,11 @@
 #include "pointflight/core/locked_file.hpp"
 #include "pointflight/core/mapped_file.hpp"
 #include "pointflight/core/output_file.hpp"
+#include "pointflight/core/owned_files.hpp"
 #include "pointflight/core/resources.hpp"
 #include "pointflight/core/shell_words.hpp"
 #include "pointflight/core/version.hpp"
+#include "pointflight/sim/run_folder.hpp"
 #include "pointflight/sim/scenario.hpp"
 #include "pointflight/sim/scenario_copy.hpp"
 
@@ -30,8 +33,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr const char* kIdentity = "campaign.json";
 constexpr const char* kResult = "result.json";
 constexpr const char* kAttempt = ".attempt-";
+constexpr const char* kRuns = "runs";
+constexpr const char* kOutput = "output";  // of a flight: what its program writes
 
 void write_text(const fs::path& path, std::string_view text) {
   OutputFile file(path.string());
@@ -45,44 +51,81 @@ std::string host_name() {
   return name.data();
 }
 
-/// A folder of this attempt's own: the name says whose it is.
-fs::path make_attempt(const fs::path& run) {
+/// Of a flight in the campaign's folder.
+std::string name_of(std::size_t number) {
+  return fmt::format("{}/{:06}", kRuns, number);
+}
+
+/// Of an attempt at it: it says whose it is.
+std::string attempt_name(std::size_t number) {
   static std::atomic<int> count = 0;
-  const std::string name =
-      fmt::format("{}{}{}-{}-{}", run.string(), kAttempt, host_name(), getpid(), ++count);
-  std::error_code error;
-  fs::remove_all(name, error);
-  if (!fs::create_directories(name, error) && error) {
-    throw InputError(fmt::format("{}: {}", name, error.message()));
-  }
-  return name;
+  return fmt::format("{}{}{}-{}-{}", name_of(number), kAttempt, host_name(), getpid(), ++count);
 }
 
-/// The attempt is over: it gets the run's name.
-void keep(const fs::path& attempt, const fs::path& final_folder, const RunRecord& record) {
-  write_text(attempt / kResult, record_json(record));
-  std::error_code error;
-  // what has no result is none: half taken away
-  if (!fs::exists(final_folder / kResult, error)) fs::remove_all(final_folder, error);
-  fs::rename(attempt, final_folder, error);
-  if (error && !fs::exists(final_folder)) {  // else somebody else has flown it meanwhile: the same
-    throw InputError(fmt::format("{}: {}", final_folder.string(), error.message()));
+/// Removes what we and our own `fly` wrote for a flight. Returns true if that was all: what a
+/// program of the user's left there stays.
+bool remove_flight(const Folder& home, const std::string& name) {
+  if (const auto flight = home.below(name)) remove_run(*flight, kOutput);
+  return remove_owned(home, name);
+}
+
+/// What has no result is no flight, and what is not ours stays: under another name.
+void make_way(const Folder& home, const std::string& name) {
+  if (home.entry(name + "/" + kResult) != Entry::kNothing || remove_flight(home, name)) return;
+  for (int i = 1; home.rename(name, home, fmt::format("{}.aside-{}", name, i)) == EEXIST; ++i) {
   }
 }
 
-/// An attempt that ends without a result leaves nothing.
-class AttemptGuard {
+/// A flight while it is flown, in a folder of its own. One that ends without a result leaves
+/// nothing of ours.
+class Attempt {
  public:
-  explicit AttemptGuard(fs::path folder) : folder_(std::move(folder)) {}
-  ~AttemptGuard() {
-    std::error_code ignored;
-    fs::remove_all(folder_, ignored);
+  Attempt(const Folder& home, std::size_t number)
+      : home_(home),
+        number_(number),
+        name_(attempt_name(number)),
+        folder_(home, name_),
+        lock_(folder_.path()) {}
+  ~Attempt() {
+    if (!kept_) remove_flight(home_, name_);
   }
-  AttemptGuard(const AttemptGuard&) = delete;
-  AttemptGuard& operator=(const AttemptGuard&) = delete;
+  Attempt(const Attempt&) = delete;
+  Attempt& operator=(const Attempt&) = delete;
+
+  [[nodiscard]] OwnedFolder& folder() { return folder_; }
+
+  /// Takes away what a thousand flights need not keep of a run that lists its files.
+  void remove_bulk(const std::string& figures) const {
+    const auto output = folder_.folder().below(kOutput);
+    auto files = output ? read_file_list(*output) : std::nullopt;
+    if (!files) return;
+    const std::set<std::string> kept = {"summary.json", "timing.json", "events.csv", figures};
+    remove_listed(*output, *files, [&](const std::string& name) { return kept.contains(name); });
+    std::erase_if(*files, [&](const ListedFile& file) { return !kept.contains(file.name); });
+    output->write(kFileList, file_list_text(*files));
+  }
+
+  /// It is over: its folder gets the flight's name.
+  void keep(const RunRecord& record) {
+    write_text(folder_.file(kResult), record_json(record));
+    const std::string name = name_of(number_);
+    make_way(home_, name);
+    const int error = home_.rename(name_, home_, name);
+    if (error == EEXIST) return;  // somebody else has flown it meanwhile: the same
+    if (error != 0) {
+      throw InputError(
+          fmt::format("{}/{}: {}", home_.path(), name, std::generic_category().message(error)));
+    }
+    kept_ = true;
+  }
 
  private:
-  fs::path folder_;
+  const Folder& home_;
+  std::size_t number_;
+  std::string name_;
+  OwnedFolder folder_;
+  FolderLock lock_;
+  bool kept_ = false;
 };
 
 void replace_all(std::string& text, std::string_view what, const std::string& by) {
@@ -219,30 +262,45 @@ std::string Campaign::identity() const {
 /// Several processes may come at once: all write the same.
 void Campaign::check_folder() const {
   std::error_code error;
-  const fs::path runs = fs::path(folder_) / "runs";
-  const std::string path = (fs::path(folder_) / "campaign.json").string();
-  const bool is_one = fs::exists(path, error) || fs::exists(runs, error);
-  if (!is_one && fs::exists(folder_, error) && !fs::is_empty(folder_, error)) {
-    throw InputError(
-        fmt::format("{}: is not empty, and no campaign; choose another folder", folder_));
-  }
-  fs::create_directories(runs, error);
+  fs::create_directories(folder_, error);
   if (error) throw InputError(fmt::format("{}: {}", folder_, error.message()));
-  if (fs::exists(path, error)) {
-    if (MappedFile(path).text() == identity()) return;
+  const Folder home(folder_);
+  const auto is_ours = [](const std::string& name) {
+    return name.substr(name.starts_with('.') ? 1 : 0).starts_with(kIdentity);
+  };
+  const std::vector<std::string> names = home.names();
+  if (!std::ranges::any_of(names, [](const std::string& name) { return name == kIdentity; })) {
+    if (!std::ranges::all_of(names, is_ours)) {  // those of others who begin it as well
+      throw InputError(
+          fmt::format("{}: is not empty, and no campaign; choose another folder", folder_));
+    }
+    const std::string own = fmt::format("{}.{}-{}", kIdentity, host_name(), getpid());
+    home.write(own, identity());
+    const int refused = home.rename(own, home, kIdentity);
+    if (refused == EEXIST) home.remove_file(own);  // one of them was first
+    if (refused != 0 && refused != EEXIST) {
+      throw InputError(
+          fmt::format("{}/{}: {}", folder_, kIdentity, std::generic_category().message(refused)));
+    }
+  }
+  constexpr std::size_t kLongest = std::size_t{1} << 24u;  // bytes
+  if (home.read(kIdentity, kLongest) != identity()) {
     throw InputError(fmt::format(
         "{}: is the campaign of another study, scenario, map, input or version; choose another "
         "folder",
         folder_));
   }
-  const std::string own = fmt::format("{}.{}-{}", path, host_name(), getpid());
-  write_text(own, identity());
-  fs::rename(own, path, error);
-  if (error) throw InputError(fmt::format("{}: {}", path, error.message()));
+  if (!home.make(kRuns)) {
+    throw InputError(fmt::format(
+        "{}/{}: cannot be used as a folder: it is a link, a file, a mount or not writable; give "
+        "another with -o",
+        folder_,
+        kRuns));
+  }
 }
 
 std::string Campaign::run_folder(std::size_t number) const {
-  return (fs::path(folder_) / "runs" / fmt::format("{:06}", number)).string();
+  return (fs::path(folder_) / name_of(number)).string();
 }
 
 std::vector<std::size_t> Campaign::missing() const {
@@ -263,27 +321,28 @@ std::vector<std::size_t> Campaign::missing() const {
 }
 
 std::size_t Campaign::forget_failed() {
+  const Folder home(folder_);
   std::size_t count = 0;
   for (const PlannedRun& run : plan_.runs) {
     const auto record = result(run.number);
     if (!record || record->status != RunStatus::kFailed) continue;
     // at one stroke: whoever is killed meanwhile leaves no half of a result
-    std::error_code error;
-    fs::remove(fs::path(run_folder(run.number)) / kResult, error);
-    if (error) throw InputError(fmt::format("{}: {}", run_folder(run.number), error.message()));
-    fs::remove_all(run_folder(run.number), error);
+    const std::string name = name_of(run.number);
+    if (!home.remove_file(name + "/" + kResult)) {
+      throw InputError(fmt::format("{}/{}: cannot be removed", run_folder(run.number), kResult));
+    }
+    remove_flight(home, name);
     ++count;
   }
   return count;
 }
 
-void Campaign::remove_leftovers() const {
+std::size_t Campaign::remove_leftovers() const {
+  const Folder home(folder_);
+  const auto runs = home.below(kRuns);
   const std::string ours = kAttempt + host_name() + "-";
-  std::error_code error;
-  for (fs::directory_iterator at(fs::path(folder_) / "runs", error);
-       !error && at != fs::directory_iterator();
-       at.increment(error)) {
-    const std::string name = at->path().filename().string();
+  std::size_t left = 0;
+  for (const std::string& name : runs ? runs->names() : std::vector<std::string>()) {
     const std::size_t found = name.find(ours);
     if (found == std::string::npos) continue;
     // a process and a count, and no more: else another host's name begins as this one's
@@ -296,14 +355,15 @@ void Campaign::remove_leftovers() const {
     if (fields != 2 || rest.size() != static_cast<std::size_t>(read)) continue;
     if (pid <= 0 || pid == getpid()) continue;
     if (kill(static_cast<pid_t>(pid), 0) == 0 || errno != ESRCH) continue;
+    if (runs->entry(name) != Entry::kFolder) continue;
     try {
       // containers have process numbers of their own: whoever flies there holds the folder
-      const FolderLock lock(at->path().string());
-      std::error_code ignored;
-      fs::remove_all(at->path(), ignored);
+      const FolderLock lock(runs->path() + "/" + name);
+      left += remove_flight(*runs, name) ? 0 : 1;
     } catch (const InputError&) {  // somebody flies there
     }
   }
+  return left;
 }
 
 std::optional<RunRecord> Campaign::result(std::size_t number) const {
@@ -351,25 +411,11 @@ std::string Campaign::repeating_command(std::size_t number) const {
   return line;
 }
 
-/// What a thousand runs need not keep.
-void Campaign::remove_bulk(const std::string& output) const {
-  if (study_.kept == KeptFiles::kAll) return;
-  const std::set<std::string> kept = {"summary.json", "timing.json", "events.csv", study_.figures};
-  std::error_code ignored;
-  std::vector<fs::path> others;
-  for (fs::directory_iterator at(output, ignored); !ignored && at != fs::directory_iterator();
-       at.increment(ignored)) {
-    if (!kept.contains(at->path().filename().string())) others.push_back(at->path());
-  }
-  for (const fs::path& path : others) fs::remove_all(path, ignored);
-}
-
 std::optional<RunRecord> Campaign::fly(std::size_t number, const std::atomic<bool>& stop) const {
   const PlannedRun& run = plan_.runs[number];
-  const fs::path final_folder = run_folder(number);
-  const fs::path attempt = fs::absolute(make_attempt(final_folder));
-  const AttemptGuard guard(attempt);
-  const FolderLock lock(attempt.string());
+  const Folder home(fs::absolute(folder_).string());
+  Attempt attempt(home, number);
+  OwnedFolder& folder = attempt.folder();
   Scenario scenario;
   std::string text;
   try {
@@ -379,22 +425,23 @@ std::optional<RunRecord> Campaign::fly(std::size_t number, const std::atomic<boo
     RunRecord record;
     record.status = RunStatus::kFailed;
     record.reason = "values that do not fit together";
-    if (!text.empty()) write_text(attempt / "scenario.yaml", text);
-    write_text(attempt / "log.txt", std::string(problem.what()) + "\n");
-    keep(attempt, final_folder, record);
+    if (!text.empty()) write_text(folder.file("scenario.yaml"), text);
+    write_text(folder.file("log.txt"), std::string(problem.what()) + "\n");
+    attempt.keep(record);
     return record;
   }
   const auto map = maps_.find(scenario.map);
   write_scenario_copy(scenario,
                       map != maps_.end() ? *map->second : *scenario.open_map(),
-                      attempt.string(),
-                      final_folder.string());
-  const std::string output = (attempt / "output").string();
-  std::error_code error;
-  fs::create_directory(output, error);
+                      folder,
+                      run_folder(number));
+  const std::string output = folder.path() + "/" + kOutput;
+  if (!folder.folder().make(kOutput)) {
+    throw InputError(fmt::format("{}: cannot make the folder", output));
+  }
   ProcessRequest request;
-  request.command = command_of(run, (attempt / "scenario.yaml").string(), output);
-  request.log = (attempt / "log.txt").string();
+  request.command = command_of(run, folder.path() + "/scenario.yaml", output);
+  request.log = folder.file("log.txt");
   request.folder = fs::path(study_.path).parent_path().string();
   request.time_limit = study_.time_limit;
   request.memory_limit = study_.memory_limit;
@@ -412,10 +459,10 @@ std::optional<RunRecord> Campaign::fly(std::size_t number, const std::atomic<boo
   } catch (const InputError& problem) {
     record.status = RunStatus::kFailed;
     record.reason = "results that cannot be read";
-    write_text(attempt / "results_error.txt", std::string(problem.what()) + "\n");
+    write_text(folder.file("results_error.txt"), std::string(problem.what()) + "\n");
   }
-  remove_bulk(output);
-  keep(attempt, final_folder, record);
+  if (study_.kept == KeptFiles::kResults) attempt.remove_bulk(study_.figures);
+  attempt.keep(record);
   return record;
 }
 

@@ -35,10 +35,12 @@ class Campaign {
 
   /// Flights without a result, by number.
   [[nodiscard]] std::vector<std::size_t> missing() const;
-  /// Takes away results of flights that failed, so that they are flown again. Returns how many.
+  /// Removes results of flights that failed, so that they are flown again; what the user's program
+  /// wrote beside them is set aside. Returns how many.
   std::size_t forget_failed();
-  /// Takes away what attempts left that cannot go on: those of this machine whose process is gone.
-  void remove_leftovers() const;
+  /// Removes what attempts left that cannot go on: those of this machine whose process is gone.
+  /// Returns how many folders stay for what the user's program has written into them.
+  std::size_t remove_leftovers() const;
 
   /// Flies one and puts its result into the folder; nothing where `stop` or somebody outside
   /// (SIGKILL, SIGTERM) ended it. Callable from
@@ -63,7 +65,6 @@ class Campaign {
                                                     const std::string& scenario,
                                                     const std::string& output) const;
   [[nodiscard]] std::string identity() const;
-  void remove_bulk(const std::string& output) const;
 
   Study study_;
   std::string folder_;

@@ -97,7 +97,7 @@ std::string found_program(const std::string& name) {
 }
 
 int opened_log(const std::string& path) {
-  const int file = open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+  const int file = open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_NOFOLLOW | O_CLOEXEC, 0644);
   if (file < 0) throw InputError(fmt::format("{}: {}", path, reason(errno)));
   return file;
 }

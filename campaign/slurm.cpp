@@ -8,6 +8,7 @@
 
 #include "campaign/engines.hpp"
 #include "campaign/process.hpp"
+#include "pointflight/core/folder.hpp"
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/core/mapped_file.hpp"
 #include "pointflight/core/output_file.hpp"
@@ -28,21 +29,22 @@ struct Answer {
 };
 
 /// What a command of Slurm's says.
-Answer ask(const fs::path& folder,
+Answer ask(const Folder& folder,
            const std::vector<std::string>& command,
            const std::atomic<bool>& stop) {
   ProcessRequest request;
   request.command = command;
-  request.log = (folder / ("." + command.front() + ".txt")).string();
-  request.errors = (folder / ("." + command.front() + ".errors.txt")).string();
+  const std::string log = Folder::temporary_name(command.front());
+  const std::string errors = Folder::temporary_name(command.front() + ".errors");
+  request.log = folder.path() + "/" + log;
+  request.errors = folder.path() + "/" + errors;
   request.time_limit = 120.0;
   const ProcessResult ended = run_process(request, stop);
   Answer answer{ended.timed_out ? -1 : ended.exit_code, {}, {}};
   answer.text = MappedFile(request.log).text();
   answer.errors = MappedFile(request.errors).text();
-  std::error_code ignored;
-  fs::remove(request.log, ignored);
-  fs::remove(request.errors, ignored);
+  folder.remove_file(log);
+  folder.remove_file(errors);
   return answer;
 }
 
@@ -61,7 +63,7 @@ bool is_job(const std::string& text) {
 
 /// True while some of its tasks wait or run. A job that Slurm has forgotten is over; a controller
 /// that does not answer for a while is asked again.
-bool is_there(const fs::path& folder, const std::string& job, const std::atomic<bool>& stop) {
+bool is_there(const Folder& folder, const std::string& job, const std::atomic<bool>& stop) {
   for (int tries = 0;; ++tries) {
     const Answer answer =
         ask(folder, {"squeue", "--noheader", "--format=%T", "--jobs=" + job}, stop);
@@ -77,7 +79,7 @@ bool is_there(const fs::path& folder, const std::string& job, const std::atomic<
 }
 
 std::string submit(const Campaign& campaign,
-                   const fs::path& folder,
+                   const Folder& folder,
                    const std::vector<std::size_t>& numbers,
                    const SlurmOptions& options) {
   const std::size_t count = numbers.size();
@@ -89,7 +91,7 @@ std::string submit(const Campaign& campaign,
       "--parsable",
       "--job-name=pointflight",
       fmt::format("--array=0-{}", tasks - 1),
-      "--output=" + (folder / "task_%a.log").string(),
+      "--output=" + folder.path() + "/task_%a.log",
       "--chdir=" + fs::absolute(campaign.study().path).parent_path().string()};
   command.insert(command.end(), options.words.begin(), options.words.end());
   command.push_back(fmt::format("--wrap=exec {} campaign {} -o {} --share $SLURM_ARRAY_TASK_ID/{}",
@@ -121,11 +123,15 @@ std::string fly_by_slurm(const Campaign& campaign,
                          const SlurmOptions& options,
                          const std::atomic<bool>& stop,
                          const Progress& progress) {
-  const fs::path folder = fs::absolute(fs::path(campaign.folder()) / "slurm");
-  std::error_code error;
-  fs::create_directories(folder, error);
-  if (error) throw InputError(fmt::format("{}: {}", folder.string(), error.message()));
-  const fs::path note = folder / "job";
+  const Folder home(fs::absolute(campaign.folder()).string());
+  const auto made = home.make("slurm");
+  if (!made) {
+    throw InputError(fmt::format(
+        "{}/slurm: cannot be used as a folder: it is a link, a file, a mount or not writable",
+        home.path()));
+  }
+  const Folder& folder = *made;
+  const fs::path note = fs::path(folder.path()) / "job";
   std::optional<std::string> job = job_in(note);
   if (!job || !is_there(folder, *job, stop)) {
     job = submit(campaign, folder, numbers, options);

@@ -246,6 +246,8 @@ Study read_study(const YAML::Node& root, const StudyReader& reader, const std::s
   if (root["command"]) read_command(reader, root["command"], study);
   if (root["limits"]) read_limits(reader, root["limits"], study);
   if (root["figures"]) study.figures = reader.word(root["figures"], "figures");
+  // what is not ours is removed if the user says so, and never otherwise
+  if (!study.command.empty()) study.kept = KeptFiles::kAll;
   if (root["keep"]) {
     const std::string keep = reader.word(root["keep"], "keep");
     if (keep != "results" && keep != "all") {

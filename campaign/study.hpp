@@ -28,7 +28,8 @@ struct StudyDraw {
 
 /// What is kept of a run beside its row.
 enum class KeptFiles {
-  kResults,  ///< Scenario, log, summary, events and the user's figures.
+  kResults,  ///< Scenario, log, summary, events and the user's figures; the rest of what a run's
+             ///< list (`files.txt`) has is removed.
   kAll,      ///< All that it wrote.
 };
 
@@ -45,7 +46,7 @@ struct Study {
   double time_limit = 0.0;           ///< s of the wall clock for each run; 0: none.
   double memory_limit = 0.0;         ///< Bytes that a run may take beside mapped files; 0: any.
   std::string figures;               ///< JSON that a run leaves in {output}; empty: none.
-  KeptFiles kept = KeptFiles::kResults;  ///< Of each run.
+  KeptFiles kept = KeptFiles::kResults;  ///< Of each run; all of a user's command unless told.
 };
 
 /// Reads a study's file. Throws InputError with file and line.

@@ -23,6 +23,9 @@ install(FILES ${PROJECT_BINARY_DIR}/pointflight-config.cmake
         DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/pointflight)
 
 # what `cmake --install` wrote goes again by: cmake --build BUILD --target uninstall
+set(installed ${PROJECT_BINARY_DIR}/installed.txt)
+install(CODE "set(MANIFEST \"${installed}\")")
+install(SCRIPT cmake/install_list.cmake)
 add_custom_target(uninstall
-  COMMAND ${CMAKE_COMMAND} -D MANIFEST=${PROJECT_BINARY_DIR}/install_manifest.txt
+  COMMAND ${CMAKE_COMMAND} -D MANIFEST=${installed}
           -P ${PROJECT_SOURCE_DIR}/cmake/uninstall.cmake)

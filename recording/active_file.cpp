@@ -4,16 +4,15 @@
 #include <unistd.h>
 
 #include <cerrno>
-#include <filesystem>
 #include <system_error>
 #include <utility>
 
 #include "pointflight/core/input_error.hpp"
-#include "pointflight/core/locked_file.hpp"
 
 namespace pointflight {
 
-ActiveFile::ActiveFile(std::string path) : path_(std::move(path)), active_path_(path_ + ".active") {
+ActiveFile::ActiveFile(std::string path)
+    : name_(std::move(path)), active_path_(name_.path() + ".active") {
   file_ = ::fdopen(open_locked(active_path_, active_path_), "wb");
   if (file_ == nullptr) {
     throw InputError(fmt::format(
@@ -26,9 +25,9 @@ ActiveFile::~ActiveFile() {
 }
 
 void ActiveFile::discard() {
-  std::remove(active_path_.c_str());
-  if (file_ != nullptr) std::fclose(file_);
-  file_ = nullptr;
+  if (file_ == nullptr) return;
+  remove_locked(::fileno(file_), active_path_);
+  std::fclose(std::exchange(file_, nullptr));
 }
 
 void ActiveFile::fail(int error) {
@@ -54,13 +53,8 @@ void ActiveFile::commit() {
   flush();
   // some file systems say only here that they have no room; the lock stays with `file_`
   if (::close(::dup(::fileno(file_))) != 0) fail(errno);
-  std::error_code error;
-  std::filesystem::rename(active_path_, path_, error);
+  name_.take(active_path_, ::fileno(file_));
   std::fclose(std::exchange(file_, nullptr));
-  if (error) {
-    throw InputError(
-        fmt::format("{}: cannot be renamed to {}: {}", active_path_, path_, error.message()));
-  }
 }
 
 }  // namespace pointflight

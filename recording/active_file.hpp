@@ -6,6 +6,8 @@
 #include <span>
 #include <string>
 
+#include "pointflight/core/locked_file.hpp"
+
 namespace pointflight {
 
 /// A recording that grows: `NAME.active`, locked, until it is complete, then `NAME`. What was
@@ -26,12 +28,13 @@ class ActiveFile {
   void discard();
 
   [[nodiscard]] std::uint64_t size() const { return size_; }
-  [[nodiscard]] const std::string& path() const { return path_; }
+  [[nodiscard]] const std::string& path() const { return name_.path(); }
 
  private:
   [[noreturn]] void fail(int error);
 
-  std::string path_, active_path_;
+  OutputName name_;
+  std::string active_path_;
   std::FILE* file_ = nullptr;
   std::uint64_t size_ = 0;
 };

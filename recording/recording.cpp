@@ -15,7 +15,7 @@ namespace fs = std::filesystem;
 void check_recording(const RecordingRequest& request) {
   for (const std::string& path : {request.path, request.path + ".active"}) {
     std::error_code error;
-    const fs::file_status status = fs::status(path, error);
+    const fs::file_status status = fs::symlink_status(path, error);
     if (!fs::exists(status)) continue;
     if (!fs::is_regular_file(status)) {
       throw InputError(

@@ -1,10 +1,13 @@
 #include "ros1/bag.hpp"
 
+#include <fcntl.h>
 #include <ros/serialization.h>
 #include <rosbag/bag.h>
 #include <rosbag/query.h>
 #include <rosbag/view.h>
+#include <unistd.h>
 
+#include <cerrno>
 #include <cstdio>
 #include <map>
 #include <stdexcept>
@@ -23,12 +26,12 @@ constexpr std::uint64_t kLong = 256u << 20;  // bytes of the file
 class BagWriter : public Outlet {
  public:
   BagWriter(const std::string& path, const std::string& compression)
-      : path_(path), active_(path + ".active") {
+      : path_(path), active_(path + ".active"), replaces_(::access(path.c_str(), F_OK) == 0) {
     try {
       bag_->open(active_, rosbag::bagmode::Write);
     } catch (const rosbag::BagException& error) {
       give_up();
-      std::remove(active_.c_str());
+      ::unlink(active_.c_str());  // empty: it was made for this
       throw std::runtime_error(active_ + ": cannot be written: " + error.what());
     }
     bag_->setCompression(compression == "lz4"   ? rosbag::compression::LZ4
@@ -90,7 +93,15 @@ class BagWriter : public Outlet {
       throw std::runtime_error(active_ + ": writing failed: " + error.what());
     }
     bag_.reset();
-    if (std::rename(active_.c_str(), path_.c_str()) != 0) {
+    // what has appeared there since stays; a file system that knows no such rename: as before it
+    const bool is_taken =
+        !replaces_ &&
+        ::renameat2(AT_FDCWD, active_.c_str(), AT_FDCWD, path_.c_str(), RENAME_NOREPLACE) != 0;
+    if (is_taken && errno == EEXIST) {
+      throw std::runtime_error(path_ + ": somebody has put something there; the recording is " +
+                               active_);
+    }
+    if ((replaces_ || is_taken) && std::rename(active_.c_str(), path_.c_str()) != 0) {
       throw std::runtime_error(active_ + ": cannot be renamed to " + path_);
     }
   }
@@ -101,6 +112,7 @@ class BagWriter : public Outlet {
   void give_up() { static_cast<void>(bag_.release()); }
 
   std::string path_, active_;
+  bool replaces_;  ///< A recording of that name was there.
   std::unique_ptr<rosbag::Bag> bag_ = std::make_unique<rosbag::Bag>();
   bool is_long_ = false;  ///< The file is.
   std::vector<std::unique_ptr<Topic>> topics_;

@@ -1,8 +1,10 @@
 #pragma once
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -48,6 +50,21 @@ class TemporaryFolder {
  private:
   std::filesystem::path path_;
 };
+
+/// While it lives no file of this process may grow beyond some bytes, as on a full disk.
+class FullDisk {
+ public:
+  explicit FullDisk(std::size_t bytes);
+  ~FullDisk();
+  FullDisk(const FullDisk&) = delete;
+  FullDisk& operator=(const FullDisk&) = delete;
+
+ private:
+  rlimit before_{};
+};
+
+/// All that lies below a folder, by name: what it is and what it holds, links by their targets.
+std::map<std::string, std::string> snapshot(const std::string& folder);
 
 void write_file(const std::string& path, std::string_view bytes);
 std::string read_file(const std::string& path);

@@ -59,8 +59,27 @@ usr/bin/pointflight picture planned
 
 # everything goes again, but what others have put there
 cmake --install "$build" --prefix "$folder/gone" >"$folder/log"
+uninstall() {
+  cmake -D MANIFEST="$build/installed.txt" -P "$source/cmake/uninstall.cmake" >"$folder/log" 2>&1
+}
 touch gone/bin/precious
-cmake -D MANIFEST="$build/install_manifest.txt" -P "$source/cmake/uninstall.cmake" >"$folder/log" 2>&1
+uninstall || fail "the uninstaller failed: $(cat log)"
 left=$(find gone -type f)
 [ "$left" = gone/bin/precious ] || fail "the uninstaller left: $left"
 [ ! -e gone/share/pointflight ] && [ ! -e gone/include/pointflight ] || fail "folders were left"
+[ -d gone/share ] || fail "a folder went that others use"
+
+# a file in the place of ours, a folder behind a link, names that globs miss
+cmake --install "$build" --prefix "$folder/again" >"$folder/log"
+mkdir mine
+echo mine >mine/mid360.yaml
+cp again/share/pointflight/lidars/avia.yaml mine/
+mv again/share/pointflight/lidars elsewhere
+ln -s "$folder/mine" again/share/pointflight/lidars
+echo mine >again/share/pointflight/vehicles/quad_330.yaml
+touch "again/include/pointflight/core/$(printf 'a;b\nc[')" again/include/pointflight/.hidden
+uninstall || fail "the uninstaller failed: $(cat log)"
+[ "$(cat mine/mid360.yaml)" = mine ] && [ -f mine/avia.yaml ] || fail "a folder behind a link was emptied"
+[ -L again/share/pointflight/lidars ] || fail "somebody's link went"
+[ "$(cat again/share/pointflight/vehicles/quad_330.yaml)" = mine ] || fail "somebody's file went"
+[ "$(find again -type f | wc -l)" = 3 ] || fail "it left: $(find again -type f)"

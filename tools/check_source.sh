@@ -63,6 +63,13 @@ found=$(grep -rnE 'system_clock|steady_clock|time\(nullptr|std::(cout|cerr)|fmt:
         grep -vE '^pointflight/run/.*steady_clock')
 [ -z "$found" ] || { echo "wall clock or printing in the library:"; breach "$found"; }
 
+# What is removed or renamed goes through core/folder (by a list, never through a link); core/locked_file takes away
+# and names what it holds open. Empty folders that we made ourselves may go by rmdir.
+found=$(grep -rnE 'remove_all|(fs|filesystem)::(remove|rename)\(|std::(remove|rename)\(|\bunlink(at)?\(|renameat2?\(' \
+        apps pointflight campaign recording view share ros_common ros1 ros2 dds mpi --include='*.cpp' --include='*.hpp' |
+        grep -vE '^(pointflight/core/(folder|locked_file|scratch)|ros1/bag)\.cpp:|::(remove|rename)\([a-z_]+\.(begin|rbegin)')
+[ -z "$found" ] || { echo "removes or renames files beside core/folder and core/locked_file:"; breach "$found"; }
+
 # Public headers: std and Eigen only, so that a user needs no other headers.
 found=$(grep -rnE '#include <(fmt|yaml-cpp|nlohmann|tbb|oneapi|nanoflann|xxhash|lzf|liblzf|assimp|Random123|hwy|lzma|boost)' \
         pointflight ros_common recording campaign view share --include='*.hpp' | grep -vE 'io/byte_cursor.hpp|-inl.hpp')

@@ -1,8 +1,8 @@
 // Flies a drone through a map by what its LiDARs see, among moving obstacles: the planner of this
 // folder in the loop with the simulation, through the public interface only.
 //
-//   fly_with_planner MAP.pfmap -o RUN [--seed N] [--seeds N] [--obstacles N] [--threads N]
-//   fly_with_planner SCENARIO.yaml -o RUN [--threads N]
+//   fly_with_planner MAP.pfmap -o RUN [--force] [--seed N] [--seeds N] [--obstacles N] [--threads
+//   N] fly_with_planner SCENARIO.yaml -o RUN [--threads N]
 //
 // A scenario's first vehicle is flown to its last waypoint, with the scenario's own seed: as a
 // campaign's command (docs/campaigns.md).
@@ -29,6 +29,7 @@ namespace {
 struct Options {
   std::string map;
   std::string output;
+  Existing existing = Existing::kRefuse;  ///< --force: an earlier run is replaced.
   int seed = 1;
   int seeds = 0;  ///< Above 0: these many, from 1 on.
   int obstacles = 40;
@@ -145,10 +146,11 @@ Outcome fly(const Scenario& scenario,
             const Vector3d& goal,
             const std::shared_ptr<const SurfelMap>& map,
             const std::string& output,
+            Existing existing,
             const Executor& executor) {
   Simulation simulation(scenario, map, executor);
   std::unique_ptr<FlightRecorder> recorder;
-  if (!output.empty()) recorder = std::make_unique<FlightRecorder>(output, simulation);
+  if (!output.empty()) recorder = std::make_unique<FlightRecorder>(output, simulation, existing);
   Eyes eyes(recorder.get());
   planner::PlannerOptions planning;
   planning.height_min = kLow;
@@ -201,6 +203,8 @@ Options parse(int argc, char** argv) {
     };
     if (flag == "-o") {
       options.output = value();
+    } else if (flag == "--force") {
+      options.existing = Existing::kReplace;
     } else if (flag == "--seed") {
       options.seed = number();
     } else if (flag == "--seeds") {
@@ -217,7 +221,8 @@ Options parse(int argc, char** argv) {
   }
   if (options.map.empty()) {
     throw InputError(
-        "usage: fly_with_planner MAP.pfmap -o RUN [--seed N] [--seeds N] [--obstacles N]");
+        "usage: fly_with_planner MAP.pfmap -o RUN [--force] [--seed N] [--seeds N] [--obstacles "
+        "N]");
   }
   return options;
 }
@@ -242,7 +247,8 @@ bool say(std::int64_t seed, const Outcome& o) {
 int fly_scenario(const Options& options, const Executor& executor) {
   Vector3d goal;
   const Scenario scenario = scenario_from(options.map, goal);
-  const Outcome outcome = fly(scenario, goal, scenario.open_map(), options.output, executor);
+  const Outcome outcome =
+      fly(scenario, goal, scenario.open_map(), options.output, options.existing, executor);
   return say(scenario.seed, outcome) ? 0 : 1;
 }
 
@@ -261,7 +267,7 @@ int main(int argc, char** argv) try {
     const std::string output = options.seeds > 0 ? std::string() : options.output;
     Vector3d goal;
     const Scenario scenario = scenario_for(options, *map, seed, goal);
-    if (say(seed, fly(scenario, goal, map, output, executor))) continue;
+    if (say(seed, fly(scenario, goal, map, output, options.existing, executor))) continue;
     ++failed;
     std::printf("  replay: %s %s -o replay_%d --seed %d --obstacles %d\n",
                 argv[0],

@@ -7,8 +7,11 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <cstdio>
 #include <system_error>
+#include <utility>
 
+#include "pointflight/core/folder.hpp"
 #include "pointflight/core/input_error.hpp"
 
 namespace pointflight {
@@ -18,8 +21,21 @@ namespace {
 bool is_at(int descriptor, const std::string& path) {
   struct stat opened {};
   struct stat named {};
-  return ::fstat(descriptor, &opened) == 0 && ::stat(path.c_str(), &named) == 0 &&
+  return ::fstat(descriptor, &opened) == 0 && ::lstat(path.c_str(), &named) == 0 &&
          opened.st_ino == named.st_ino && opened.st_dev == named.st_dev;
+}
+
+[[noreturn]] void refuse(const std::string& path) {
+  throw InputError(fmt::format(
+      "{}: is there and was not left by a program of ours (a link, a pipe, a file with a second "
+      "name); move it away or give another name",
+      path));
+}
+
+/// What lies at an output's name: 0 nothing, S_IFREG, S_IFLNK, ...
+mode_t kind_of(const std::string& path) {
+  struct stat status {};
+  return ::lstat(path.c_str(), &status) == 0 ? status.st_mode & S_IFMT : 0;
 }
 
 }  // namespace
@@ -34,8 +50,11 @@ std::string write_error_text(int error) {
 
 int open_locked(const std::string& path, const std::string& name) {
   for (;;) {
-    const int descriptor = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
+    // never through a link: what it points to is not ours to empty
+    const int descriptor =
+        ::open(path.c_str(), O_RDWR | O_CREAT | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC, 0666);
     if (descriptor < 0) {
+      if (errno == ELOOP || errno == ENXIO) refuse(path);
       throw InputError(fmt::format("{}: cannot write: {}", name, write_error_text(errno)));
     }
     const int refused = ::flock(descriptor, LOCK_EX | LOCK_NB) == 0 ? 0 : errno;
@@ -48,14 +67,57 @@ int open_locked(const std::string& path, const std::string& name) {
     }
     // a file system without locks: as before there were any
     if (refused != 0 || is_at(descriptor, path)) {
-      // devices have no length
-      if (::ftruncate(descriptor, 0) == 0 || errno == EINVAL) return descriptor;
+      struct stat status {};
+      if (::fstat(descriptor, &status) != 0 || !S_ISREG(status.st_mode) || status.st_nlink > 1) {
+        ::close(descriptor);
+        refuse(path);
+      }
+      if (::ftruncate(descriptor, 0) == 0) return descriptor;
       const int error = errno;
       ::close(descriptor);
       throw InputError(fmt::format("{}: cannot write: {}", name, write_error_text(error)));
     }
     ::close(descriptor);
   }
+}
+
+void remove_locked(int descriptor, const std::string& path) {
+  if (is_at(descriptor, path)) ::unlink(path.c_str());
+}
+
+OutputName::OutputName(std::string path) : path_(std::move(path)) {
+  if (path_.empty()) throw InputError("no name is given for a file to write");
+  // renaming would replace a device, another's folder, or a link that somebody has put there
+  const mode_t kind = kind_of(path_);
+  if (kind == S_IFLNK) {
+    throw InputError(fmt::format(
+        "{}: is a symbolic link; give the path of the file that is to be written", path_));
+  }
+  if (kind != 0 && kind != S_IFREG) {
+    throw InputError(
+        fmt::format("{}: is there and is not a regular file; give the path of a file", path_));
+  }
+  was_there_ = kind == S_IFREG;
+}
+
+void OutputName::take(const std::string& complete, int descriptor) const {
+  int error = 0;
+  if (!is_at(descriptor, complete)) {
+    error = EEXIST;
+  } else if (!was_there_) {
+    error = rename_to_new(complete, path_);
+  } else if (const mode_t kind = kind_of(path_); kind != 0 && kind != S_IFREG) {
+    error = EEXIST;
+  } else if (::rename(complete.c_str(), path_.c_str()) != 0) {
+    error = errno;
+  }
+  if (error == 0) return;
+  throw InputError(fmt::format(
+      "{}: cannot write: {}",
+      path_,
+      error == EEXIST
+          ? "somebody has put something there meanwhile; move it away or give another name"
+          : write_error_text(error)));
 }
 
 FolderLock::FolderLock(const std::string& folder)

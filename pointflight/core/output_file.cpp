@@ -4,27 +4,16 @@
 #include <unistd.h>
 
 #include <cerrno>
-#include <filesystem>
-#include <system_error>
 #include <utility>
 
 #include "pointflight/core/input_error.hpp"
-#include "pointflight/core/locked_file.hpp"
 #include "pointflight/core/mapped_file.hpp"
 
 namespace pointflight {
 
 OutputFile::OutputFile(std::string path)
-    : path_(std::move(path)), partial_path_(path_ + ".partial"), buffer_(1 << 18) {
-  if (path_.empty()) throw InputError("no name is given for a file to write");
-  // renaming would replace a device or another's folder
-  std::error_code ignored;
-  const auto status = std::filesystem::status(path_, ignored);
-  if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) {
-    throw InputError(
-        fmt::format("{}: is there and is not a regular file; give the path of a file", path_));
-  }
-  file_ = ::fdopen(open_locked(partial_path_, path_), "wb");
+    : name_(std::move(path)), partial_path_(name_.path() + ".partial"), buffer_(1 << 18) {
+  file_ = ::fdopen(open_locked(partial_path_, name_.path()), "wb");
   if (file_ == nullptr) fail(errno);
   std::setvbuf(file_, buffer_.data(), _IOFBF, buffer_.size());
 }
@@ -32,12 +21,12 @@ OutputFile::OutputFile(std::string path)
 OutputFile::~OutputFile() {
   if (file_ == nullptr) return;
   // while it is still ours
-  std::remove(partial_path_.c_str());
+  remove_locked(::fileno(file_), partial_path_);
   std::fclose(file_);
 }
 
 OutputFile::OutputFile(OutputFile&& other) noexcept
-    : path_(std::move(other.path_)),
+    : name_(std::move(other.name_)),
       partial_path_(std::move(other.partial_path_)),
       buffer_(std::move(other.buffer_)),
       file_(std::exchange(other.file_, nullptr)) {}
@@ -65,12 +54,12 @@ void OutputFile::commit() {
   if (std::fflush(file_) != 0) fail(errno);
   // some file systems say only here that they have no room; the lock stays with `file_`
   if (::close(::dup(::fileno(file_))) != 0) fail(errno);
-  if (std::rename(partial_path_.c_str(), path_.c_str()) != 0) fail(errno);
+  name_.take(partial_path_, ::fileno(file_));
   std::fclose(std::exchange(file_, nullptr));
 }
 
 void OutputFile::fail(int error) const {
-  throw InputError(fmt::format("{}: cannot write: {}", path_, write_error_text(error)));
+  throw InputError(fmt::format("{}: cannot write: {}", path(), write_error_text(error)));
 }
 
 }  // namespace pointflight

@@ -7,6 +7,8 @@
 #include <string_view>
 #include <vector>
 
+#include "pointflight/core/locked_file.hpp"
+
 namespace pointflight {
 
 /// A file that appears under its name only when it is complete.
@@ -14,11 +16,12 @@ namespace pointflight {
 /// Bytes go to `<path>.partial`, which is locked and which `commit()` renames. Without `commit()`
 /// (an exception, an interrupt) the partial file is removed. Every failed write throws InputError
 /// with the path and the system's reason (disk full, no permission, ...), and so does `commit()`
-/// where a file that was read has been cut short meanwhile (core/mapped_file.hpp).
+/// if a file that was read has been cut short meanwhile (core/mapped_file.hpp), or if something has
+/// appeared at `path` that was not there.
 class OutputFile {
  public:
-  /// Opens and locks the partial file. Throws InputError where it cannot, where another program is
-  /// writing it, and where `path` is there and is no regular file.
+  /// Opens and locks the partial file. Throws InputError if it cannot, if another program is
+  /// writing it, and if a link, a folder or a device is at `path`.
   explicit OutputFile(std::string path);
   ~OutputFile();
   /// Takes over the open file; the other one may only be destroyed.
@@ -37,12 +40,12 @@ class OutputFile {
   void commit();
 
   /// The name that it will have.
-  [[nodiscard]] const std::string& path() const { return path_; }
+  [[nodiscard]] const std::string& path() const { return name_.path(); }
 
  private:
   [[noreturn]] void fail(int error) const;
 
-  std::string path_;
+  OutputName name_;
   std::string partial_path_;
   std::vector<char> buffer_;
   std::FILE* file_ = nullptr;

@@ -13,8 +13,15 @@ namespace {
 
 namespace fs = std::filesystem;
 
+/// A file itself: a link would lead to somebody else's.
+bool is_file(const fs::path& path) {
+  std::error_code ignored;
+  return fs::is_regular_file(fs::symlink_status(path, ignored));
+}
+
 /// The last bytes of a file as whole lines.
 std::vector<std::string> last_lines(const fs::path& path, std::size_t most) {
+  if (!is_file(path)) return {};
   std::ifstream file(path, std::ios::binary | std::ios::ate);
   if (!file) return {};
   const auto size = static_cast<std::size_t>(file.tellg());
@@ -68,6 +75,7 @@ std::optional<EndedRun> ended_run(const std::string& folder,
   std::map<std::size_t, std::map<SimTime, VehicleState>> known;
   EndedRun ended{{}, SimTime::max(), Duration{0}, {}};
   std::int64_t skipped = 0;
+  if (!is_file(staging / kSkippedFile) || !is_file(staging / "scenario.yaml")) return std::nullopt;
   if (!(std::ifstream(staging / kSkippedFile) >> skipped)) return std::nullopt;
   ended.skipped = Duration(skipped);
   try {

@@ -16,17 +16,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Makes a folder; returns it.
-std::string made_folder(const std::string& folder) {
-  std::error_code error;
-  fs::create_directories(folder, error);
-  if (error) {
-    throw InputError(fmt::format(
-        "{}: cannot make the folder: {}; choose another with -o", folder, error.message()));
-  }
-  return folder;
-}
-
 /// Seconds with nine digits: exact.
 std::string seconds(SimTime time) {
   const std::int64_t ns = time.time_since_epoch().count();
@@ -39,10 +28,6 @@ std::string csv(const Vector3d& v) {
 
 nlohmann::ordered_json json_of(const Vector3d& v) {
   return nlohmann::ordered_json::array({v.x(), v.y(), v.z()});
-}
-
-std::string at(const std::string& folder, const char* name) {
-  return (fs::path(folder) / name).string();
 }
 
 std::string row_of(const RigidBodyState& b) {
@@ -135,14 +120,13 @@ nlohmann::ordered_json json_of(const Simulation& simulation, const ApartSummary&
 
 /// What one vehicle's samples go to.
 struct FlightRecorder::VehicleFiles {
-  VehicleFiles(const std::string& in, const OutputSetup& output)
-      : folder(made_folder(in)),
-        trajectory(at(folder, "trajectory.csv")),
-        tum(at(folder, "trajectory.tum")),
-        scans(at(folder, "scans.csv")) {
-    if (output.scans) made_folder(at(folder, "scans"));
-    if (output.imu) imu.emplace(at(folder, "imu.csv"));
-    if (output.odometry) odometry.emplace(at(folder, "odometry.csv"));
+  VehicleFiles(RunFolder& run, std::string in, const OutputSetup& output)
+      : folder(std::move(in)),
+        trajectory(run.file(folder + "trajectory.csv")),
+        tum(run.file(folder + "trajectory.tum")),
+        scans(run.file(folder + "scans.csv")) {
+    if (output.imu) imu.emplace(run.file(folder + "imu.csv"));
+    if (output.odometry) odometry.emplace(run.file(folder + "odometry.csv"));
   }
 
   void commit() {
@@ -154,7 +138,7 @@ struct FlightRecorder::VehicleFiles {
     for (auto& [number, file] : sensors) file.commit();
   }
 
-  std::string folder;
+  std::string folder;  ///< In the run's: empty, or a name and a slash.
   OutputFile trajectory;
   SimTime flushed;  ///< The trajectory, last.
   OutputFile tum;
@@ -180,7 +164,7 @@ std::map<std::size_t, std::string> sensor_files(const VehicleAgent& vehicle) {
 
 void FlightRecorder::add_sensor_files(const VehicleAgent& vehicle, VehicleFiles& files) {
   for (const auto& [number, name] : sensor_files(vehicle)) {
-    OutputFile file(at(files.folder, name.c_str()));
+    OutputFile file(folder_.file(files.folder + name));
     std::string header = "time,delivered";
     for (const SensorColumn& column : vehicle.sensors()[number].kind->columns) {
       header += "," + column.name;
@@ -202,7 +186,7 @@ FlightRecorder::FlightRecorder(const std::string& folder,
       shared_(simulation.others() != nullptr ? &simulation : nullptr),
       events_(path_for("events.csv")) {
   if (shared_ == nullptr) folder_.forget_killed();  // nobody goes on from it
-  write_scenario_copy(simulation.scenario(), simulation.map(), folder_.staging(), folder_.path());
+  write_scenario_copy(simulation.scenario(), simulation.map(), folder_, folder_.path());
   const OutputSetup& output = simulation.scenario().output;
   events_.write(
       "time,event,vehicle,partner,vehicle_x,vehicle_y,vehicle_z,place_x,place_y,place_z,"
@@ -218,7 +202,7 @@ FlightRecorder::FlightRecorder(const std::string& folder,
       continue;
     }
     auto files = std::make_unique<VehicleFiles>(
-        simulation.vehicle_count() == 1 ? folder_.staging() : path_for(names_.back()), output);
+        folder_, simulation.vehicle_count() == 1 ? "" : names_.back() + "/", output);
     files->trajectory.write(
         fmt::format("time,{},command_px,command_py,command_pz,clearance,nearest", kStateColumns));
     for (std::size_t i = 0; i < simulation.status(v).state.rotors.size(); ++i) {
@@ -245,8 +229,8 @@ FlightRecorder::FlightRecorder(const std::string& folder,
 
 FlightRecorder::~FlightRecorder() = default;
 
-std::string FlightRecorder::path_for(const std::string& name) const {
-  return (fs::path(folder_.staging()) / name).string();
+std::string FlightRecorder::path_for(const std::string& name) {
+  return folder_.file(name);
 }
 
 void FlightRecorder::on_sample(const Sample& sample) {
@@ -322,7 +306,7 @@ void FlightRecorder::write(const ScanSample& sample) {
   const Scan& scan = *sample.scan;
   VehicleFiles& files = *vehicles_[scan.vehicle];
   const std::string name = fmt::format("scans/{}_{:06}.pcd", scan.sensor, scan.index);
-  write_scan_pcd(at(files.folder, name.c_str()), scan);
+  write_scan_pcd(folder_.file(files.folder + name), scan);
   // T_world_sensor in the middle of the scan
   const Pose pose = sample.T_world_sensor.at(scan.start + (scan.end - scan.start) / 2);
   const Quaterniond& q = pose.rotation;
@@ -387,8 +371,7 @@ void FlightRecorder::finish(const Simulation& simulation) {
   for (const auto& files : vehicles_) {
     if (files) files->commit();
   }
-  std::error_code ignored;
-  fs::remove(path_for(kSkippedFile), ignored);
+  folder_.drop(kSkippedFile);
   if (obstacles_) obstacles_->commit();
   events_.commit();
   OutputFile summary(path_for("summary.json"));

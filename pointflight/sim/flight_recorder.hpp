@@ -28,15 +28,16 @@ class FlightRecorder : public SampleSink {
 
   void on_sample(const Sample& sample) override;
 
-  /// Where to write a file that shall be part of the run, before `finish`.
-  [[nodiscard]] std::string path_for(const std::string& name) const;
+  /// Where to write a file that shall be part of the run, before `finish`. Throws InputError if the
+  /// folder has a file of that name that no run wrote.
+  [[nodiscard]] std::string path_for(const std::string& name);
 
   /// Closes the files and writes summary.json.
   void finish(const Simulation& simulation);
 
  private:
   struct VehicleFiles;
-  static void add_sensor_files(const VehicleAgent& vehicle, VehicleFiles& files);
+  void add_sensor_files(const VehicleAgent& vehicle, VehicleFiles& files);
   void write(const StateSample& sample);
   void write(const OdometrySample& sample);
   void write(const ImuSample& sample);

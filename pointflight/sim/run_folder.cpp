@@ -1,15 +1,14 @@
 #include "pointflight/sim/run_folder.hpp"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <filesystem>
-#include <fstream>
+#include <system_error>
 #include <utility>
-#include <vector>
 
 #include "pointflight/core/input_error.hpp"
-#include "pointflight/core/output_file.hpp"
 
 namespace pointflight {
 namespace {
@@ -18,7 +17,6 @@ namespace fs = std::filesystem;
 
 constexpr const char* kStaging = ".partial";
 constexpr const char* kKilled = ".killed";
-constexpr const char* kManifest = "files.txt";
 constexpr const char* kLast = "summary.json";
 
 /// Makes a folder; true where it was not there.
@@ -35,43 +33,28 @@ bool make_folder(const std::string& folder) {
   return made;
 }
 
-/// Files below a folder, by name, relative to it. Links count as files.
-std::vector<fs::path> files_below(const fs::path& folder) {
-  std::vector<fs::path> files;
-  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
-    if (entry.is_directory() && !entry.is_symlink()) continue;
-    files.push_back(entry.path().lexically_relative(folder));
-  }
-  std::sort(files.begin(), files.end());
-  return files;
+/// The files of the run that lies there.
+std::vector<ListedFile> earlier_run_in(const Folder& folder) {
+  if (auto files = read_file_list(folder)) return std::move(*files);
+  if (folder.entry(kFileList) == Entry::kNothing) return {};
+  throw InputError(
+      fmt::format("{}/{}: is not the list of a run's files; move it away or choose another folder",
+                  folder.path(),
+                  kFileList));
 }
 
-/// A manifest may say anything: only what lies below the folder is taken.
-bool is_below(const fs::path& relative) {
-  return !relative.empty() && relative.is_relative() &&
-         std::none_of(relative.begin(), relative.end(), [](const fs::path& part) {
-           return part == ".." || part == ".";
-         });
+void require_owned(const Folder& folder, const char* name) {
+  if (is_owned(folder, name)) return;
+  throw InputError(fmt::format(
+      "{}/{}: was not made by a run; move it away or choose another folder", folder.path(), name));
 }
 
-/// Takes away the files that an earlier run says it wrote, and folders that are empty then.
-void remove_earlier_run(const fs::path& folder) {
-  std::vector<fs::path> files = {kManifest};
-  std::ifstream manifest(folder / kManifest);
-  for (std::string line; std::getline(manifest, line);) {
-    if (is_below(line)) files.emplace_back(line);
-  }
-  std::error_code ignored;
-  fs::remove(folder / kLast, ignored);  // first: what is not whole has none
-  for (const fs::path& file : files) {
-    if (!fs::is_directory(fs::symlink_status(folder / file, ignored))) {
-      fs::remove(folder / file, ignored);
-    }
-    // refuses where anything is left
-    for (fs::path up = file.parent_path(); !up.empty(); up = up.parent_path()) {
-      if (fs::is_empty(folder / up, ignored)) fs::remove(folder / up, ignored);
-    }
-  }
+bool lists(const std::vector<ListedFile>& files, const std::string& name) {
+  const auto at =
+      std::lower_bound(files.begin(), files.end(), name, [](const ListedFile& file, const auto& n) {
+        return file.name < n;
+      });
+  return at != files.end() && at->name == name;
 }
 
 }  // namespace
@@ -86,63 +69,96 @@ std::string killed_run_in(const std::string& folder) {
   return fs::exists(aside, ignored) ? aside.string() : staging_of(folder);
 }
 
-RunFolder::RunFolder(std::string path, Existing existing)
-    : path_(std::move(path)), staging_(staging_of(path_)) {
+bool remove_run(const Folder& parent, const std::string& name) {
+  if (const auto folder = parent.below(name)) {
+    remove_owned(*folder, kStaging);
+    remove_owned(*folder, kKilled);
+  }
+  return remove_owned(parent, name);
+}
+
+RunFolder::RunFolder(std::string path, Existing existing) : path_(std::move(path)) {
   made_ = make_folder(path_);
   lock_.emplace(path_);
-  std::error_code error;
-  if (existing == Existing::kRefuse && !fs::is_empty(path_, error)) {
+  folder_.emplace(path_);
+  if (existing == Existing::kRefuse && !folder_->names().empty()) {
     throw InputError(fmt::format("{}: is not empty; choose another folder or give --force", path_));
   }
+  earlier_ = earlier_run_in(*folder_);
+  require_owned(*folder_, kStaging);
+  require_owned(*folder_, kKilled);
   // where something is set aside already, the run that did it had no time to begin
-  const fs::path aside = fs::path(path_) / kKilled;
-  if (!fs::exists(aside, error)) fs::rename(staging_, aside, error);
-  has_killed_ = fs::exists(aside, error);
-  fs::remove_all(staging_, error);
-  make_folder(staging_);
+  if (folder_->entry(kKilled) == Entry::kNothing) {
+    static_cast<void>(folder_->rename(kStaging, *folder_, kKilled));
+  }
+  has_killed_ = folder_->entry(kKilled) != Entry::kNothing;
+  remove_owned(*folder_, kStaging);
+  staging_.emplace(*folder_, kStaging);
 }
 
 RunFolder::~RunFolder() {
-  std::error_code ignored;
-  if (open_) fs::remove_all(staging_, ignored);
-  if (open_ && made_) fs::remove(path_, ignored);
+  if (!open_) return;
+  remove_owned(*folder_, kStaging);
+  if (made_) ::rmdir(path_.c_str());  // if it is empty
+}
+
+/// Who has a name of the run's, and is not of an earlier one, is not ours to replace.
+void RunFolder::check_free(const std::string& name) const {
+  const Entry entry = folder_->entry(name);
+  const bool ours = (entry == Entry::kFile || entry == Entry::kLink) && lists(earlier_, name);
+  if (entry == Entry::kNothing || ours) return;
+  throw InputError(fmt::format(
+      "{}/{}: was not written by an earlier run, and this one has a file of that name; move it "
+      "away or choose another folder",
+      path_,
+      name));
+}
+
+std::string RunFolder::file(const std::string& name) {
+  check_free(name);
+  return staging_->file(name);
+}
+
+std::string RunFolder::link(const std::string& name) {
+  check_free(name);
+  return staging_->link(name);
 }
 
 void RunFolder::forget_killed() {
-  if (!std::exchange(has_killed_, false)) return;
-  std::error_code ignored;
-  fs::remove_all(fs::path(path_) / kKilled, ignored);
+  if (std::exchange(has_killed_, false)) remove_owned(*folder_, kKilled);
+}
+
+void RunFolder::move_in(const std::string& name) {
+  const int error = staging_->folder().rename(name, *folder_, name);
+  if (error == 0) return;
+  throw InputError(fmt::format("{}/{}: cannot be moved there: {}; the run's files are in {}",
+                               path_,
+                               name,
+                               std::generic_category().message(error),
+                               staging_->path()));
 }
 
 void RunFolder::commit() {
   forget_killed();
-  const fs::path from = staging_;
-  const fs::path to = path_;
-  std::vector<fs::path> files = files_below(from);
-  {
-    OutputFile manifest((from / kManifest).string());
-    for (const fs::path& file : files) manifest.write(file.generic_string() + "\n");
-    manifest.commit();
-  }
-  files.emplace_back(kManifest);
-  // a run that has a summary is whole
-  std::stable_partition(
-      files.begin(), files.end(), [](const fs::path& file) { return file != kLast; });
+  std::vector<ListedFile> files = staging_->files();
+  std::erase_if(files, [&](const ListedFile& file) {  // listed and then not made
+    const Entry entry = staging_->folder().entry(file.name);
+    return entry != (file.is_link ? Entry::kLink : Entry::kFile);
+  });
+  for (const ListedFile& file : files) check_free(file.name);
   open_ = false;
-  remove_earlier_run(to);
-  for (const fs::path& file : files) {
-    std::error_code error;
-    fs::create_directories((to / file).parent_path(), error);
-    fs::rename(from / file, to / file, error);
-    if (error) {
-      throw InputError(fmt::format("{}: cannot be moved there: {}; the run's files are in {}",
-                                   (to / file).string(),
-                                   error.message(),
-                                   staging_));
-    }
+  // whatever ends us from here on, the list says of each file there that it is a run's
+  std::vector<ListedFile> both = earlier_;
+  both.insert(both.end(), files.begin(), files.end());
+  folder_->write(kFileList, file_list_text(both));
+  if (lists(earlier_, kLast)) folder_->remove_file(kLast);  // first: what is not whole has none
+  remove_listed(*folder_, earlier_);
+  for (const ListedFile& file : files) {
+    if (file.name != kLast) move_in(file.name);
   }
-  std::error_code ignored;
-  fs::remove_all(from, ignored);
+  folder_->write(kFileList, file_list_text(files));
+  if (lists(files, kLast)) move_in(kLast);  // a run that has a summary is whole
+  remove_owned(*folder_, kStaging);
 }
 
 }  // namespace pointflight

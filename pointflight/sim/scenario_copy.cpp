@@ -21,8 +21,8 @@ namespace fs = std::filesystem;
 /// Copies of a scenario's files, each once, in inputs/.
 class Inputs {
  public:
-  Inputs(std::string scenario_folder, std::string folder)
-      : from_(std::move(scenario_folder)), folder_(std::move(folder)) {}
+  Inputs(std::string scenario_folder, OutputFolder& folder)
+      : from_(std::move(scenario_folder)), folder_(folder) {}
 
   /// Copies a file that a setting names, and lets the setting name the copy.
   void take(std::string& setting) {
@@ -82,15 +82,13 @@ class Inputs {
   }
 
   void write(const std::string& name, std::string_view text) {
-    const fs::path inputs = fs::path(folder_) / "inputs";
-    std::error_code error;
-    fs::create_directories(inputs, error);
-    OutputFile file((inputs / name).string());  // says what is wrong with the folder
+    OutputFile file(folder_.file("inputs/" + name));
     file.write(text);
     file.commit();
   }
 
-  std::string from_, folder_;
+  std::string from_;
+  OutputFolder& folder_;
   std::map<std::string, std::string> names_;  ///< By source.
   std::set<std::string> taken_;
 };
@@ -131,14 +129,14 @@ struct Paths {
 
 /// A link to the map in the folder, or its path where the file system has no links.
 std::string link_to_map(const std::string& map_path,
-                        const std::string& folder,
+                        OutputFolder& folder,
                         const std::string& final_folder) {
   std::error_code error;
   const fs::path map = fs::canonical(map_path, error);
   if (error) return map_path;  // was never a file
   const fs::path target = map.lexically_relative(fs::weakly_canonical(final_folder));
   const std::string name = fs::path(map_path).filename().string();
-  fs::create_symlink(target, fs::path(folder) / name, error);
+  fs::create_symlink(target, folder.link(name), error);
   return error ? target.string() : name;
 }
 
@@ -153,14 +151,14 @@ std::vector<std::string> files_of(const Scenario& scenario) {
 
 void write_scenario_copy(const Scenario& scenario,
                          const SurfelMap& map,
-                         const std::string& folder,
+                         OutputFolder& folder,
                          const std::string& final_folder) {
   Scenario copy = scenario;
   Inputs inputs(scenario.folder(), folder);
   take_files(copy, inputs);
   copy.map = link_to_map(resolve_path(scenario.map, scenario.folder()), folder, final_folder);
   copy.map_hash = map.hash();
-  OutputFile file((fs::path(folder) / "scenario.yaml").string());
+  OutputFile file(folder.file("scenario.yaml"));
   file.write(
       "# As flown; every key: docs/scenario.md. Again: pointflight fly scenario.yaml -o RUN\n" +
       scenario_yaml(copy));

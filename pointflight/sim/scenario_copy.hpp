@@ -3,12 +3,13 @@
 #include <string>
 #include <vector>
 
+#include "pointflight/core/owned_files.hpp"
 #include "pointflight/sim/scenario.hpp"
 
 namespace pointflight {
 
 /// Writes a scenario as it is flown, with all that it takes from other files, so that it can be
-/// flown again from `folder` alone: scenario.yaml; inputs/ with copies of sensors, vehicles,
+/// flown again from that folder alone: scenario.yaml; inputs/ with copies of sensors, vehicles,
 /// profiles, obstacles' clouds, keyframes and trajectories that are given by path; and, under its
 /// own name, a link to the map, whose hash the scenario then demands.
 ///
@@ -17,7 +18,7 @@ namespace pointflight {
 /// InputError.
 void write_scenario_copy(const Scenario& scenario,
                          const SurfelMap& map,
-                         const std::string& folder,
+                         OutputFolder& folder,
                          const std::string& final_folder);
 
 /// Paths of the files that a scenario names: sensors, vehicles and profiles that are given by path,

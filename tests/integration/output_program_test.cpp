@@ -158,7 +158,8 @@ TEST_F(Output, ForceTakesAwayTheEarlierRunAndNothingElse) {
   EXPECT_FALSE(read_file(in("run/scans/0_000099.pcd")).empty());
   // nothing outside of the folder, whatever its list of files says
   write_file(in("precious"), "data");
-  write_file(in("run/files.txt"), "../precious\n/etc/hostname\n..\n.\n");
+  write_file(in("run/files.txt"),
+             read_file(in("run/files.txt")) + "../precious\n/etc/hostname\n..\n.\n");
   EXPECT_EQ(run(fmt::format("fly {} -o {} --force", scenario(0.2), in("run"))).code, 0);
   EXPECT_EQ(read_file(in("precious")), "data");
 }

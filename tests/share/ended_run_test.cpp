@@ -16,6 +16,8 @@ namespace {
 namespace fs = std::filesystem;
 
 using testing::Bus;
+using testing::error_of;
+using testing::expect_contains;
 using testing::Member;
 using testing::read_file;
 using testing::TemporaryFolder;
@@ -156,6 +158,30 @@ TEST_F(EndedRunTest, RowsThatAreCutOrNoStatesAreLeftOut) {
   }
   write_file(trajectory("a"), "");
   EXPECT_FALSE(ended());
+}
+
+TEST_F(EndedRunTest, LinksAreNotFollowedAndWhatTheyLeadToStays) {
+  fs::create_directory(folder_ / "theirs");
+  const std::string theirs = folder_ / "theirs/trajectory.csv.partial";
+  fs::rename(trajectory("a"), theirs);
+  fs::create_symlink(theirs, trajectory("a"));
+  const std::string text = read_file(theirs);
+  EXPECT_FALSE(ended());
+  Member next(
+      bus_, of_a_map(), {0, 1}, [this] { return now_; }, 2);
+  {
+    FlightRecorder recorder(killed_, next.simulation, Existing::kReplace);
+    next.simulation.advance_to(SimTime(std::chrono::milliseconds(10)), recorder);
+    recorder.finish(next.simulation);
+  }
+  EXPECT_EQ(read_file(theirs), text);
+  EXPECT_TRUE(fs::is_symlink(fs::path(killed_) / ".killed/a/trajectory.csv.partial"));
+  const std::string other = folder_ / "other";
+  fs::create_directory(other);
+  fs::create_directory_symlink(folder_ / "theirs", staging_of(other));
+  expect_contains(error_of([&] { FlightRecorder(other, next.simulation, Existing::kReplace); }),
+                  "was not made by a run");
+  EXPECT_EQ(read_file(theirs), text);
 }
 
 TEST_F(EndedRunTest, AnotherScenariosRunIsTold) {
