@@ -1,6 +1,6 @@
 # What nearly every source includes, compiled once for all libraries (position-independent) and once
 # for all tests: 15 to 30 % of a build's time. -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON builds without,
-# which lint does, for it builds none; with -DCMAKE_UNITY_BUILD=OFF as well it shows that each source
+# which lint does, for it builds none; with -DPOINTFLIGHT_BATCH=0 as well it shows that each source
 # includes what it uses.
 set(POINTFLIGHT_COMMON_HEADERS
   <algorithm> <array> <chrono> <cmath> <cstdint> <functional> <map> <memory> <optional> <span>

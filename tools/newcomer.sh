@@ -1,11 +1,19 @@
 #!/usr/bin/env bash
 # A bare Debian in which a new user follows the docs and nothing else: the demo, an own cloud to a flight, an own
 # sensor, an own vehicle, an own planner from an installed prefix.
-# usage: newcomer.sh [FOLDER]   (root; the tree is kept in FOLDER for a next time, else made anew)
+# usage: newcomer.sh [12|13 [FOLDER [test]]]   (root; the tree is kept in FOLDER for a next time, else made anew; with
+# `test` also ./dev test there)
 set -eu
+release=${1:-12}
+case $release in
+  12) suite=bookworm ;;
+  13) suite=trixie ;;
+  *) echo "newcomer: '$release'; Debian 12 or 13" >&2; exit 2 ;;
+esac
 source=$(cd "$(dirname "$0")/.." && pwd)
 [ "$(id -u)" = 0 ] || { echo "newcomer: needs root, for debootstrap and chroot" >&2; exit 2; }
-root=${1:-}
+root=${2:-}
+tests=${3:-}
 if [ -z "$root" ]; then
   root=$(mktemp -d)
   # the mounts below are gone with their namespace by then
@@ -13,19 +21,25 @@ if [ -z "$root" ]; then
 fi
 sources=/etc/apt
 if [ ! -x "$root/bin/bash" ]; then
-  echo "== a bare Debian 12 in $root" >&2
+  echo "== a bare Debian $release in $root" >&2
   mirror=$(sed -n 's/^URIs: *//p; s/^deb \(\[[^]]*\] \)\?\([^ ]*\) .*/\2/p' $sources/sources.list \
            $sources/sources.list.d/* 2>/dev/null | head -1)
-  debootstrap --variant=minbase bookworm "$root" "${mirror:-http://deb.debian.org/debian}" >/dev/null
-  # the same sources of packages as here, and no others
+  debootstrap --variant=minbase "$suite" "$root" "${mirror:-http://deb.debian.org/debian}" >/dev/null
+  # the same sources of packages as here, of that release, and no others
   rm -f "$root/etc/apt/sources.list"
   for file in $sources/apt.conf.d $sources/sources.list $sources/sources.list.d $sources/auth.conf.d; do
     [ ! -e "$file" ] || cp -a "$file" "$root/etc/apt/"
   done
+  here=$(sed -n 's/^VERSION_CODENAME=//p' /etc/os-release)
+  find "$root/etc/apt/sources.list" "$root/etc/apt/sources.list.d" -type f -exec sed -i "s/\b$here\b/$suite/g" {} + \
+    2>/dev/null || true
 fi
 rm -rf "$root/home/new"
 mkdir -p "$root/home/new"
 git clone -q "$source" "$root/home/new/pointflight"
+for file in /etc/npmrc "$HOME/.npmrc"; do  # npm's, too
+  [ ! -f "$file" ] || cp "$file" "$root${file/#$HOME/\/root}"
+done
 # what the user brings: a cloud of a place, as text
 cat >"$root/home/new/day.sh" <<'END'
 set -eux
@@ -50,6 +64,7 @@ POINTFLIGHT_INSTALLED=/usr/local tools/run_docs.py build/release \
   docs/sensors.md docs/vehicles.md docs/maps.md docs/planner.md
 cmake --build build/release --target uninstall >/dev/null
 test ! -e /usr/local/bin/pointflight
+[ -z "${1:-}" ] || ./dev test
 END
 echo "== the first day" >&2
 # mounts of its own, which go with it
@@ -57,4 +72,4 @@ unshare --mount --pid --fork sh -c '
   mount -t proc proc "$1/proc"
   mount --bind /dev "$1/dev"
   [ ! -e /etc/resolv.conf ] || cp -L /etc/resolv.conf "$1/etc/"
-  chroot "$1" bash /home/new/day.sh' sh "$root"
+  chroot "$1" bash /home/new/day.sh "$2"' sh "$root" "$tests"

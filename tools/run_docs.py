@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
 """Runs the code blocks of README.md and docs/*.md as a reader would.
 
-usage: run_docs.py BUILD_FOLDER [PAGE...]
+usage: run_docs.py BUILD_FOLDER [--in FOLDER] [PAGE...]
 
 Installs the build into a folder of its own ($POINTFLIGHT_INSTALLED: where it is already) and runs each
-page's shell blocks there, line by line, with that program in the path. The README comes first; every other page starts with the files that it left.
+page's shell blocks there, line by line, with that program in the path. The README comes first; every other page starts
+with the files that it left. With --in, README.md leaves them in FOLDER (made anew) and other pages find them there.
 A comment on the line before a block says what else it is:
 
   <!-- docs: file NAME -->          the block is a file of that name, which later blocks use;
@@ -13,6 +14,7 @@ A comment on the line before a block says what else it is:
   <!-- docs: arguments REASON -->   not run; commands, flags and launch files in it must exist
   <!-- docs: text -->               a drawing, a formula, what a program prints
 """
+import argparse
 import os
 import re
 import shutil
@@ -182,20 +184,31 @@ def run_page(page, folder, environment, tree):
 
 
 def main():
-    build = Path(sys.argv[1]).resolve()
-    pages = sys.argv[2:] or [str(page.relative_to(SOURCE)) for page in sorted((SOURCE / "docs").glob("*.md"))]
+    parser = argparse.ArgumentParser()
+    parser.add_argument("build", type=Path)
+    parser.add_argument("--in", type=Path, dest="shared")
+    parser.add_argument("pages", nargs="*")
+    options = parser.parse_intermixed_args()
+    build = options.build.resolve()
+    pages = options.pages or [str(page.relative_to(SOURCE)) for page in sorted((SOURCE / "docs").glob("*.md"))]
     with tempfile.TemporaryDirectory(prefix="pointflight_docs_") as scratch:
-        prefix = Path(os.environ.get("POINTFLIGHT_INSTALLED", Path(scratch) / "usr"))
-        if not prefix.exists():
-            subprocess.run(["cmake", "--install", build, "--prefix", prefix], check=True, capture_output=True)
+        shared = options.shared.resolve() if options.shared else Path(scratch)
+        begins = options.shared is None or pages == ["README.md"]
+        prefix = Path(os.environ.get("POINTFLIGHT_INSTALLED", shared / "usr"))
+        if begins:
+            shutil.rmtree(shared / "README", ignore_errors=True)
+            if "POINTFLIGHT_INSTALLED" not in os.environ:
+                shutil.rmtree(prefix, ignore_errors=True)
+                subprocess.run(["cmake", "--install", build, "--prefix", prefix], check=True, capture_output=True)
         environment = dict(os.environ, PATH=f"{prefix}/bin:{os.environ['PATH']}",
                            CMAKE_PREFIX_PATH=str(prefix), POINTFLIGHT_PREFIX=str(prefix),
                            SOURCE=str(SOURCE), CLICOLOR="0")
         environment.pop("POINTFLIGHT_DATA", None)
         tree = Tree(environment)
-        first = Path(scratch) / "README"
-        run_page("README.md", first, environment, tree)
-        for number, page in enumerate(pages):
+        first = shared / "README"
+        if begins:
+            run_page("README.md", first, environment, tree)
+        for number, page in enumerate(page for page in pages if page != "README.md"):
             folder = Path(scratch) / f"page{number}"
             subprocess.run(["cp", "-a", first, folder], check=True)
             run_page(page, folder, environment, tree)

@@ -28,7 +28,9 @@ class Folder {
   /// Opens a folder that the user named: links in `path` itself are followed. Throws InputError.
   explicit Folder(const std::string& path);
   ~Folder();
+  /// The other one may only be destroyed or assigned to.
   Folder(Folder&& other) noexcept;
+  /// Changes places with `other`.
   Folder& operator=(Folder&& other) noexcept;
 
   /// As given to the constructor, or the parent's path and the name; for messages.

@@ -16,9 +16,9 @@ inline constexpr const char* kFileList = "files.txt";
 
 /// One line of such a list.
 struct ListedFile {
-  std::string name;      ///< Relative to the folder.
-  bool is_link = false;  ///< We made a symbolic link, not a file.
-  bool operator==(const ListedFile&) const = default;
+  std::string name;                                    ///< Relative to the folder.
+  bool is_link = false;                                ///< We made a symbolic link, not a file.
+  bool operator==(const ListedFile&) const = default;  ///< Both are the same.
 };
 
 /// The list as text: a header by which it is known again, then a name per line, `\n` and `\\` for

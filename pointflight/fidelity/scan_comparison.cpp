@@ -86,12 +86,39 @@ class EnoughPoints {
   [[nodiscard]] double worstDist() const { return squared_; }
   [[nodiscard]] bool full() const { return true; }
   [[nodiscard]] std::size_t size() const { return count_; }
+  void sort() {}
   [[nodiscard]] bool enough() const { return count_ >= wanted_; }
 
  private:
   double squared_;
   std::size_t wanted_;
   std::size_t count_ = 0;
+};
+
+/// nanoflann's result set of all points within a radius, by their distance. (Its own one holds
+/// pairs up to version 1.4 and a type of its own from 1.5 on.)
+class PointsWithin {
+ public:
+  using DistanceType = double;
+  struct Item {
+    std::uint32_t index;
+    double squared;
+  };
+  explicit PointsWithin(double radius) : squared_(radius * radius) {}
+  bool addPoint(double squared, std::uint32_t index) {
+    if (squared < squared_) items_.push_back({index, squared});
+    return true;
+  }
+  [[nodiscard]] double worstDist() const { return squared_; }
+  [[nodiscard]] bool full() const { return true; }
+  [[nodiscard]] std::size_t size() const { return items_.size(); }
+  void sort() { std::ranges::sort(items_, {}, &Item::squared); }
+  void clear() { items_.clear(); }
+  [[nodiscard]] const std::vector<Item>& items() const { return items_; }
+
+ private:
+  double squared_;
+  std::vector<Item> items_;
 };
 // NOLINTEND(readability-identifier-naming)
 
@@ -140,7 +167,7 @@ SupportCloud::~SupportCloud() = default;
 bool SupportCloud::supports(const Vector3d& point_world) const {
   EnoughPoints result(kSupportRadius, kSupportPoints);
   const Vector3d query = point_world - tree_->origin;
-  tree_->index->findNeighbors(result, query.data(), nanoflann::SearchParams());
+  tree_->index->findNeighbors(result, query.data(), {});
   return result.enough();
 }
 
@@ -201,17 +228,17 @@ ErrorCollector ScanPlanes::compare(std::size_t scan, const Executor& executor) c
   // NaN where there is no plane
   std::vector<double> ranges(count, std::numeric_limits<double>::quiet_NaN());
   executor.parallel_for(count, 256, [&](std::size_t begin, std::size_t end) {
-    std::vector<std::pair<std::uint32_t, double>> near;
+    PointsWithin near(kSupportRadius);
     for (std::size_t i = begin; i < end; ++i) {
       const Vector3d p = own.points_sensor[i * kStride].cast<double>();
       const Vector3d place = own.T_world_sensor * p - tree_->origin;
       near.clear();
-      tree_->index->radiusSearch(
-          place.data(), kSupportRadius * kSupportRadius, near, nanoflann::SearchParams());
+      tree_->index->findNeighbors(near, place.data(), {});
+      near.sort();
       Vector3d sum = Vector3d::Zero();
       Matrix3d products = Matrix3d::Zero();
       double n = 0.0;
-      for (const auto& [index, squared] : near) {
+      for (const auto& [index, squared] : near.items()) {
         if (tree_->scan[index] == scan) continue;
         const Vector3d q = tree_->points[index].cast<double>() - place;
         sum += q;

@@ -74,7 +74,7 @@ TEST(MapLayers, FindACeilingAndLeaveWhatStandsBelowIt) {
   EXPECT_NEAR(layers.floor_at({10, 6, 2.0}), 0.0, 0.2);
 }
 
-TEST(MapLayers, DoNotTakeTheOpenOrCrownsForACeiling) {
+TEST(MapLayers, Statistics_DoNotTakeTheOpenOrCrownsForACeiling) {
   EXPECT_FALSE(MapLayers(*map_of(room(false), 0.1, 6.0)).has_ceiling());
   // crowns: leaves at any height from 4 to 9 m over all of the ground
   std::vector<Vector3d> points;

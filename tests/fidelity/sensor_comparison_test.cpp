@@ -62,7 +62,7 @@ class SensorComparisonTest : public ::testing::Test {
   std::vector<RealScan> scans_;
 };
 
-TEST_F(SensorComparisonTest, AModelFindsItself) {
+TEST_F(SensorComparisonTest, Statistics_AModelFindsItself) {
   const SensorComparison same = against(reflecting(0.2));
   EXPECT_EQ(same.beams, 3.0 * 32768.0);
   EXPECT_LT(same.blocked, 0.05 * same.beams);

@@ -44,7 +44,7 @@ std::vector<RecordedScan> recorded(const LidarSettings& settings, std::size_t co
   return scans;
 }
 
-TEST(SensorFit, FindsTheNoiseThatASensorWasGiven) {
+TEST(SensorFit, Statistics_FindsTheNoiseThatASensorWasGiven) {
   struct Case {
     const char* model;
     double range_sigma, angle_sigma_deg;

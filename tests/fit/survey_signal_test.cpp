@@ -18,9 +18,9 @@ using testing::error_of;
 using testing::expect_contains;
 using testing::map_of;
 
-class Rays : public SurveyReader {
+class SignalRays : public SurveyReader {
  public:
-  explicit Rays(const std::vector<SurveyRay>& rays) : rays_(rays) {}
+  explicit SignalRays(const std::vector<SurveyRay>& rays) : rays_(rays) {}
   bool read(std::vector<SurveyRay>& batch) override {
     batch.clear();
     for (; next_ < rays_.size() && batch.size() < 5000; ++next_) batch.push_back(rays_[next_]);
@@ -82,7 +82,7 @@ Painted painted(const SurfelMap& map,
   EditedMap edited = transform_map(map, {}, {}, Executor(1));
   paint_reflectivity(
       edited,
-      [&] { return std::make_unique<Rays>(rays); },
+      [&] { return std::make_unique<SignalRays>(rays); },
       options,
       {},
       Executor(threads),

@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "pointflight/map/surfel_map.hpp"
+#include "tests/paths.hpp"
 #include "tests/support.hpp"
 
 // Whole flights: the same bytes everywhere, and real maps where they are present.
@@ -20,9 +21,9 @@ using testing::read_file;
 using testing::shared_data;
 using testing::TemporaryFolder;
 
-int run(const std::string& arguments, const std::string& before = "") {
+int run_quietly(const std::string& arguments, const std::string& before = "") {
   const std::string command =
-      fmt::format("{} '{}' {} >/dev/null 2>&1", before, POINTFLIGHT_PROGRAM, arguments);
+      fmt::format("{} '{}' {} >/dev/null 2>&1", before, testing::kProgram, arguments);
   return std::system(command.c_str());  // NOLINT(concurrency-mt-unsafe)
 }
 
@@ -40,17 +41,20 @@ std::string bytes_of(const std::string& folder) {
   return all;
 }
 
-TEST(Flight, TheSameBytesWhateverTheThreadsAndTheProcessor) {
+TEST(Flight, Slow_TheSameBytesWhateverTheThreadsAndTheProcessor) {
   const TemporaryFolder folder;
   const std::string map = folder / "m.pfmap";
-  ASSERT_EQ(
-      run(fmt::format("map forest --size-x 24 --size-y 20 --density 300 -o {}", folder / "m.pcd")),
-      0);
-  ASSERT_EQ(run(fmt::format("map import {} -o {} --resolution 0.1", folder / "m.pcd", map)), 0);
-  ASSERT_EQ(run(fmt::format("scenario new {} -o {} --length 3", map, folder / "s.yaml")), 0);
+  ASSERT_EQ(run_quietly(fmt::format("map forest --size-x 24 --size-y 20 --density 300 -o {}",
+                                    folder / "m.pcd")),
+            0);
+  ASSERT_EQ(run_quietly(fmt::format("map import {} -o {} --resolution 0.1", folder / "m.pcd", map)),
+            0);
+  ASSERT_EQ(run_quietly(fmt::format("scenario new {} -o {} --length 3", map, folder / "s.yaml")),
+            0);
   const auto fly = [&](const std::string& name, int threads, const std::string& environment) {
     EXPECT_EQ(
-        run(fmt::format(
+        run_quietly(
+            fmt::format(
                 "fly {} -o {} --threads {} --seed 7", folder / "s.yaml", folder / name, threads),
             environment),
         0);
@@ -66,18 +70,19 @@ TEST(Flight, TheSameBytesWhateverTheThreadsAndTheProcessor) {
                   2,
                   "GLIBC_TUNABLES=glibc.cpu.hwcaps=-FMA,-AVX2,-FMA4,-AVX2_Usable,-FMA_Usable"));
   // and the map itself
-  EXPECT_EQ(run(fmt::format("map import {} -o {} --resolution 0.1 --threads 1",
-                            folder / "m.pcd",
-                            folder / "n.pfmap"),
-                "GLIBC_TUNABLES=glibc.cpu.hwcaps=-FMA,-AVX2,-FMA4,-AVX2_Usable,-FMA_Usable"),
-            0);
+  EXPECT_EQ(
+      run_quietly(fmt::format("map import {} -o {} --resolution 0.1 --threads 1",
+                              folder / "m.pcd",
+                              folder / "n.pfmap"),
+                  "GLIBC_TUNABLES=glibc.cpu.hwcaps=-FMA,-AVX2,-FMA4,-AVX2_Usable,-FMA_Usable"),
+      0);
   EXPECT_TRUE(read_file(map) == read_file(folder / "n.pfmap"));
 }
 
 /// Runs the program and returns its peak resident memory in MB; negative where it failed.
 double peak_memory_of(const std::string& arguments) {
   const std::string command =
-      fmt::format("exec '{}' {} >/dev/null 2>&1", POINTFLIGHT_PROGRAM, arguments);
+      fmt::format("exec '{}' {} >/dev/null 2>&1", testing::kProgram, arguments);
   const pid_t child = fork();
   if (child == 0) {
     execl("/bin/sh", "sh", "-c", command.c_str(), nullptr);
@@ -102,15 +107,15 @@ void PrintTo(const RealMap& map, std::ostream* out) {
 
 class RealFlight : public ::testing::TestWithParam<RealMap> {};
 
-TEST_P(RealFlight, ImportsScansAndFliesWithoutACollision) {
+TEST_P(RealFlight, Slow_ImportsScansAndFliesWithoutACollision) {
   const RealMap& param = GetParam();
   const std::string cloud = shared_data(fmt::format("maps/{}.pcd", param.name));
   SKIP_WITHOUT(cloud);
   const TemporaryFolder folder;
   const std::string map = folder / "m.pfmap";
-  ASSERT_EQ(run(fmt::format("map import {} -o {} {}", cloud, map, param.flags)), 0);
-  ASSERT_EQ(run(fmt::format("map info {} --verify", map)), 0);
-  ASSERT_EQ(run(fmt::format(
+  ASSERT_EQ(run_quietly(fmt::format("map import {} -o {} {}", cloud, map, param.flags)), 0);
+  ASSERT_EQ(run_quietly(fmt::format("map info {} --verify", map)), 0);
+  ASSERT_EQ(run_quietly(fmt::format(
                 "scenario new {} -o {} --length {}", map, folder / "s.yaml", param.length + 2.0)),
             0);
 

@@ -10,13 +10,15 @@
 #include <filesystem>
 #include <thread>
 
+#include "tests/paths.hpp"
+
 namespace pointflight::testing {
 
 Result run(const std::string& arguments, const std::string& before) {
   const TemporaryFolder folder;
   const std::string command = fmt::format("{} '{}' {} >'{}' 2>'{}'",
                                           before,
-                                          POINTFLIGHT_PROGRAM,
+                                          testing::kProgram,
                                           arguments,
                                           folder / "out",
                                           folder / "err");
@@ -29,11 +31,8 @@ Result run(const std::string& arguments, const std::string& before) {
 }
 
 Started::Started(const std::string& arguments) {
-  const std::string command = fmt::format("exec '{}' {} >'{}' 2>'{}'",
-                                          POINTFLIGHT_PROGRAM,
-                                          arguments,
-                                          folder_ / "out",
-                                          folder_ / "err");
+  const std::string command = fmt::format(
+      "exec '{}' {} >'{}' 2>'{}'", testing::kProgram, arguments, folder_ / "out", folder_ / "err");
   process_ = ::fork();
   if (process_ == 0) {
     ::execl("/bin/sh", "sh", "-c", command.c_str(), nullptr);

@@ -13,6 +13,7 @@
 
 #include "pointflight/io/csv_table.hpp"
 #include "tests/integration/program.hpp"
+#include "tests/paths.hpp"
 
 namespace pointflight {
 namespace {
@@ -29,7 +30,7 @@ using testing::write_file;
 
 /// Where `./dev test` puts Foxglove's MCAP reader; "" where it could not.
 std::string node_folder() {
-  const std::string folder = POINTFLIGHT_NODE;
+  const std::string folder = std::string(testing::kSource) + "/build/node";
   return std::filesystem::exists(folder + "/node_modules/@mcap/core") ? folder : "";
 }
 
@@ -39,13 +40,14 @@ std::string node_folder() {
 /// Lines of JSON that the independent reader prints: a head, then each message.
 std::vector<Json> read_independently(const std::string& path, const std::string& how = "") {
   const TemporaryFolder folder;
-  const std::string command = fmt::format("node '{}' '{}' '{}' {} >'{}' 2>'{}'",
-                                          POINTFLIGHT_READ_MCAP,
-                                          node_folder(),
-                                          path,
-                                          how,
-                                          folder / "out",
-                                          folder / "err");
+  const std::string command =
+      fmt::format("node '{}' '{}' '{}' {} >'{}' 2>'{}'",
+                  std::string(testing::kSource) + "/tests/recording/read_mcap.js",
+                  node_folder(),
+                  path,
+                  how,
+                  folder / "out",
+                  folder / "err");
   const int status = std::system(command.c_str());  // NOLINT(concurrency-mt-unsafe)
   EXPECT_EQ(status, 0) << read_file(folder / "err");
   std::vector<Json> lines;
@@ -224,7 +226,7 @@ TEST_F(Program, ARecordingOfAKilledFlightIsReadable) {
   const std::string active = bag + ".active";
   const pid_t child = fork();
   if (child == 0) {
-    const char* arguments[] = {POINTFLIGHT_PROGRAM,
+    const char* arguments[] = {testing::kProgram,
                                "fly",
                                yaml.c_str(),
                                "-o",
@@ -234,7 +236,7 @@ TEST_F(Program, ARecordingOfAKilledFlightIsReadable) {
                                "--record",
                                bag.c_str(),
                                nullptr};
-    execv(POINTFLIGHT_PROGRAM, const_cast<char* const*>(arguments));
+    execv(testing::kProgram, const_cast<char* const*>(arguments));
     _exit(127);
   }
   // the map's chunk, and after it others of what is measured

@@ -110,7 +110,7 @@ TEST_F(Program, FitsAMapToTheScansItWasMadeOf) {
   EXPECT_NE(info.out.find("rays of 10 scans"), std::string::npos) << info.out;
 }
 
-TEST_F(Program, MakesAMapOfScans) {
+TEST_F(Program, Slow_MakesAMapOfScans) {
   const TemporaryFolder folder;
   const std::string scans = survey_the_room(folder);
   const Result whole = run(fmt::format("map import {} -o {}", scans, folder / "auto.pfmap"));

@@ -23,19 +23,19 @@ using testing::read_file;
 using testing::TemporaryFolder;
 using testing::write_file;
 
-const std::vector<CloudPoint> kPoints = {{{1.5, -2.25, 3.0}, 10.0f, {255, 0, 7}},
-                                         {{0.0, 0.5, -0.125}, 20.0f, {1, 2, 3}},
-                                         {{-7.0, 8.0, 9.5}, 30.0f, {0, 128, 255}}};
+const std::vector<CloudPoint> kWritten = {{{1.5, -2.25, 3.0}, 10.0f, {255, 0, 7}},
+                                          {{0.0, 0.5, -0.125}, 20.0f, {1, 2, 3}},
+                                          {{-7.0, 8.0, 9.5}, 30.0f, {0, 128, 255}}};
 
-std::vector<CloudPoint> read_all(CloudReader& reader) {
+std::vector<CloudPoint> read_back(CloudReader& reader) {
   std::vector<CloudPoint> all;
   std::vector<CloudPoint> batch;
   while (reader.read(batch)) all.insert(all.end(), batch.begin(), batch.end());
   return all;
 }
 
-std::vector<CloudPoint> read_all(const std::string& path) {
-  return read_all(*open_cloud(path));
+std::vector<CloudPoint> read_back(const std::string& path) {
+  return read_back(*open_cloud(path));
 }
 
 TEST(CloudWriter, WhatIsWrittenReadsBackInEveryFormat) {
@@ -43,19 +43,19 @@ TEST(CloudWriter, WhatIsWrittenReadsBackInEveryFormat) {
   for (const char* name : {"a.pcd", "a.ply", "a.las"}) {
     SCOPED_TRACE(name);
     auto writer = write_cloud(OutputFile(folder / name), {.intensity = true, .color = true});
-    for (const CloudPoint& point : kPoints) writer->write(std::span(&point, 1));
+    for (const CloudPoint& point : kWritten) writer->write(std::span(&point, 1));
     EXPECT_FALSE(std::filesystem::exists(folder / name));  // not before it is complete
     writer->commit();
     EXPECT_EQ(writer->loss(), "");
     const auto reader = open_cloud(folder / name);
     EXPECT_TRUE(reader->has_intensity());
     EXPECT_TRUE(reader->has_color());
-    const auto points = read_all(folder / name);
-    ASSERT_EQ(points.size(), kPoints.size());
+    const auto points = read_back(folder / name);
+    ASSERT_EQ(points.size(), kWritten.size());
     for (std::size_t i = 0; i < points.size(); ++i) {
-      EXPECT_LT((points[i].position - kPoints[i].position).norm(), 1e-9);
-      EXPECT_EQ(points[i].intensity, kPoints[i].intensity);
-      EXPECT_EQ(points[i].color, kPoints[i].color);
+      EXPECT_LT((points[i].position - kWritten[i].position).norm(), 1e-9);
+      EXPECT_EQ(points[i].intensity, kWritten[i].intensity);
+      EXPECT_EQ(points[i].color, kWritten[i].color);
     }
   }
 }
@@ -67,18 +67,18 @@ TEST(CloudWriter, PlacesFarFromZeroKeepTheirMillimetres) {
     auto writer = write_cloud(OutputFile(folder / name), {});
     writer->write(std::span(&far, 1));
     writer->commit();
-    EXPECT_LT((read_all(folder / name).at(0).position - far.position).norm(), 1e-4) << name;
+    EXPECT_LT((read_back(folder / name).at(0).position - far.position).norm(), 1e-4) << name;
   }
   // single precision was chosen by the first batch
   auto writer = write_cloud(OutputFile(folder / "b.pcd"), {});
-  writer->write(std::span(kPoints));
+  writer->write(std::span(kWritten));
   expect_contains(error_of([&] { writer->write(std::span(&far, 1)); }), "single precision");
 }
 
 TEST(CloudWriter, NormalsAndEllipsoidsHaveColumns) {
   const TemporaryFolder folder;
   CloudRow row;
-  row.point = kPoints[0];
+  row.point = kWritten[0];
   row.normal = {0.0f, 0.6f, 0.8f};
   row.spread = {0.001f, 0.02f, 0.03f};
   row.surfel = 123456;
@@ -117,7 +117,7 @@ TEST(CloudWriter, AnEmptyCloudHasAHeader) {
   const TemporaryFolder folder;
   for (const char* name : {"a.pcd", "a.ply", "a.las"}) {
     write_cloud(OutputFile(folder / name), {})->commit();
-    EXPECT_TRUE(read_all(folder / name).empty()) << name;
+    EXPECT_TRUE(read_back(folder / name).empty()) << name;
   }
 }
 
@@ -127,13 +127,13 @@ TEST(Colors, OfPclAndOfPlyWithFloats) {
   write_file(folder / "a.pcd",
              "VERSION 0.7\nFIELDS x y z rgb\nSIZE 4 4 4 4\nTYPE F F F F\nWIDTH 1\nHEIGHT 1\n"
              "POINTS 1\nDATA ascii\n1 2 3 2.346397066966522e-38\n");
-  const auto pcd = read_all(folder / "a.pcd").at(0);
+  const auto pcd = read_back(folder / "a.pcd").at(0);
   EXPECT_EQ(pcd.color, (std::array<std::uint8_t, 3>{0xff, 0x80, 0x01}));
   write_file(folder / "a.ply",
              "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
              "property float z\nproperty float red\nproperty float green\nproperty float blue\n"
              "end_header\n1 2 3 1 0.5 0\n");
-  EXPECT_EQ(read_all(folder / "a.ply").at(0).color, (std::array<std::uint8_t, 3>{255, 128, 0}));
+  EXPECT_EQ(read_back(folder / "a.ply").at(0).color, (std::array<std::uint8_t, 3>{255, 128, 0}));
   EXPECT_FALSE(open_cloud(folder / "a.ply")->has_intensity());
   EXPECT_NEAR(static_cast<double>(luminance({{}, 0.0f, {255, 128, 0}})), 151.4, 0.1);
 }
@@ -225,20 +225,20 @@ TEST(CloudSource, AStreamIsKeptAndKnownByItsFirstBytes) {
   std::signal(SIGPIPE, SIG_IGN);
   for (const char* name : {"a.pcd", "a.ply", "a.las"}) {
     auto writer = write_cloud(OutputFile(folder / name), {});
-    writer->write(std::span(kPoints));
+    writer->write(std::span(kWritten));
     writer->commit();
     const CloudSource source = stream(read_file(folder / name));
     for (int pass = 0; pass < 2; ++pass) {
       const auto reader = source.open();
-      EXPECT_EQ(read_all(*reader).size(), 3u) << name;
+      EXPECT_EQ(read_back(*reader).size(), 3u) << name;
     }
   }
   std::string text;
   for (int i = 0; i < 100'000; ++i) text += "1 2 3\n";
   const auto reader = stream(text).open();
-  EXPECT_EQ(read_all(*reader).size(), 100'000u);
+  EXPECT_EQ(read_back(*reader).size(), 100'000u);
   const auto named = stream("1 2 3\n", "xyz").open();
-  EXPECT_EQ(read_all(*named).size(), 1u);
+  EXPECT_EQ(read_back(*named).size(), 1u);
   expect_contains(error_of([&] { stream(""); }), "nothing came");
   expect_contains(error_of([&] { stream(std::string("\1\2\3\4", 4)); }), "--format");
   expect_contains(error_of([&] { stream("ASTM-E57 and more"); }), "pdal translate");
@@ -258,7 +258,7 @@ TEST(CloudSource, AFormatCountsInsteadOfTheName) {
   write_file(folder / "scan.dat", "1 2 3\n4 5 6\n");
   const CloudSource source(folder / "scan.dat", "xyz");
   const auto reader = source.open();
-  EXPECT_EQ(read_all(*reader).size(), 2u);
+  EXPECT_EQ(read_back(*reader).size(), 2u);
 }
 
 TEST(MappedFile, RefusesWhatIsNoRegularFileWithoutWaiting) {

@@ -21,7 +21,7 @@ using testing::write_file;
 constexpr MeshLimits kShort{1.0, std::size_t{200} << 20};
 
 template <class T>
-void put(std::string& bytes, T value) {
+void put_raw(std::string& bytes, T value) {
   bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
 }
 
@@ -46,13 +46,13 @@ std::string obj() {
 
 std::string stl(bool ascii) {
   std::string bytes = ascii ? "solid pyramid\n" : std::string(80, ' ');
-  if (!ascii) put(bytes, std::uint32_t{6});
+  if (!ascii) put_raw(bytes, std::uint32_t{6});
   for (const auto& f : kFaces) {
     if (ascii) bytes += "facet normal 0 0 1\nouter loop\n";
     if (!ascii) bytes += std::string(12, '\0');
     for (const int corner : f) {
       for (const float c : kCorners[corner]) {
-        if (!ascii) put(bytes, c);
+        if (!ascii) put_raw(bytes, c);
       }
       const auto& c = kCorners[corner];
       if (ascii) bytes += fmt::format("vertex {} {} {}\n", c[0], c[1], c[2]);
@@ -70,14 +70,14 @@ std::string ply(bool ascii) {
   for (const auto& c : kCorners) {
     if (ascii) bytes += fmt::format("{} {} {}\n", c[0], c[1], c[2]);
     for (const float value : c) {
-      if (!ascii) put(bytes, value);
+      if (!ascii) put_raw(bytes, value);
     }
   }
   for (const auto& f : kFaces) {
     if (ascii) bytes += fmt::format("3 {} {} {}\n", f[0], f[1], f[2]);
-    if (!ascii) put(bytes, std::uint8_t{3});
+    if (!ascii) put_raw(bytes, std::uint8_t{3});
     for (const std::int32_t value : f) {
-      if (!ascii) put(bytes, value);
+      if (!ascii) put_raw(bytes, value);
     }
   }
   return bytes;
@@ -120,10 +120,10 @@ std::string gltf_json(const std::string& uri) {
 std::string gltf_buffer() {
   std::string bytes;
   for (const auto& f : kFaces) {
-    for (const int index : f) put(bytes, static_cast<std::uint16_t>(index));
+    for (const int index : f) put_raw(bytes, static_cast<std::uint16_t>(index));
   }
   for (const auto& corner : kCorners) {
-    for (const float c : corner) put(bytes, c);
+    for (const float c : corner) put_raw(bytes, c);
   }
   return bytes;
 }
@@ -145,11 +145,11 @@ std::string glb() {
   json.resize((json.size() + 3) / 4 * 4, ' ');
   const std::string buffer = gltf_buffer();
   std::string bytes = "glTF";
-  put(bytes, std::uint32_t{2});
-  put(bytes, static_cast<std::uint32_t>(12 + 8 + json.size() + 8 + buffer.size()));
-  put(bytes, static_cast<std::uint32_t>(json.size()));
+  put_raw(bytes, std::uint32_t{2});
+  put_raw(bytes, static_cast<std::uint32_t>(12 + 8 + json.size() + 8 + buffer.size()));
+  put_raw(bytes, static_cast<std::uint32_t>(json.size()));
   bytes += "JSON" + json;
-  put(bytes, static_cast<std::uint32_t>(buffer.size()));
+  put_raw(bytes, static_cast<std::uint32_t>(buffer.size()));
   return bytes + std::string("BIN\0", 4) + buffer;
 }
 

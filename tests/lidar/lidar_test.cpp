@@ -20,7 +20,7 @@ LidarSettings exact_lidar(const std::string& name) {
   return settings;
 }
 
-TEST(Lidar, AScanTakenWhileFlyingUsesThePoseOfEachBeam) {
+TEST(Lidar, Statistics_AScanTakenWhileFlyingUsesThePoseOfEachBeam) {
   // 5 m/s along x and 180 deg/s of yaw inside a box
   ShapeScene scene;
   scene.add_box({-6, -6, -2}, {6, 6, 4});
@@ -97,7 +97,7 @@ double share_of_pixels(double depth, bool noise) {
   return count / static_cast<double>(scan.beams);
 }
 
-TEST(Lidar, ADepthCamerasLimitsAreOfTheDepthAlongItsAxis) {
+TEST(Lidar, Statistics_ADepthCamerasLimitsAreOfTheDepthAlongItsAxis) {
   for (const bool noise : {false, true}) {
     EXPECT_GT(share_of_pixels(5.0, noise), 0.9999);
     EXPECT_GT(share_of_pixels(5.9, noise), 0.9999);
@@ -314,7 +314,7 @@ TEST(Lidar, TruthIsWhatIsThereAndWhereExactDeskewingPutsThePoint) {
   }
 }
 
-TEST(Lidar, TruthOfWideBeamsSaysWhatIsMixed) {
+TEST(Lidar, Statistics_TruthOfWideBeamsSaysWhatIsMixed) {
   // a pillar before a wall 3 m behind it: an OS1's beams that graze its edges see both
   ShapeScene scene;
   scene.add_box({-12, -12, -3}, {12, 12, 5});

@@ -183,7 +183,7 @@ TEST(StereoCamera, GrazedSurfacesHaveNoDepth) {
   }
 }
 
-TEST(StereoCamera, ItsInfraredPictureIsLitByProjectorAndSun) {
+TEST(StereoCamera, Statistics_ItsInfraredPictureIsLitByProjectorAndSun) {
   // a wall at 2 m on the left and one at 4 m on the right
   ShapeScene scene;
   scene.add_box({2.0, 0.0, -12}, {2.4, 12, 12});

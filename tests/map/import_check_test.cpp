@@ -43,7 +43,7 @@ TEST(ImportCheck, AHallInMetresIsFine) {
   EXPECT_EQ(warnings(folder / "a.pcd"), std::vector<std::string>());
 }
 
-TEST(ImportCheck, OtherUnitsAreSaidWithTheScaleThatMendsThem) {
+TEST(ImportCheck, Slow_OtherUnitsAreSaidWithTheScaleThatMendsThem) {
   const TemporaryFolder folder;
   struct Case {
     double per_metre;
@@ -77,7 +77,7 @@ TEST(ImportCheck, AUnitInTheHeaderThatWasNotHeeded) {
   EXPECT_EQ(warnings(folder / "a.ply", options), std::vector<std::string>());
 }
 
-TEST(ImportCheck, TheSharedMapsAreFine) {
+TEST(ImportCheck, Slow_TheSharedMapsAreFine) {
   for (const char* name : {"maps/drone_hall.pcd",
                            "maps/garage.pcd",
                            "maps/forest_tls.pcd",

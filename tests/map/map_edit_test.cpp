@@ -177,7 +177,7 @@ TEST(TransformMap, ATurnCostsBeamsLessThanAHundredthOfTheResolution) {
   EXPECT_LT(far, again.size() / 500);
 }
 
-TEST(TransformMap, DoesNotDependOnThreads) {
+TEST(TransformMap, Threads_DoesNotDependOnThreads) {
   const auto map = map_of(room(), 0.1);
   const Pose T{quaternion_from_rpy(0.0, 0.1, 0.3), {1.0, 2.0, 3.0}};
   const EditedMap one = transform_map(*map, T, {}, Executor(1));

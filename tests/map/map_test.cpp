@@ -21,7 +21,7 @@ using testing::import_points;
 using testing::map_of;
 using testing::TemporaryFolder;
 
-ShapeScene room() {
+ShapeScene small_room() {
   ShapeScene scene;
   scene.add_box({0, 0, 0}, {6, 5, 3});
   scene.shapes.emplace_back(Sphere{{3, 2, 1}, 0.6});
@@ -84,7 +84,7 @@ TEST(Import, AMapInUtmCoordinatesIsAsExactAsOneAtZero) {
   const Vector3d shift(500000.0, 5400000.0, 300.0);
   std::vector<Vector3d> here;
   std::vector<Vector3d> there;
-  room().sample(800.0, 0.0, 1, [&](const Vector3d& p) {
+  small_room().sample(800.0, 0.0, 1, [&](const Vector3d& p) {
     here.push_back(p);
     there.push_back(p + shift);
   });
@@ -100,7 +100,7 @@ TEST(Import, AMapInUtmCoordinatesIsAsExactAsOneAtZero) {
 }
 
 TEST(Import, CountsAndDropsWhatIsNotFinite) {
-  auto points = cloud_of(room(), 500.0);
+  auto points = cloud_of(small_room(), 500.0);
   const std::size_t good = points.size();
   points.push_back({{std::nan(""), 0, 0}, 0.0f});
   points.push_back({{0, std::numeric_limits<double>::infinity(), 0}, 0.0f});
@@ -127,12 +127,12 @@ TEST(Import, TooWideForTheResolutionIsAnError) {
   expect_contains(error_of([&] { import_points(points, options); }), "coarser --resolution");
 }
 
-TEST(Import, MeasuresTheNoiseAndTakesItOut) {
+TEST(Import, Statistics_MeasuresTheNoiseAndTakesItOut) {
   for (const double noise : {0.0, 0.005, 0.01, 0.02}) {
     SCOPED_TRACE(noise);
     ImportOptions options;
     options.resolution = 0.05;
-    const ImportedMap imported = import_points(cloud_of(room(), 3200.0, noise), options);
+    const ImportedMap imported = import_points(cloud_of(small_room(), 3200.0, noise), options);
     EXPECT_NEAR(imported.report.noise, noise, 0.12 * noise + 1e-4);
     EXPECT_EQ(imported.report.projection.projected > 0, noise > 0.0025);
     // centres on the floor lie on it
@@ -226,7 +226,7 @@ TEST(Import, OnePointMakesAMapOfOneSurfel) {
 }
 
 TEST(Import, TakesStrayPointsOutAndLeavesEvenlySparseGroundIn) {
-  auto points = cloud_of(room(), 800.0, 0.002);
+  auto points = cloud_of(small_room(), 800.0, 0.002);
   // stray points in the room's air, and ground outside with a point every 0.3 m
   const RandomStream random(1, StreamId::kTest, 0);
   constexpr std::size_t kStray = 40;
@@ -271,7 +271,7 @@ TEST(Import, ChoosesTheResolutionThatTheSpacingSupports) {
 
 TEST(Import, KeepsIntensities) {
   const TemporaryFolder folder;
-  auto points = cloud_of(room(), 500.0);
+  auto points = cloud_of(small_room(), 500.0);
   for (CloudPoint& p : points) p.intensity = p.position.z() > 2.9 ? 200.0f : 50.0f;
   write_cloud_pcd(OutputFile(folder / "a.pcd"), points, true);
   ImportOptions options;
@@ -301,8 +301,8 @@ TEST(Import, UpAxisAndScale) {
   EXPECT_NEAR(map.description.bounds_world.min.y(), -0.98, 0.51 * step);
 }
 
-TEST(Import, DoesNotDependOnThreads) {
-  const auto points = cloud_of(room(), 1500.0, 0.004);
+TEST(Import, Threads_DoesNotDependOnThreads) {
+  const auto points = cloud_of(small_room(), 1500.0, 0.004);
   ImportOptions options;
   options.resolution = 0.05;
   std::uint64_t first = 0;
@@ -318,7 +318,7 @@ TEST(Import, DoesNotDependOnThreads) {
 }
 
 TEST(Import, MemoryThatIsTooSmallChangesTheRoundingAtMost) {
-  const auto points = cloud_of(room(), 1500.0, 0.004);
+  const auto points = cloud_of(small_room(), 1500.0, 0.004);
   ImportOptions options;
   options.resolution = 0.05;
   const ImportedMap whole = import_points(points, options);
@@ -358,7 +358,7 @@ double brute_force_distance(const SurfelMap& map, const Vector3d& p) {
 }
 
 TEST(Nearest, EqualsBruteForce) {
-  const auto map = map_of(room(), 0.1, 8.0, 0.005);
+  const auto map = map_of(small_room(), 0.1, 8.0, 0.005);
   const RandomStream random(3, StreamId::kTest, 0);
   for (std::uint64_t i = 0; i < 300; ++i) {
     const Vector3d p(random.uniform(3 * i, -2, 8),
@@ -376,7 +376,7 @@ TEST(MapFile, OpensFromDiskAndVerifies) {
   const TemporaryFolder folder;
   ImportOptions options;
   options.resolution = 0.1;
-  const ImportedMap imported = import_points(cloud_of(room(), 800.0), options);
+  const ImportedMap imported = import_points(cloud_of(small_room(), 800.0), options);
   write_map(OutputFile(folder / "a.pfmap"), imported.tree, imported.description);
   const auto map = SurfelMap::open(folder / "a.pfmap");
   map->verify();
@@ -389,7 +389,7 @@ TEST(MapFile, OpensFromDiskAndVerifies) {
 TEST(MapFile, LeavesAtTheEndOf32BitsAreNotRead) {
   ImportOptions options;
   options.resolution = 0.2;
-  const ImportedMap imported = import_points(cloud_of(room(), 800.0), options);
+  const ImportedMap imported = import_points(cloud_of(small_room(), 800.0), options);
   auto bytes = map_bytes(imported.tree, imported.description);
   // with a surfel or two more, such an offset is small again in 32 bits
   for (std::size_t i = 0; i < imported.tree.nodes.size(); ++i) {
@@ -403,7 +403,7 @@ TEST(MapFile, LeavesAtTheEndOf32BitsAreNotRead) {
 }
 
 TEST(MapFile, DamageIsFoundAndNeverCrashes) {
-  const ImportedMap imported = import_points(cloud_of(room(), 800.0), [] {
+  const ImportedMap imported = import_points(cloud_of(small_room(), 800.0), [] {
     ImportOptions options;
     options.resolution = 0.2;
     return options;

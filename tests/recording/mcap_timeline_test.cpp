@@ -22,7 +22,7 @@ using testing::expect_contains;
 using testing::read_file;
 using testing::TemporaryFolder;
 
-Bytes clock_bytes(int i) {
+Bytes tick_bytes(int i) {
   return std::make_shared<const std::vector<std::byte>>(encode<Wire::kCdr>(msg::Clock{{i, 0}}));
 }
 
@@ -31,7 +31,7 @@ void record(const std::string& path, int count, const std::string& compression =
   McapWriter writer(path, {compression, 900});
   const int a = writer.advertise({"/a", message_type<msg::Clock>()});
   const int b = writer.advertise({"/b", message_type<msg::Clock>(), true, 1});
-  for (int i = 0; i < count; ++i) writer.send(i % 4 == 0 ? b : a, clock_bytes(i), 1000 + 10 * i);
+  for (int i = 0; i < count; ++i) writer.send(i % 4 == 0 ? b : a, tick_bytes(i), 1000 + 10 * i);
   writer.close();
 }
 

@@ -134,7 +134,7 @@ class Bits : public ::testing::TestWithParam<Recorded> {
   std::uint64_t map_hash_ = 0;
 };
 
-TEST_P(Bits, AreThoseRecorded) {
+TEST_P(Bits, Slow_AreThoseRecorded) {
 #if defined(__x86_64__)
   const Recorded& recorded = GetParam();
   EXPECT_EQ(map_hash_, recorded.map) << "the map is another";

@@ -89,7 +89,7 @@ struct Shots {
   }
 };
 
-TEST(Bodies, AreSeenWhereTheyAreAtEachBeamsOwnTime) {
+TEST(Bodies, Statistics_AreSeenWhereTheyAreAtEachBeamsOwnTime) {
   const BeamRenderer renderer({room()});
   const Shots shots(20000);
   const Executor executor(2);

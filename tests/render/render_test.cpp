@@ -112,7 +112,7 @@ TEST(HitList, WeightsAddUpWithinTheWindowOnly) {
   EXPECT_FLOAT_EQ(list.evaluate(0.35f, 0.025f)->range, 5.01f);
 }
 
-TEST(BeamRenderer, MeetsAPlaneAtItsExactRange) {
+TEST(BeamRenderer, Statistics_MeetsAPlaneAtItsExactRange) {
   ShapeScene scene;
   scene.add_rectangle({5, -10, -10}, {0, 20, 0}, {0, 0, 20});
   const BeamRenderer renderer(Scene{map_of(scene, 0.05)});
@@ -124,7 +124,7 @@ TEST(BeamRenderer, MeetsAPlaneAtItsExactRange) {
   EXPECT_LT(errors.leak, 0.001);
 }
 
-TEST(BeamRenderer, GrazingBeamsStayOnTheFloor) {
+TEST(BeamRenderer, Statistics_GrazingBeamsStayOnTheFloor) {
   ShapeScene scene;
   scene.add_rectangle({-1, -5, 0}, {40, 0, 0}, {0, 10, 0});
   const BeamRenderer renderer(Scene{map_of(scene, 0.05)});
@@ -154,7 +154,7 @@ TEST(BeamRenderer, SphereAndBoxWithinMillimetres) {
   EXPECT_LT(errors.false_returns, 0.01);
 }
 
-TEST(BeamRenderer, ReportsTheAngleOfIncidence) {
+TEST(BeamRenderer, Statistics_ReportsTheAngleOfIncidence) {
   ShapeScene scene;
   scene.add_rectangle({5, -10, -10}, {0, 20, 0}, {0, 0, 20});
   const BeamRenderer renderer(Scene{map_of(scene, 0.05)});
@@ -254,7 +254,7 @@ TEST(BeamRenderer, EqualsTheModelWithoutATree) {
   EXPECT_LE(differing, compared / 500) << differing << " of " << compared;
 }
 
-TEST(BeamRenderer, DoesNotDependOnThreads) {
+TEST(BeamRenderer, Threads_DoesNotDependOnThreads) {
   ShapeScene scene;
   scene.add_box({-4, -4, -2}, {4, 4, 2});
   const BeamRenderer renderer(Scene{map_of(scene, 0.1, 6.0, 0.01)});
@@ -277,7 +277,7 @@ std::vector<std::uint32_t> bits_of(const std::vector<Hit>& hits) {
   return bits;
 }
 
-TEST(BeamRenderer, TheSameBitsOnEveryInstructionSetAndInEveryOrder) {
+TEST(BeamRenderer, Threads_TheSameBitsOnEveryInstructionSetAndInEveryOrder) {
   ShapeScene scene;
   scene.add_box({-4, -4, -2}, {4, 4, 2});
   scene.shapes.emplace_back(Sphere{{2, 2, 0}, 0.5});
@@ -421,7 +421,7 @@ class PaperAgainstBeam : public ::testing::Test {
   }
 };
 
-TEST_F(PaperAgainstBeam, OnAPlane) {
+TEST_F(PaperAgainstBeam, Statistics_OnAPlane) {
   ShapeScene scene;
   scene.add_rectangle({5, -10, -10}, {0, 20, 0}, {0, 0, 20});
   const Agreement a = agree(scene, fan({0, 0, 0}, 45, 30, 0.5));
@@ -430,7 +430,7 @@ TEST_F(PaperAgainstBeam, OnAPlane) {
   EXPECT_LT(a.only_beam + a.only_paper, 0.001);
 }
 
-TEST_F(PaperAgainstBeam, OnAFloorAtGrazingAngles) {
+TEST_F(PaperAgainstBeam, Statistics_OnAFloorAtGrazingAngles) {
   ShapeScene scene;
   scene.add_rectangle({-1, -12, 0}, {14, 0, 0}, {0, 24, 0});
   std::vector<Ray> rays;
@@ -457,7 +457,7 @@ TEST_F(PaperAgainstBeam, OnASphereAndABox) {
   EXPECT_LT(a.only_paper, 0.01);
 }
 
-TEST_F(PaperAgainstBeam, AllAroundAndAcrossTheRear) {
+TEST_F(PaperAgainstBeam, Statistics_AllAroundAndAcrossTheRear) {
   ShapeScene scene;
   scene.add_box({-4, -4, -2}, {4, 4, 2});
   const Agreement a = agree(scene, fan({0.3, -0.2, 0.1}, 179.9, 45, 0.7));
@@ -466,7 +466,7 @@ TEST_F(PaperAgainstBeam, AllAroundAndAcrossTheRear) {
   EXPECT_LT(a.only_beam + a.only_paper, 0.002);
 }
 
-TEST(PaperRenderer, DoesNotDependOnThreads) {
+TEST(PaperRenderer, Threads_DoesNotDependOnThreads) {
   ShapeScene scene;
   scene.add_box({-4, -4, -2}, {4, 4, 2});
   const PaperRenderer renderer(Scene{map_of(scene, 0.1, 6.0, 0.01)}, {});

@@ -25,6 +25,7 @@
 #include "messages.h"
 #include "ros_common/description.hpp"
 #include "tests/integration/program.hpp"
+#include "tests/paths.hpp"
 
 namespace pointflight::testing {
 
@@ -198,10 +199,10 @@ class Flight {
       const int out = open(log.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
       dup2(out, 1);
       dup2(out, 2);
-      std::vector<char*> argv = {const_cast<char*>(POINTFLIGHT_PROGRAM), const_cast<char*>("fly")};
+      std::vector<char*> argv = {const_cast<char*>(testing::kProgram), const_cast<char*>("fly")};
       for (const std::string& a : arguments) argv.push_back(const_cast<char*>(a.c_str()));
       argv.push_back(nullptr);
-      execv(POINTFLIGHT_PROGRAM, argv.data());
+      execv(testing::kProgram, argv.data());
       _exit(127);
     }
   }

@@ -196,7 +196,7 @@ TEST(RosBridge, BothWiresSayTheSame) {
   }
 }
 
-TEST(RosBridge, TheSameBytesDoesNotDependOnThreads) {
+TEST(RosBridge, Threads_TheSameBytesDoesNotDependOnThreads) {
   std::uint64_t first = 0;
   for (const int threads : {1, 2, 8}) {
     Keeper keeper;
@@ -302,7 +302,7 @@ TEST(RosBridge, MarsimsGraph) {
 }
 
 /// tf2 knows one parent and one place of each frame.
-TEST(RosBridge, SeveralVehiclesShareNoFrame) {
+TEST(RosBridge, Slow_SeveralVehiclesShareNoFrame) {
   Scenario scenario = flight(0.3);
   scenario.vehicles[0].lidars.push_back(LidarMount{"d455"});
   scenario.vehicles.push_back(scenario.vehicles[0]);

@@ -15,7 +15,7 @@ namespace {
 using testing::error_of;
 using testing::expect_contains;
 
-constexpr Duration kEpoch = std::chrono::seconds(1'700'000'000);
+constexpr Duration kCloudEpoch = std::chrono::seconds(1'700'000'000);
 
 /// Three points of a scan that starts at 2 s.
 Scan scan_of_three() {
@@ -94,7 +94,7 @@ TEST(PointLayouts, FieldsLieWhereDriversPutThem) {
 TEST(PointLayouts, HoldTheScan) {
   const Scan scan = scan_of_three();
   for (const PointLayout& layout : point_layouts()) {
-    const msg::PointCloud2 cloud = cloud_of(scan, layout, "sensor", kEpoch);
+    const msg::PointCloud2 cloud = cloud_of(scan, layout, "sensor", kCloudEpoch);
     EXPECT_EQ(cloud.height, 1u);
     EXPECT_EQ(cloud.width, 3u);
     EXPECT_TRUE(cloud.is_dense);
@@ -133,7 +133,7 @@ TEST(PointLayouts, ReturnsWithoutAnIntensityGetAPlainOne) {
   Scan scan = scan_of_three();
   scan.points[1].intensity = 0.0f;
   for (const PointLayout& layout : point_layouts()) {
-    const auto cloud = cloud_of(scan, layout, "sensor", kEpoch, {}, kPlainIntensity);
+    const auto cloud = cloud_of(scan, layout, "sensor", kCloudEpoch, {}, kPlainIntensity);
     for (const char* name : {"intensity", "reflectivity"}) {
       const double value = value_of(cloud, 1, name);
       EXPECT_TRUE(std::isnan(value) || value == kPlainIntensity) << layout.name << " " << name;
@@ -141,14 +141,14 @@ TEST(PointLayouts, ReturnsWithoutAnIntensityGetAPlainOne) {
       EXPECT_TRUE(std::isnan(other) || other == 100.0) << layout.name << " " << name;
     }
   }
-  const auto custom = custom_cloud_of(scan, "livox_frame", kEpoch, kPlainIntensity);
+  const auto custom = custom_cloud_of(scan, "livox_frame", kCloudEpoch, kPlainIntensity);
   EXPECT_EQ(custom.points[1].reflectivity, 45);
   EXPECT_EQ(custom.points[0].reflectivity, 100);
 }
 
 TEST(PointLayouts, LivoxCustomCountsFromItsFirstPoint) {
   const Scan scan = scan_of_three();
-  const msg::CustomMsg cloud = custom_cloud_of(scan, "livox_frame", kEpoch);
+  const msg::CustomMsg cloud = custom_cloud_of(scan, "livox_frame", kCloudEpoch);
   EXPECT_EQ(cloud.timebase, 1'700'000'002'000'500'000u);
   EXPECT_EQ(cloud.header.stamp.nanosec, 500'000u);
   ASSERT_EQ(cloud.point_num, 3u);
@@ -162,11 +162,11 @@ TEST(PointLayouts, LivoxCustomCountsFromItsFirstPoint) {
 TEST(PointLayouts, AScanWithoutPointsIsACloudWithoutPoints) {
   Scan scan = scan_of_three();
   scan.points.clear();
-  const msg::PointCloud2 cloud = cloud_of(scan, point_layout("velodyne"), "s", kEpoch);
+  const msg::PointCloud2 cloud = cloud_of(scan, point_layout("velodyne"), "s", kCloudEpoch);
   EXPECT_EQ(cloud.width, 0u);
   EXPECT_TRUE(cloud.data.empty());
   EXPECT_EQ(cloud.header.stamp.nanosec, 0u);
-  EXPECT_EQ(custom_cloud_of(scan, "s", kEpoch).point_num, 0u);
+  EXPECT_EQ(custom_cloud_of(scan, "s", kCloudEpoch).point_num, 0u);
 }
 
 TEST(Profiles, ShippedOnesAreReadAndMistakesSayWhere) {

@@ -5,12 +5,11 @@
 
 #include "pointflight/core/random.hpp"
 #include "ros_common/description.hpp"
+#include "tests/paths.hpp"
 #include "tests/support.hpp"
 
-namespace pointflight {
+namespace pointflight::msg {
 namespace {
-
-using namespace msg;
 
 /// Every message that goes over a wire by itself.
 using AllMessages = std::tuple<PointCloud2,
@@ -150,7 +149,7 @@ TEST(MessageTypes, DefinitionsNameNestedTypesOnce) {
 TEST(MessageTypes, TheFilesForWorkspacesSayTheSame) {
   const auto expect_file = [](const std::string& path, const TypeDescription& type) {
     const std::string text = definition_text(type, 2);
-    EXPECT_EQ(testing::read_file(POINTFLIGHT_SOURCE "/ros/messages/" + path),
+    EXPECT_EQ(testing::read_file(std::string(testing::kSource) + "/ros/messages/" + path),
               text.substr(0, text.find("====")))
         << path;
   };
@@ -314,4 +313,4 @@ TEST(Wires, ALengthAloneTakesNoMemory) {
 }
 
 }  // namespace
-}  // namespace pointflight
+}  // namespace pointflight::msg

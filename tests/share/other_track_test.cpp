@@ -43,7 +43,7 @@ TEST(OtherTrack, AStateIsMovedOnAsItsVelocitiesSay) {
   EXPECT_EQ(moved.v_world, state.v_world);
 }
 
-TEST(OtherTrack, NothingThatRotorsCanDoIsBeyondTheBound) {
+TEST(OtherTrack, Statistics_NothingThatRotorsCanDoIsBeyondTheBound) {
   std::mt19937 draws(1);
   const auto draw = [&draws](double least, double most) {
     return least + (most - least) * static_cast<double>(draws()) / 4294967295.0;

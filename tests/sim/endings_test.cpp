@@ -99,7 +99,7 @@ TEST(Battery, StopsTheRotorsWhenEmptyWhateverTheScenarioSays) {
   }
 }
 
-TEST(RotorLoss, AQuadrotorLandsSpinningAndTakesNoMoreCommands) {
+TEST(RotorLoss, Slow_AQuadrotorLandsSpinningAndTakesNoMoreCommands) {
   Scenario scenario = hovering();
   scenario.duration = 20.0;
   FaultSettings lost;

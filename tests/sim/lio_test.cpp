@@ -86,7 +86,7 @@ Drift drift(const std::string& lidar, bool with_times, double visibility = 0.0) 
   return {judge.last_error() / judge.way(), judge.rms_error()};
 }
 
-TEST(Lio, NeedsTheTimesOfPointsAndAClearView) {
+TEST(Lio, Slow_NeedsTheTimesOfPointsAndAClearView) {
   for (const char* lidar : {"mid360", "avia"}) {
     SCOPED_TRACE(lidar);
     const Drift with_times = drift(lidar, true);

@@ -9,6 +9,7 @@
 #include "pointflight/lidar/lidar_settings.hpp"
 #include "pointflight/sim/scenario.hpp"
 #include "pointflight/vehicle/airframe.hpp"
+#include "tests/paths.hpp"
 #include "tests/support.hpp"
 
 /// What sensor, vehicle and scenario files have in common: no key without effect, pages that show
@@ -189,7 +190,8 @@ std::string without_numbers(const std::string& key) {
 }
 
 TEST(Pages, ExamplesOfSensorFilesLoadAndHoldEveryKey) {
-  const auto blocks = blocks_of(read_file(POINTFLIGHT_SOURCE "/docs/sensors.md"), "yaml");
+  const auto blocks =
+      blocks_of(read_file(std::string(testing::kSource) + "/docs/sensors.md"), "yaml");
   ASSERT_GE(blocks.size(), 8u);
   std::set<std::string> missing = keys_of(lidar_reference());
   ASSERT_GT(missing.size(), 40u);
@@ -205,7 +207,8 @@ TEST(Pages, ExamplesOfSensorFilesLoadAndHoldEveryKey) {
 }
 
 TEST(Pages, TheExampleOfAScenarioLoads) {
-  const auto blocks = blocks_of(read_file(POINTFLIGHT_SOURCE "/docs/scenario.md"), "yaml");
+  const auto blocks =
+      blocks_of(read_file(std::string(testing::kSource) + "/docs/scenario.md"), "yaml");
   ASSERT_EQ(blocks.size(), 1u);
   const Scenario scenario = parse_scenario(blocks[0], "docs/scenario.md");
   const VehicleSetup& vehicle = scenario.vehicles[0];
@@ -215,7 +218,8 @@ TEST(Pages, TheExampleOfAScenarioLoads) {
 }
 
 TEST(Pages, TheExampleOfAVehicleFileLoadsAndHoldsEveryKey) {
-  const auto blocks = blocks_of(read_file(POINTFLIGHT_SOURCE "/docs/vehicles.md"), "yaml");
+  const auto blocks =
+      blocks_of(read_file(std::string(testing::kSource) + "/docs/vehicles.md"), "yaml");
   ASSERT_EQ(blocks.size(), 1u);
   const VehicleSettings settings = parse_vehicle(blocks[0], "docs/vehicles.md");
   EXPECT_GT(settings.thrust_to_weight(), 2.0);

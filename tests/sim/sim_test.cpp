@@ -184,7 +184,7 @@ class HashSink : public SampleSink {
   std::vector<std::byte> bytes_;
 };
 
-std::shared_ptr<const SurfelMap> hall() {
+std::shared_ptr<const SurfelMap> small_hall() {
   ShapeScene scene;
   scene.add_box({0, 0, 0}, {16, 10, 5});
   scene.shapes.emplace_back(Cone{{8, 5, 0}, {8, 5, 5}, 0.3, 0.3});
@@ -218,7 +218,7 @@ Ran run(const Scenario& scenario,
 
 TEST(Simulation, FliesItsMissionAndCountsWhatItDid) {
   HashSink sink;
-  const Ran s = run(short_flight(), hall(), sink);
+  const Ran s = run(short_flight(), small_hall(), sink);
   EXPECT_EQ(s.end, RunEnd::kCompleted);
   EXPECT_NEAR(s.distance_flown, 3.04, 0.1);
   EXPECT_EQ(s.collisions, 0u);
@@ -232,8 +232,8 @@ TEST(Simulation, FliesItsMissionAndCountsWhatItDid) {
   EXPECT_NEAR(*s.closest_approach, 1.5 - 0.26, 0.1);
 }
 
-TEST(Simulation, TheSameBytesWithOneTwoAndEightThreads) {
-  const auto map = hall();
+TEST(Simulation, Threads_TheSameBytesWithOneTwoAndEightThreads) {
+  const auto map = small_hall();
   Scenario scenario = short_flight();
   scenario.duration = 0.6;
   scenario.vehicles[0].lidars.push_back(
@@ -252,7 +252,7 @@ TEST(Simulation, TheSameBytesWithOneTwoAndEightThreads) {
 }
 
 TEST(Simulation, AddingASensorMovesNoOtherDraw) {
-  const auto map = hall();
+  const auto map = small_hall();
   class FirstScan : public SampleSink {
    public:
     void on_sample(const Sample& sample) override {
@@ -276,7 +276,7 @@ TEST(Simulation, AddingASensorMovesNoOtherDraw) {
 }
 
 TEST(Simulation, ReportsACollisionOrStopsAtIt) {
-  const auto map = hall();
+  const auto map = small_hall();
   Scenario scenario = short_flight();
   scenario.vehicles[0].lidars.clear();
   scenario.vehicles[0].start = {3, 5, 2};
@@ -302,27 +302,27 @@ TEST(Simulation, AMissionCutShortIsUnfinished) {
   scenario.vehicles[0].lidars.clear();
   scenario.duration = 1.0;
   HashSink sink;
-  EXPECT_EQ(run(scenario, hall(), sink).end, RunEnd::kMissionUnfinished);
+  EXPECT_EQ(run(scenario, small_hall(), sink).end, RunEnd::kMissionUnfinished);
   scenario.vehicles[0].mission.waypoints.clear();
-  EXPECT_EQ(run(scenario, hall(), sink).end, RunEnd::kCompleted);
+  EXPECT_EQ(run(scenario, small_hall(), sink).end, RunEnd::kCompleted);
 }
 
 TEST(Simulation, AStartInsideTheMapIsAnError) {
   Scenario scenario =
       parse_scenario("map: a.pfmap\nvehicle:\n  model: quad_330\n  start: [8, 5.1, 1]\n", "s.yaml");
-  const auto map = hall();
+  const auto map = small_hall();
   const std::string error = error_of([&] { Simulation(scenario, map, Executor(1)); });
   expect_contains(error, "s.yaml:4: vehicle.start");
   expect_contains(error, "inside the map");
 }
 
-TEST(Simulation, WhateverTheRatesNothingIsLost) {
+TEST(Simulation, Slow_WhateverTheRatesNothingIsLost) {
   Scenario scenario = short_flight();
   scenario.duration = 1.0;
   scenario.vehicles[0].lidars = {LidarMount{"d455"}};
   scenario.output.trajectory_rate = 333.0;
   HashSink sink;
-  const Ran s = run(scenario, hall(), sink);
+  const Ran s = run(scenario, small_hall(), sink);
   EXPECT_EQ(s.states, 334u);  // k / 333 from 0 to 1 s
   EXPECT_EQ(s.scans, 30u);    // the last one ends with the run
 }
@@ -336,7 +336,7 @@ TEST(Simulation, ASensorFasterThanThePhysicsLosesNoScan) {
   scenario.physics_step = 0.005;
   scenario.vehicles[0].lidars = {LidarMount{folder / "fast.yaml"}};
   HashSink sink;
-  EXPECT_EQ(run(scenario, hall(), sink).scans, 500u);
+  EXPECT_EQ(run(scenario, small_hall(), sink).scans, 500u);
 }
 
 TEST(Simulation, AFastSmallVehicleMeetsAThinWall) {

@@ -10,7 +10,7 @@ using testing::ByteSink;
 using testing::hall;
 using testing::through_each_other;
 
-TEST(Simulation, TimeThatIsSkippedHasNotPassedForVehicles) {
+TEST(Simulation, Slow_TimeThatIsSkippedHasNotPassedForVehicles) {
   Scenario scenario = through_each_other();
   scenario.vehicles.resize(1);
   scenario.vehicles[0].lidars.resize(1);

@@ -51,7 +51,7 @@ Scenario swarm(double duration) {
   return s;
 }
 
-TEST(Swarm, TheSameBytesWithOneTwoAndEightThreads) {
+TEST(Swarm, Threads_TheSameBytesWithOneTwoAndEightThreads) {
   std::uint64_t first = 0;
   for (const int threads : {1, 2, 8}) {
     const Executor executor(threads);

@@ -329,7 +329,7 @@ TEST(Commands, OfAScenarioTakeOffFlyAndLand) {
   EXPECT_EQ(simulation.end(), RunEnd::kCompleted);
 }
 
-TEST(Commands, ALargeVehicleStaysOnTheGroundThatItHasLandedOn) {
+TEST(Commands, Slow_ALargeVehicleStaysOnTheGroundThatItHasLandedOn) {
   // its rotors run down slowly and lift more near the ground
   Scenario scenario = hovering();
   VehicleSetup& v = scenario.vehicles[0];
@@ -433,7 +433,7 @@ TEST(Air, WindIsHeldAgainstAndABatterySags) {
   EXPECT_LT(status.conditions.speed_share, 1.0);
 }
 
-TEST(Legacy, GivesTheBytesOfVersion01) {
+TEST(Legacy, Slow_GivesTheBytesOfVersion01) {
   Scenario scenario = hovering();
   scenario.duration = 1.0;
   scenario.legacy = true;

@@ -88,7 +88,7 @@ void PrintTo(const Case& c, std::ostream* out) {
 
 class Levels : public ::testing::TestWithParam<Case> {};
 
-TEST_P(Levels, FollowTheirDesignPassedThroughTheRotors) {
+TEST_P(Levels, Statistics_FollowTheirDesignPassedThroughTheRotors) {
   VehicleSettings v = load_vehicle(GetParam().vehicle);
   v.controller.kind = GetParam().controller;
   // no drag and no limits: what the linear model describes

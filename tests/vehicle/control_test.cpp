@@ -228,7 +228,7 @@ double overshoot_of(double damping) {
   return damping < 1.0 ? std::exp(-M_PI * damping / std::sqrt(1.0 - damping * damping)) : 0.0;
 }
 
-TEST_P(ShippedVehicles, OvershootNoMoreThanTheirDampingPromises) {
+TEST_P(ShippedVehicles, Statistics_OvershootNoMoreThanTheirDampingPromises) {
   for (const std::string& name : model_names("vehicles")) {
     VehicleSettings settings = load_vehicle(name);
     settings.controller.kind = GetParam();
@@ -285,7 +285,7 @@ LoopDesign nearest_design(const StepResponse& response) {
   return found;
 }
 
-TEST_P(ShippedVehicles, AnswerWithTheNaturalFrequencyAndDampingOfTheirFile) {
+TEST_P(ShippedVehicles, Statistics_AnswerWithTheNaturalFrequencyAndDampingOfTheirFile) {
   for (const std::string& name : model_names("vehicles")) {
     VehicleSettings settings = load_vehicle(name);
     settings.controller.kind = GetParam();
@@ -318,7 +318,7 @@ Vector3d place_after(double duration,
   return state.body.p_world;
 }
 
-TEST_P(ShippedVehicles, ComeBackToTheirPlaceInSteadyWindAndWithAWrongMass) {
+TEST_P(ShippedVehicles, Statistics_ComeBackToTheirPlaceInSteadyWindAndWithAWrongMass) {
   for (const std::string& name : model_names("vehicles")) {
     SCOPED_TRACE(name);
     VehicleSettings known = load_vehicle(name);

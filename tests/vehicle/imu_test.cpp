@@ -149,7 +149,7 @@ std::vector<double> recorded_variances(const ImuErrors& errors,
   return sums;
 }
 
-TEST(Imu, AllanDeviationGivesBackDensityInstabilityAndWalk) {
+TEST(Imu, Statistics_AllanDeviationGivesBackDensityInstabilityAndWalk) {
   // the floor is reached after 30 s and left after 3,000: all three terms show in 1.05e5 s
   ImuErrors errors;
   errors.gyro = {.noise_density = 1e-2, .bias_walk = 5.8e-5, .bias_instability = 2.75e-3};
@@ -181,7 +181,7 @@ Record record_for(const TriadErrors& e) {
 
 class EachPart : public ::testing::TestWithParam<std::string> {};
 
-TEST_P(EachPart, AllanDeviationGivesBackWhatItsFileSays) {
+TEST_P(EachPart, Statistics_AllanDeviationGivesBackWhatItsFileSays) {
   if (testing::kSanitized) GTEST_SKIP() << "millions of samples for their numbers alone";
   // at such intervals 16 bits would round white noise away, which does not happen at 200 Hz
   ImuErrors errors = load_imu_part(GetParam()).errors;

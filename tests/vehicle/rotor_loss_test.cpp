@@ -120,7 +120,7 @@ Loss lose_a_rotor(const VehicleSettings& vehicle,
 
 class RotorLoss : public ::testing::TestWithParam<const char*> {};
 
-TEST_P(RotorLoss, SixAndEightRotorsHoldTheirPlace) {
+TEST_P(RotorLoss, Slow_SixAndEightRotorsHoldTheirPlace) {
   for (const char* name : {"hexa_550", "octo_1045"}) {
     VehicleSettings vehicle = load_vehicle(name);
     vehicle.controller.kind = GetParam();
@@ -138,7 +138,7 @@ TEST_P(RotorLoss, SixAndEightRotorsHoldTheirPlace) {
 
 /// Not lee2010: its rotors' drag is so small that it does not spin, and three rotors hold a vehicle
 /// upright only while it spins.
-TEST_P(RotorLoss, FourComeDownInPlaceSpinning) {
+TEST_P(RotorLoss, Slow_FourComeDownInPlaceSpinning) {
   for (const char* name : {"quad_250", "quad_330", "quad_450", "marsim_quad"}) {
     SCOPED_TRACE(name);
     VehicleSettings vehicle = load_vehicle(name);
@@ -153,7 +153,7 @@ TEST_P(RotorLoss, FourComeDownInPlaceSpinning) {
   }
 }
 
-TEST_P(RotorLoss, WithoutReallocationTheyTumble) {
+TEST_P(RotorLoss, Slow_WithoutReallocationTheyTumble) {
   VehicleSettings vehicle = load_vehicle("hexa_550");
   vehicle.controller.kind = GetParam();
   vehicle.controller.reallocate = false;

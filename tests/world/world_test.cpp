@@ -66,7 +66,7 @@ TEST(FreeSpace, FindsATourInsideTheRoomAndAroundItsWall) {
   EXPECT_EQ(again->points_world.back(), tour->points_world.back());
 }
 
-TEST(FreeSpace, StaysInItsBounds) {
+TEST(FreeSpace, Statistics_StaysInItsBounds) {
   // a hall with a mezzanine of more room above than below
   ShapeScene scene;
   scene.add_box({0, 0, 0}, {20, 10, 30});
