@@ -101,13 +101,13 @@ OutputName::OutputName(std::string path) : path_(std::move(path)) {
 }
 
 void OutputName::take(const std::string& complete, int descriptor) const {
+  const mode_t kind = kind_of(path_);
+  const bool is_taken = was_there_ && kind != 0 && kind != S_IFREG;
   int error = 0;
-  if (!is_at(descriptor, complete)) {
+  if (is_taken || !is_at(descriptor, complete)) {
     error = EEXIST;
   } else if (!was_there_) {
     error = rename_to_new(complete, path_);
-  } else if (const mode_t kind = kind_of(path_); kind != 0 && kind != S_IFREG) {
-    error = EEXIST;
   } else if (::rename(complete.c_str(), path_.c_str()) != 0) {
     error = errno;
   }

@@ -106,8 +106,8 @@ TEST_F(OwnedFiles, ListsAreReadAsTheyWereWritten) {
       files.push_back({name, random() % 2 == 0});
     }
     std::ranges::sort(files, {}, &ListedFile::name);
-    const auto twice = std::ranges::unique(files, {}, &ListedFile::name);
-    files.erase(twice.begin(), twice.end());
+    const auto same = [](const ListedFile& a, const ListedFile& b) { return a.name == b.name; };
+    files.erase(std::unique(files.begin(), files.end(), same), files.end());
     EXPECT_EQ(parse_file_list(file_list_text(files)), files);
   }
 }
