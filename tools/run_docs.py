@@ -210,7 +210,8 @@ def main():
             run_page("README.md", first, environment, tree)
         for number, page in enumerate(page for page in pages if page != "README.md"):
             folder = Path(scratch) / f"page{number}"
-            subprocess.run(["cp", "-a", first, folder], check=True)
+            if any(block.kind in ("run", "with", "file") for block in blocks_of(page)):
+                subprocess.run(["cp", "-a", first, folder], check=True)
             run_page(page, folder, environment, tree)
 
 
