@@ -25,6 +25,7 @@
 #include "pointflight/core/owned_files.hpp"
 #include "pointflight/io/cloud_reader.hpp"
 #include "pointflight/io/csv_table.hpp"
+#include "pointflight/sim/run_folder.hpp"
 
 namespace pointflight::apps {
 namespace {
@@ -82,13 +83,14 @@ void read_vehicle(const fs::path& folder, std::size_t number, RunPicture& pictur
   if (!fs::exists(scans)) return;
   constexpr std::size_t kColumns = 14;
   std::size_t offered = 0;
+  const Folder own(folder.string());
   for (const auto& row : rows_of(scans)) {
     if (row.size() < kColumns) throw InputError(fmt::format("{}: short row", scans.string()));
     std::array<double, 7> pose{};
     for (std::size_t i = 0; i < pose.size(); ++i) pose[i] = number_of(row[7 + i], scans);
     const Pose T_world_sensor{Quaterniond(pose[3], pose[4], pose[5], pose[6]).normalized(),
                               {pose[0], pose[1], pose[2]}};
-    const auto reader = open_cloud((folder / row[0]).string());
+    const auto reader = open_cloud(file_of_run(own, row[0], scans.string()));
     std::vector<CloudPoint> points;
     while (reader->read(points)) {
       for (const CloudPoint& point : points) {

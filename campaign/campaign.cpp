@@ -111,7 +111,8 @@ class Attempt {
     const std::string name = name_of(number_);
     make_way(home_, name);
     const int error = home_.rename(name_, home_, name);
-    if (error == EEXIST) return;  // somebody else has flown it meanwhile: the same
+    const bool is_flown = home_.entry(name + "/" + kResult) == Entry::kFile;
+    if (error == EEXIST && is_flown) return;  // by somebody else meanwhile: the same
     if (error != 0) {
       throw InputError(
           fmt::format("{}/{}: {}", home_.path(), name, std::generic_category().message(error)));

@@ -219,7 +219,10 @@ struct RecordedRun::Files {
     const VehicleAgent& agent = simulation.vehicle(v);
     const std::size_t before = agent.sensors().size() - agent.lidars().size();
     const std::string table = (folder / "scans.csv").string();
-    for (const auto& words : words_of(table)) {
+    const auto rows = words_of(table);
+    if (rows.empty()) return;
+    const Folder own(folder.string());
+    for (const auto& words : rows) {
       if (words.size() < 6) throw InputError(fmt::format("{}: a row is cut off", table));
       Scan scan;
       scan.vehicle = static_cast<std::uint32_t>(v);
@@ -231,7 +234,7 @@ struct RecordedRun::Files {
       if (scan.sensor >= agent.lidars().size()) {
         throw InputError(fmt::format("{}: the scenario has no lidar {}", table, scan.sensor));
       }
-      const std::string path = (folder / words[0]).string();
+      const std::string path = file_of_run(own, words[0], table);
       add(Phase::kArrears, scan.end, before + scan.sensor, v, true, [this, scan, path] {
         return with_points(scan, path);
       });

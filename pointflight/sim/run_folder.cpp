@@ -69,6 +69,15 @@ std::string killed_run_in(const std::string& folder) {
   return fs::exists(aside, ignored) ? aside.string() : staging_of(folder);
 }
 
+std::string file_of_run(const Folder& folder, const std::string& name, const std::string& table) {
+  const Entry entry = folder.entry(name);
+  if (entry == Entry::kFile) return folder.path() + "/" + name;
+  throw InputError(fmt::format("{}: names '{}', which is {} in the run's folder",
+                               table,
+                               name,
+                               entry == Entry::kNothing ? "not there" : "no file"));
+}
+
 bool remove_run(const Folder& parent, const std::string& name) {
   if (const auto folder = parent.below(name)) {
     remove_owned(*folder, kStaging);

@@ -18,6 +18,10 @@ std::string staging_of(const std::string& folder);
 /// Where the files are of a run that was killed, if one was.
 std::string killed_run_in(const std::string& folder);
 
+/// The path of a file that a table of a run names, such as a scan. Throws InputError, which names
+/// the table, unless it is a file in the run's folder itself: not elsewhere, not behind a link.
+std::string file_of_run(const Folder& folder, const std::string& name, const std::string& table);
+
 /// Removes a run from a folder below `parent`, finished or killed, by its lists. Returns true if
 /// the folder is gone: nothing else was in it.
 bool remove_run(const Folder& parent, const std::string& name);

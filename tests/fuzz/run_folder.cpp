@@ -38,9 +38,9 @@ void write(const fs::path& path, std::string_view bytes) {
 }
 
 /// A short flight, one file of which is another in each input.
-class Folder {
+class FolderOnDisk {
  public:
-  Folder() {
+  FolderOnDisk() {
     std::string name = (fs::temp_directory_path() / "pointflight_fuzz_XXXXXX").string();
     if (mkdtemp(name.data()) == nullptr) __builtin_trap();
     path_ = name;
@@ -75,7 +75,7 @@ class Folder {
       originals_[file].assign(std::istreambuf_iterator<char>(in), {});
     }
   }
-  ~Folder() { fs::remove_all(path_); }
+  ~FolderOnDisk() { fs::remove_all(path_); }
 
   [[nodiscard]] fs::path run() const { return path_ / "run"; }
   [[nodiscard]] const std::string& original(const std::string& file) const {
@@ -92,7 +92,7 @@ class Folder {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace pointflight;
-  static const Folder folder;
+  static const FolderOnDisk folder;
   static const Executor executor(1);
   const std::string_view text(reinterpret_cast<const char*>(data), size);
   const std::size_t line = std::min(text.find('\n'), text.size());

@@ -25,9 +25,9 @@ constexpr std::string_view kScan =
     "VERSION 0.7\nFIELDS x y z time\nSIZE 4 4 4 8\nTYPE F F F F\nCOUNT 1 1 1 1\nWIDTH 1\nHEIGHT 1\n"
     "VIEWPOINT 0 0 0 1 0 0 0\nPOINTS 1\nDATA ascii\n3 0 0 0.5\n";
 
-class Folder {
+class FolderOnDisk {
  public:
-  Folder() {
+  FolderOnDisk() {
     std::string name = (fs::temp_directory_path() / "pointflight_fuzz_XXXXXX").string();
     if (mkdtemp(name.data()) == nullptr) __builtin_trap();
     path_ = name;
@@ -36,7 +36,7 @@ class Folder {
     put('P', "0 0 0 1 0 0 0 1\n1 1 0 1 0 0 0 1\n");
     write(path_ / "scans/1.5.pcd", kScan);
   }
-  ~Folder() { fs::remove_all(path_); }
+  ~FolderOnDisk() { fs::remove_all(path_); }
   void put(char what, std::string_view bytes) const {
     write(path_ / (what == 'P' ? "poses" : "scans/0.5.pcd"), bytes);
   }
@@ -54,7 +54,7 @@ class Folder {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace pointflight;
   if (size == 0 || (data[0] != 'P' && data[0] != 'S')) return 0;
-  const Folder folder;
+  const FolderOnDisk folder;
   const auto what = static_cast<char>(data[0]);
   folder.put(what, {reinterpret_cast<const char*>(data) + 1, size - 1});
   try {

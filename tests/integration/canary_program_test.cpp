@@ -301,6 +301,22 @@ TEST_F(Canary, APictureReplacesNothingButARunsOwn) {
   expect_theirs_in(in("run"));
 }
 
+TEST_F(Canary, ARunsTablesLeadToNoFileElsewhere) {
+  ASSERT_EQ(fly("-o " + in("run")).code, 0);
+  fs::copy_file(cloud(), in("elsewhere.pcd"));
+  fs::create_symlink(in("elsewhere.pcd"), in("run/scans/link.pcd"));
+  const std::string table = read_file(in("run/scans.csv"));
+  for (const std::string& name : {in("elsewhere.pcd"),
+                                  std::string("../elsewhere.pcd"),
+                                  std::string("scans/link.pcd"),
+                                  std::string("scans")}) {
+    std::string other = table;
+    other.replace(other.find("scans/0_000000.pcd"), 18, name);
+    write_file(in("run/scans.csv"), other);
+    expect_user_error(run("picture --force " + in("run")), "no file in the run's folder");
+  }
+}
+
 TEST_F(Canary, RecordingsReplaceNoLinkAndNoSecondName) {
   fs::create_symlink(theirs("a"), in("a.mcap"));
   fs::create_symlink(theirs("a"), in("b.mcap.active"));
