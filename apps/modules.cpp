@@ -29,7 +29,7 @@ std::vector<fs::path> places_for(const std::string& name) {
 
 /// The module that a library's entry function returns.
 template <class Module>
-const Module& load(const std::string& name, const std::string& what, const std::string& packages) {
+const Module* load(const std::string& name, const std::string& what, const std::string& packages) {
   std::string reason = "this build has none";
   for (const fs::path& path : places_for(name)) {
     // stays loaded: what it made lives until the program ends
@@ -40,7 +40,7 @@ const Module& load(const std::string& name, const std::string& what, const std::
     }
     using Entry = const Module* (*)();
     const auto entry = reinterpret_cast<Entry>(dlsym(library, (name + "_module").c_str()));
-    if (entry != nullptr) return *entry();
+    if (entry != nullptr) return entry();
     reason = fmt::format("{} is of another version", path.string());
   }
   throw InputError(fmt::format("{}: {}; install {} and build again", what, reason, packages));
@@ -53,24 +53,27 @@ bool has_module(const std::string& name) {
 }
 
 const Ros1Module& ros1_module() {
-  static const Ros1Module& module =
+  static const Ros1Module* const module =
       load<Ros1Module>("pointflight_ros1", "ROS 1", "libroscpp-dev and librosbag-storage-dev");
-  return module;
+  return *module;
 }
 
 const Ros2Module& ros2_module() {
-  static const Ros2Module& module = load<Ros2Module>("pointflight_ros2", "ROS 2", "cyclonedds-dev");
-  return module;
+  static const Ros2Module* const module =
+      load<Ros2Module>("pointflight_ros2", "ROS 2", "cyclonedds-dev");
+  return *module;
 }
 
 const MpiModule& mpi_module() {
-  static const MpiModule& module = load<MpiModule>("pointflight_mpi", "MPI", "libopenmpi-dev");
-  return module;
+  static const MpiModule* const module =
+      load<MpiModule>("pointflight_mpi", "MPI", "libopenmpi-dev");
+  return *module;
 }
 
 const DdsModule& dds_module() {
-  static const DdsModule& module = load<DdsModule>("pointflight_dds", "--share", "cyclonedds-dev");
-  return module;
+  static const DdsModule* const module =
+      load<DdsModule>("pointflight_dds", "--share", "cyclonedds-dev");
+  return *module;
 }
 
 }  // namespace pointflight::apps

@@ -1,6 +1,10 @@
 // Renderers side by side on the same surfels and the same rays, in turns within one run: the
 // machine may be shared, so read the ratios. `./dev bench render`; see BENCHMARK.md.
+#if __has_include(<embree4/rtcore.h>)  // Debian 13
+#include <embree4/rtcore.h>
+#else
 #include <embree3/rtcore.h>
+#endif
 #include <fmt/format.h>
 #include <time.h>
 
@@ -60,6 +64,52 @@ std::shared_ptr<const SurfelMap> map_of(const ExactScene& scene,
   return SurfelMap::from_bytes(map_bytes(map.tree, map.description), scene.name);
 }
 
+/// A query of Embree, whose calls differ between its versions 3 and 4.
+class EmbreeQuery {
+ public:
+#if RTC_VERSION_MAJOR >= 4
+  explicit EmbreeQuery(RTCRayQueryFlags flags) {
+    rtcInitIntersectArguments(&arguments_);
+    arguments_.flags = flags;
+  }
+  static EmbreeQuery incoherent() {
+    return EmbreeQuery(RTC_RAY_QUERY_FLAG_INCOHERENT);
+  }
+  static EmbreeQuery coherent() {
+    return EmbreeQuery(RTC_RAY_QUERY_FLAG_COHERENT);
+  }
+  void intersect(RTCScene scene, RTCRayHit& hit) {
+    rtcIntersect1(scene, &hit, &arguments_);
+  }
+  void intersect(RTCScene scene, const int* valid, RTCRayHit8& hit) {
+    rtcIntersect8(valid, scene, &hit, &arguments_);
+  }
+
+ private:
+  RTCIntersectArguments arguments_;
+#else
+  explicit EmbreeQuery(RTCIntersectContextFlags flags) {
+    rtcInitIntersectContext(&context_);
+    context_.flags = flags;
+  }
+  static EmbreeQuery incoherent() {
+    return EmbreeQuery(RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT);
+  }
+  static EmbreeQuery coherent() {
+    return EmbreeQuery(RTC_INTERSECT_CONTEXT_FLAG_COHERENT);
+  }
+  void intersect(RTCScene scene, RTCRayHit& hit) {
+    rtcIntersect1(scene, &context_, &hit);
+  }
+  void intersect(RTCScene scene, const int* valid, RTCRayHit8& hit) {
+    rtcIntersect8(valid, scene, &context_, &hit);
+  }
+
+ private:
+  RTCIntersectContext context_;
+#endif
+};
+
 /// Embree's oriented discs of radius sqrt(3)/2 r at the surfels: the first one hit is the range.
 class EmbreeDiscs {
  public:
@@ -94,8 +144,7 @@ class EmbreeDiscs {
 
   /// Sum of ranges, so that nothing is optimised away.
   [[nodiscard]] double one_by_one(std::span<const Ray> rays) const {
-    RTCIntersectContext context;
-    rtcInitIntersectContext(&context);
+    EmbreeQuery query = EmbreeQuery::incoherent();
     double sum = 0.0;
     for (const Ray& ray : rays) {
       RTCRayHit hit{};
@@ -108,16 +157,14 @@ class EmbreeDiscs {
       hit.ray.tfar = ray.range_max;
       hit.ray.mask = ~0u;
       hit.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-      rtcIntersect1(scene_, &context, &hit);
+      query.intersect(scene_, hit);
       sum += static_cast<double>(hit.ray.tfar);
     }
     return sum;
   }
 
   [[nodiscard]] double by_eight(std::span<const Ray> rays) const {
-    RTCIntersectContext context;
-    rtcInitIntersectContext(&context);
-    context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+    EmbreeQuery query = EmbreeQuery::coherent();
     double sum = 0.0;
     for (std::size_t i = 0; i + 8 <= rays.size(); i += 8) {
       alignas(32) RTCRayHit8 hit{};
@@ -135,7 +182,7 @@ class EmbreeDiscs {
         hit.ray.mask[k] = ~0u;
         hit.hit.geomID[k] = RTC_INVALID_GEOMETRY_ID;
       }
-      rtcIntersect8(valid, scene_, &context, &hit);
+      query.intersect(scene_, valid, hit);
       for (std::size_t k = 0; k < 8; ++k) sum += static_cast<double>(hit.ray.tfar[k]);
     }
     return sum;

@@ -210,7 +210,7 @@ std::span<const PointLayout> point_layouts() {
   return kLayouts;
 }
 
-const PointLayout& point_layout(const std::string& name) {
+const PointLayout& point_layout(std::string_view name) {
   std::vector<std::string> names;
   for (const PointLayout& layout : kLayouts) {
     if (name == layout.name) return layout;

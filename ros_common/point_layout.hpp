@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "pointflight/core/time.hpp"
@@ -55,7 +56,7 @@ struct PointLayout {
 inline constexpr const char* kLivoxCustom = "livox_custom";
 
 /// Layout of a name. Throws InputError with the names there are.
-const PointLayout& point_layout(const std::string& name);
+const PointLayout& point_layout(std::string_view name);
 
 /// All of them.
 std::span<const PointLayout> point_layouts();

@@ -20,7 +20,12 @@ if [ -z "$root" ]; then
   trap 'rm -rf --one-file-system "$root"' EXIT
 fi
 sources=/etc/apt
-if [ ! -x "$root/bin/bash" ]; then
+mark=$root/pointflight_newcomer  # a tree of ours: nothing is removed from another
+if [ -e "$root" ] && [ ! -e "$mark" ] && [ -n "$(ls -A "$root")" ]; then
+  echo "newcomer: '$root' is neither empty nor a tree that newcomer made; give it an empty folder" >&2
+  exit 2
+fi
+if [ ! -e "$mark" ]; then
   echo "== a bare Debian $release in $root" >&2
   mirror=$(sed -n 's/^URIs: *//p; s/^deb \(\[[^]]*\] \)\?\([^ ]*\) .*/\2/p' $sources/sources.list \
            $sources/sources.list.d/* 2>/dev/null | head -1)
@@ -33,6 +38,10 @@ if [ ! -x "$root/bin/bash" ]; then
   here=$(sed -n 's/^VERSION_CODENAME=//p' /etc/os-release)
   find "$root/etc/apt/sources.list" "$root/etc/apt/sources.list.d" -type f -exec sed -i "s/\b$here\b/$suite/g" {} + \
     2>/dev/null || true
+  # whom this machine trusts (a firm's proxy); Debian's ca-certificates picks these up
+  ! ls /usr/local/share/ca-certificates/*.crt >/dev/null 2>&1 ||
+    install -D -m 644 -t "$root/usr/local/share/ca-certificates" /usr/local/share/ca-certificates/*.crt
+  touch "$mark"
 fi
 rm -rf "$root/home/new"
 mkdir -p "$root/home/new"
@@ -70,6 +79,7 @@ echo "== the first day" >&2
 # mounts of its own, which go with it
 unshare --mount --pid --fork sh -c '
   mount -t proc proc "$1/proc"
-  mount --bind /dev "$1/dev"
+  mount --rbind /dev "$1/dev"
+  mount --rbind /sys "$1/sys"
   [ ! -e /etc/resolv.conf ] || cp -L /etc/resolv.conf "$1/etc/"
   chroot "$1" bash /home/new/day.sh "$2"' sh "$root" "$tests"

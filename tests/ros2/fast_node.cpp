@@ -19,6 +19,13 @@ using pointflight::testing::FastSample;
 using pointflight::testing::FastType;
 using pointflight::testing::NodeOptions;
 namespace fast = eprosima::fastdds::dds;
+#if POINTFLIGHT_FAST_DDS >= 3
+namespace fast_rtps = eprosima::fastdds::rtps;
+const auto done = fast::RETCODE_OK;
+#else
+namespace fast_rtps = eprosima::fastrtps::rtps;
+const auto done = ReturnCode_t::RETCODE_OK;
+#endif
 
 namespace {
 
@@ -38,8 +45,7 @@ fast::DataReader* reader_of(fast::DomainParticipant& participant,
       reliable ? fast::RELIABLE_RELIABILITY_QOS : fast::BEST_EFFORT_RELIABILITY_QOS;
   qos.history().kind = fast::KEEP_LAST_HISTORY_QOS;
   qos.history().depth = 10;
-  qos.endpoint().history_memory_policy =
-      eprosima::fastrtps::rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
+  qos.endpoint().history_memory_policy = fast_rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
   qos.data_sharing().off();
   return subscriber.create_datareader(topic_of(participant, name, type), qos);
 }
@@ -47,7 +53,7 @@ fast::DataReader* reader_of(fast::DomainParticipant& participant,
 void take(fast::DataReader& reader, Counted& counted) {
   FastSample sample;
   fast::SampleInfo info;
-  while (reader.take_next_sample(&sample, &info) == ReturnCode_t::RETCODE_OK) {
+  while (reader.take_next_sample(&sample, &info) == done) {
     if (!info.valid_data || sample.in.size() < 12) continue;
     std::int32_t seconds = 0;
     std::uint32_t nanoseconds = 0;
