@@ -84,13 +84,13 @@ TEST_F(SensorComparisonTest, Statistics_AModelFindsItself) {
   EXPECT_NEAR(fired + same.blocked, same.beams, 0.02 * fired) << "the hall is closed";
 }
 
-TEST_F(SensorComparisonTest, AnotherReflectivityIsFartherOff) {
+TEST_F(SensorComparisonTest, Statistics_AnotherReflectivityIsFartherOff) {
   if (testing::kSanitized) GTEST_SKIP() << "numbers; the code is that of the other tests";
   EXPECT_GT(against(reflecting(0.9)).share_distance().modelled, 0.06);
   EXPECT_GT(against(reflecting(0.06)).share_distance().modelled, 0.06);
 }
 
-TEST_F(SensorComparisonTest, DirectionsThatSomethingBlocksDoNotCount) {
+TEST_F(SensorComparisonTest, Statistics_DirectionsThatSomethingBlocksDoNotCount) {
   if (testing::kSanitized) GTEST_SKIP() << "numbers; the code is that of the other tests";
   for (RealScan& scan : scans_) {  // the mast behind the sensor
     std::erase_if(scan.points_sensor, [](const Vector3f& p) { return p.x() < -std::abs(p.y()); });

@@ -111,7 +111,7 @@ TEST(SensorFit, FindsTheRingsOfASpinningSensor) {
   }
 }
 
-TEST(SensorFit, ARingsOwnRangeOffsetShows) {
+TEST(SensorFit, Statistics_ARingsOwnRangeOffsetShows) {
   LidarSettings settings = load_lidar("vlp16");
   settings.optics.sub_rays = 1;
   std::vector<RecordedScan> scans = recorded(settings, 4);
@@ -153,7 +153,7 @@ TEST(SensorFit, SaysWhenTheSensorMovedAndWhenNothingIsFlat) {
       "flat patches");
 }
 
-TEST(SensorFit, ItsFileIsASensorThatMeasuresAsTheOneRecorded) {
+TEST(SensorFit, Statistics_ItsFileIsASensorThatMeasuresAsTheOneRecorded) {
   LidarSettings settings = load_lidar("vlp16");
   settings.optics.sub_rays = 1;
   settings.rate = 5.0;

@@ -19,7 +19,7 @@ using testing::run;
 using testing::TemporaryFolder;
 using testing::write_file;
 
-TEST_F(Program, FliesAMapWithoutAScenario) {
+TEST_F(Program, Slow_FliesAMapWithoutAScenario) {
   const TemporaryFolder folder;
   const std::string small = folder / "small.pfmap";
   ASSERT_EQ(run(fmt::format("map forest --size-x 8 --size-y 8 --trees 150 --density 300 -o {}",

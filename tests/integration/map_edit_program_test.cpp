@@ -222,7 +222,7 @@ TEST_F(MapEdit, ADamagedMapIsNotEdited) {
   EXPECT_FALSE(std::filesystem::exists(folder / "a.pfmap"));
 }
 
-TEST_F(MapEdit, ACloudFromStandardInput) {
+TEST_F(MapEdit, Slow_ACloudFromStandardInput) {
   const TemporaryFolder folder;
   const std::string feed = fmt::format("cat {} |", cloud());
   const Result result =

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <memory>
 #include <string>
 
 #include "tests/support.hpp"
@@ -41,20 +42,20 @@ class Started {
 /// One line on stderr that starts with the program's name, exit code 2.
 void expect_user_error(const Result& result, const std::string& words);
 
-/// A small forest, imported once for all tests that ask for it.
+/// A small forest, imported once a process for all tests that ask for it.
 class Program : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
-    folder_ = new TemporaryFolder;
+    if (folder_ != nullptr) return;  // for another suite
+    folder_ = std::make_unique<TemporaryFolder>();
     ASSERT_EQ(
         run(fmt::format("map forest --size-x 24 --size-y 20 --density 300 -o {}", cloud())).code,
         0);
     ASSERT_EQ(run(fmt::format("map import {} -o {} --resolution 0.1", cloud(), map())).code, 0);
   }
-  static void TearDownTestSuite() { delete folder_; }
   static std::string cloud() { return *folder_ / "forest.pcd"; }
   static std::string map() { return *folder_ / "forest.pfmap"; }
-  inline static TemporaryFolder* folder_ = nullptr;
+  inline static std::unique_ptr<TemporaryFolder> folder_;
 };
 
 }  // namespace pointflight::testing

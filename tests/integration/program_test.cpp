@@ -64,7 +64,7 @@ TEST_F(Program, MapInfoSaysWhatIsInAMap) {
   EXPECT_EQ(json["made"]["sources"][0], "forest.pcd");
 }
 
-TEST_F(Program, ScansWithEverySensorAndBothRenderers) {
+TEST_F(Program, Slow_ScansWithEverySensorAndBothRenderers) {
   const TemporaryFolder folder;
   for (const char* lidar :
        {"avia", "mid360", "vlp32c", "hdl64e", "os1_32", "os1_128", "d455", "marsim_grid"}) {

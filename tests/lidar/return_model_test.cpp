@@ -168,14 +168,14 @@ double share_back(double distance, double reflectivity, std::uint64_t seed = 1) 
   return static_cast<double>(there) / static_cast<double>(aimed);
 }
 
-TEST(Lidar, SeesAWhiteWallFromFartherThanADarkOne) {
+TEST(Lidar, Statistics_SeesAWhiteWallFromFartherThanADarkOne) {
   EXPECT_GT(share_back(30.0, 0.8), 0.99);
   EXPECT_GT(share_back(60.0, 0.8), 0.6);
   EXPECT_GT(share_back(20.0, 0.1), 0.95);
   EXPECT_LT(share_back(50.0, 0.05), 0.02);
 }
 
-TEST(Lidar, DirectionsHaveTheFilesNoiseAndPointsDoNotSayIt) {
+TEST(Lidar, Statistics_DirectionsHaveTheFilesNoiseAndPointsDoNotSayIt) {
   ShapeScene scene;
   scene.add_box({10, -12, -12}, {11, 12, 12});
   const auto map = map_of(scene, 0.1);

@@ -142,7 +142,7 @@ TEST(TransformMap, AShiftChangesNoWord) {
   for (std::size_t i = 0; i < before.size(); ++i) EXPECT_NEAR(before[i], after[i], 1e-4f);
 }
 
-TEST(TransformMap, ATurnCostsBeamsLessThanAHundredthOfTheResolution) {
+TEST(TransformMap, Statistics_ATurnCostsBeamsLessThanAHundredthOfTheResolution) {
   const double r = 0.05;
   const auto map = map_of(room(), r);
   const Pose T{quaternion_from_rpy(0.03, -0.05, 0.7), {5.0, -3.0, 2.0}};

@@ -1,6 +1,7 @@
 // A run's folder, played through the link that published it: the same messages.
 #include "pointflight/run/playback.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -55,7 +56,7 @@ std::unique_ptr<RosLink> keeping(const RunDescription& run, Messages& messages) 
 }
 
 /// Two vehicles among obstacles, one of which touches the floor, with late odometry and lost scans.
-void fly(const TemporaryFolder& folder, Messages& messages) {
+void fly(const TemporaryFolder& folder, Messages& messages, double duration = 1.5) {
   ShapeScene scene;
   scene.add_box({0, 0, 0}, {20, 12, 6});
   std::vector<CloudPoint> points;
@@ -65,15 +66,16 @@ void fly(const TemporaryFolder& folder, Messages& messages) {
   const ImportedMap map = testing::import_points(points, options);
   write_map(OutputFile(folder / "m.pfmap"), map.tree, map.description);
   write_file(folder / "s.yaml",
-             "map: m.pfmap\nduration: 1.5\nvehicles:\n"
-             "  - name: one\n    start: [4, 6, 3]\n"
-             "    lidars: [{model: os1_32}, {model: d455, snapshot: true}]\n"
-             "    mission: {waypoints: [[10, 6, 3]]}\n"
-             "    faults: [{kind: odometry_delay, value: 0.05, from: 0.5, until: 1},\n"
-             "             {kind: scan_drop, from: 0.3, value: 0.4}]\n"
-             "  - {name: two, start: [12, 8, 0.45], lidars: [{model: mid360}],\n"
-             "     commands: [{time: 0.2, kind: velocity, vector: [0, 0, -0.6]}]}\n"
-             "obstacles: [{count: 5, radius: 0.2}]\noutput: {odometry: true}\n");
+             fmt::format("map: m.pfmap\nduration: {}\n", duration) +
+                 "vehicles:\n"
+                 "  - name: one\n    start: [4, 6, 3]\n"
+                 "    lidars: [{model: os1_32}, {model: d455, snapshot: true}]\n"
+                 "    mission: {waypoints: [[10, 6, 3]]}\n"
+                 "    faults: [{kind: odometry_delay, value: 0.05, from: 0.5, until: 1},\n"
+                 "             {kind: scan_drop, from: 0.3, value: 0.4}]\n"
+                 "  - {name: two, start: [12, 8, 0.45], lidars: [{model: mid360}],\n"
+                 "     commands: [{time: 0.2, kind: velocity, vector: [0, 0, -0.6]}]}\n"
+                 "obstacles: [{count: 5, radius: 0.2}]\noutput: {odometry: true}\n");
   const Executor executor(2);
   const Scenario scenario = load_scenario(folder / "s.yaml");
   Simulation simulation(scenario, scenario.open_map(), executor);
@@ -124,7 +126,7 @@ TEST(Playback, ARunsFolderGivesTheMessagesOfTheRun) {
 TEST(Playback, FoldersThatAreNoRunsSayWhatIsMissing) {
   const TemporaryFolder folder;
   Messages messages;
-  fly(folder, messages);
+  fly(folder, messages, 0.4);
   const Executor executor(1);
   const auto error = [&] {
     return error_of([&] {
@@ -158,9 +160,9 @@ TEST(Playback, FoldersThatAreNoRunsSayWhatIsMissing) {
   write_file(folder / "run/events.csv", events);
   const std::string summary = read_file(folder / "run/summary.json");
   std::string endless = summary;
-  endless.replace(endless.find("\"simulated_time\": 1.5"), 21, "\"simulated_time\": 1e6");
+  endless.replace(endless.find("\"simulated_time\": 0.4"), 21, "\"simulated_time\": 1e6");
   write_file(folder / "run/summary.json", endless);
-  expect_contains(error(), "the run ended at 1000000.0 s, its files at 1.5 s");
+  expect_contains(error(), "the run ended at 1000000.0 s, its files at 0.4 s");
   std::filesystem::remove(folder / "run/summary.json");
   expect_contains(error(), "summary.json: is missing");
 }

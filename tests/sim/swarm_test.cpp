@@ -80,7 +80,7 @@ TEST(Swarm, Threads_TheSameBytesWithOneTwoAndEightThreads) {
 
 TEST(Swarm, ARunIsSavedRestoredAndBranched) {
   const Executor executor(2);
-  Scenario scenario = swarm(1.0);
+  Scenario scenario = swarm(testing::kSanitized ? 0.45 : 1.0);
   scenario.vehicles.resize(2);
   for (VehicleSetup& v : scenario.vehicles) v.copies = 2;
   Simulation simulation(scenario, hall(), executor);

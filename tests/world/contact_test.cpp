@@ -116,7 +116,7 @@ TEST(Contact, ManyQueriesEqualBruteForceOverTheSameBoxes) {
   EXPECT_GT(far, kQueries / 50);
 }
 
-TEST(Contact, ErrorAgainstTheExactShapesIsASmallShareOfACell) {
+TEST(Contact, Statistics_ErrorAgainstTheExactShapesIsASmallShareOfACell) {
   const ShapeScene scene = room();
   for (const double r : {0.05, 0.1, 0.2}) {
     const auto map = map_of(scene, r);
