@@ -41,6 +41,7 @@ if [ ! -e "$mark" ]; then
   # whom this machine trusts (a firm's proxy); Debian's ca-certificates picks these up
   ! ls /usr/local/share/ca-certificates/*.crt >/dev/null 2>&1 ||
     install -D -m 644 -t "$root/usr/local/share/ca-certificates" /usr/local/share/ca-certificates/*.crt
+  [ -e "$root/etc/hosts" ] || echo "127.0.0.1 localhost" >"$root/etc/hosts"  # as an installer would
   touch "$mark"
 fi
 rm -rf "$root/home/new"
