@@ -67,46 +67,36 @@ std::shared_ptr<const SurfelMap> map_of(const ExactScene& scene,
 /// A query of Embree, whose calls differ between its versions 3 and 4.
 class EmbreeQuery {
  public:
+  explicit EmbreeQuery(bool coherent) {
 #if RTC_VERSION_MAJOR >= 4
-  explicit EmbreeQuery(RTCRayQueryFlags flags) {
-    rtcInitIntersectArguments(&arguments_);
-    arguments_.flags = flags;
-  }
-  static EmbreeQuery incoherent() {
-    return EmbreeQuery(RTC_RAY_QUERY_FLAG_INCOHERENT);
-  }
-  static EmbreeQuery coherent() {
-    return EmbreeQuery(RTC_RAY_QUERY_FLAG_COHERENT);
-  }
-  void intersect(RTCScene scene, RTCRayHit& hit) {
-    rtcIntersect1(scene, &hit, &arguments_);
-  }
-  void intersect(RTCScene scene, const int* valid, RTCRayHit8& hit) {
-    rtcIntersect8(valid, scene, &hit, &arguments_);
-  }
-
- private:
-  RTCIntersectArguments arguments_;
+    rtcInitIntersectArguments(&how_);
+    if (coherent) how_.flags = RTC_RAY_QUERY_FLAG_COHERENT;
 #else
-  explicit EmbreeQuery(RTCIntersectContextFlags flags) {
-    rtcInitIntersectContext(&context_);
-    context_.flags = flags;
+    rtcInitIntersectContext(&how_);
+    if (coherent) how_.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+#endif
   }
-  static EmbreeQuery incoherent() {
-    return EmbreeQuery(RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT);
+
+#if RTC_VERSION_MAJOR >= 4
+  void one(RTCScene scene, RTCRayHit& hit) {
+    rtcIntersect1(scene, &hit, &how_);
   }
-  static EmbreeQuery coherent() {
-    return EmbreeQuery(RTC_INTERSECT_CONTEXT_FLAG_COHERENT);
-  }
-  void intersect(RTCScene scene, RTCRayHit& hit) {
-    rtcIntersect1(scene, &context_, &hit);
-  }
-  void intersect(RTCScene scene, const int* valid, RTCRayHit8& hit) {
-    rtcIntersect8(valid, scene, &context_, &hit);
+  void eight(RTCScene scene, const int* valid, RTCRayHit8& hit) {
+    rtcIntersect8(valid, scene, &hit, &how_);
   }
 
  private:
-  RTCIntersectContext context_;
+  RTCIntersectArguments how_;
+#else
+  void one(RTCScene scene, RTCRayHit& hit) {
+    rtcIntersect1(scene, &how_, &hit);
+  }
+  void eight(RTCScene scene, const int* valid, RTCRayHit8& hit) {
+    rtcIntersect8(valid, scene, &how_, &hit);
+  }
+
+ private:
+  RTCIntersectContext how_;
 #endif
 };
 
@@ -144,7 +134,7 @@ class EmbreeDiscs {
 
   /// Sum of ranges, so that nothing is optimised away.
   [[nodiscard]] double one_by_one(std::span<const Ray> rays) const {
-    EmbreeQuery query = EmbreeQuery::incoherent();
+    EmbreeQuery query(false);
     double sum = 0.0;
     for (const Ray& ray : rays) {
       RTCRayHit hit{};
@@ -157,14 +147,14 @@ class EmbreeDiscs {
       hit.ray.tfar = ray.range_max;
       hit.ray.mask = ~0u;
       hit.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-      query.intersect(scene_, hit);
+      query.one(scene_, hit);
       sum += static_cast<double>(hit.ray.tfar);
     }
     return sum;
   }
 
   [[nodiscard]] double by_eight(std::span<const Ray> rays) const {
-    EmbreeQuery query = EmbreeQuery::coherent();
+    EmbreeQuery query(true);
     double sum = 0.0;
     for (std::size_t i = 0; i + 8 <= rays.size(); i += 8) {
       alignas(32) RTCRayHit8 hit{};
@@ -182,7 +172,7 @@ class EmbreeDiscs {
         hit.ray.mask[k] = ~0u;
         hit.hit.geomID[k] = RTC_INVALID_GEOMETRY_ID;
       }
-      query.intersect(scene_, valid, hit);
+      query.eight(scene_, valid, hit);
       for (std::size_t k = 0; k < 8; ++k) sum += static_cast<double>(hit.ray.tfar[k]);
     }
     return sum;

@@ -25,6 +25,10 @@ if [ -e "$root" ] && [ ! -e "$mark" ] && [ -n "$(ls -A "$root")" ]; then
   echo "newcomer: '$root' is neither empty nor a tree that newcomer made; give it an empty folder" >&2
   exit 2
 fi
+if [ -e "$mark" ] && [ "$(cat "$mark")" != "$suite" ]; then
+  echo "newcomer: '$root' is a tree of $(cat "$mark"); give another folder for $suite" >&2
+  exit 2
+fi
 if [ ! -e "$mark" ]; then
   echo "== a bare Debian $release in $root" >&2
   mirror=$(sed -n 's/^URIs: *//p; s/^deb \(\[[^]]*\] \)\?\([^ ]*\) .*/\2/p' $sources/sources.list \
@@ -42,9 +46,9 @@ if [ ! -e "$mark" ]; then
   ! ls /usr/local/share/ca-certificates/*.crt >/dev/null 2>&1 ||
     install -D -m 644 -t "$root/usr/local/share/ca-certificates" /usr/local/share/ca-certificates/*.crt
   [ -e "$root/etc/hosts" ] || echo "127.0.0.1 localhost" >"$root/etc/hosts"  # as an installer would
-  touch "$mark"
+  echo "$suite" >"$mark"
 fi
-rm -rf "$root/home/new"
+rm -rf --one-file-system "$root/home/new"
 mkdir -p "$root/home/new"
 git clone -q "$source" "$root/home/new/pointflight"
 for file in /etc/npmrc "$HOME/.npmrc"; do  # npm's, too
