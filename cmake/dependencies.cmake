@@ -6,7 +6,7 @@ find_package(fmt REQUIRED)
 find_package(yaml-cpp REQUIRED)
 find_package(nlohmann_json REQUIRED)
 find_package(nanoflann REQUIRED)
-find_package(Boost 1.74 REQUIRED)  # Beast and Asio: headers only
+find_package(boost_headers 1.74 REQUIRED)  # Beast and Asio
 if(POINTFLIGHT_TBB)
   find_package(TBB REQUIRED)
 endif()

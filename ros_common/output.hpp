@@ -160,6 +160,7 @@ class OutputStream {
   /// Sends a message that leaves at a time; `always`: also where nobody reads, for transports that
   /// keep it for whoever comes.
   template <class M>
+  // NOLINTNEXTLINE(performance-unnecessary-value-param): a header's number is written
   void send(M message, SimTime leaves, bool always = false) {
     if constexpr (requires { message.header; }) message.header.seq = sent_;
     ++sent_;

@@ -15,7 +15,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "pointflight/core/simd_targets.hpp"
+#include "pointflight/core/simd_targets-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace pointflight::HWY_NAMESPACE {

@@ -1,7 +1,7 @@
 // Compiled once for each instruction set; one is picked at run time.
 #include "pointflight/map/nearest_kernel.hpp"
 
-#include "pointflight/core/simd_targets.hpp"
+#include "pointflight/core/simd_targets-inl.hpp"
 // for foreach_target
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "pointflight/map/nearest_kernel.cpp"

@@ -9,7 +9,7 @@
 
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/input_error.hpp"
-#include "pointflight/core/simd_targets.hpp"
+#include "pointflight/core/simd_targets-inl.hpp"
 // for foreach_target
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "pointflight/render/beam_kernel.cpp"

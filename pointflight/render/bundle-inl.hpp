@@ -68,7 +68,7 @@ POINTFLIGHT_INLINE void set_up_bundle(Bundle& b, std::size_t count) {
 }
 
 /// Eight boxes as a bundle sees them from its apex.
-struct SeenBoxes {
+struct SeenBoxes {  // NOLINT(cppcoreguidelines-pro-type-member-init): all is written
   F8 low_u, high_u, low_v, high_v;  ///< Rectangles in the plane at distance 1 along w.
   F8 begin;                         ///< Along w, m: no beam is there earlier.
   std::uint32_t in_frustum = 0;     ///< A bit for each.

@@ -1,7 +1,7 @@
 // Rays that go through everything: what a map's fit to its survey asks.
 #include "pointflight/render/meeting_kernel.hpp"
 
-#include "pointflight/core/simd_targets.hpp"
+#include "pointflight/core/simd_targets-inl.hpp"
 // for foreach_target
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "pointflight/render/meeting_kernel.cpp"

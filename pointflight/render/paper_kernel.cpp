@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "pointflight/core/constants.hpp"
-#include "pointflight/core/simd_targets.hpp"
+#include "pointflight/core/simd_targets-inl.hpp"
 // for foreach_target
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "pointflight/render/paper_kernel.cpp"

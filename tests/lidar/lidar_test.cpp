@@ -235,7 +235,7 @@ ShapeScene room() {
   return scene;
 }
 
-TEST(Lidar, TruthIsWhatIsThereAndWhereExactDeskewingPutsThePoint) {
+TEST(Lidar, Statistics_TruthIsWhatIsThereAndWhereExactDeskewingPutsThePoint) {
   const ShapeScene scene = room();
   const auto map = map_of(scene, 0.05);
   const auto renderer = make_renderer("beam", Scene{map});

@@ -11,7 +11,7 @@
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/hash.hpp"
 #include "pointflight/core/random.hpp"
-#include "pointflight/core/simd_targets.hpp"
+#include "pointflight/core/simd_targets-inl.hpp"
 #include "pointflight/fidelity/exact_scene.hpp"
 #include "pointflight/geometry/shape_scene.hpp"
 #include "pointflight/lidar/beam_pattern.hpp"

@@ -23,7 +23,7 @@ std::int64_t wall() {
 Scenario three(ShareTime time) {
   Scenario s;
   s.path = "s.yaml";
-  s.duration = testing::kSanitized ? 0.4 : 1.2;
+  s.duration = testing::kSanitized ? 0.25 : 1.2;
   s.vehicles.resize(3);
   for (std::size_t i = 0; i < 3; ++i) {
     VehicleSetup& v = s.vehicles[i];

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <map>
+#include <vector>
 
 #include "tests/sim/runs.hpp"
 #include "tests/support.hpp"
@@ -53,7 +54,10 @@ Scenario swarm(double duration) {
 
 TEST(Swarm, Threads_TheSameBytesWithOneTwoAndEightThreads) {
   std::uint64_t first = 0;
-  for (const int threads : {1, 2, 8}) {
+  // one thread says nothing to a sanitizer of threads
+  const std::vector<int> all_threads =
+      testing::kSanitized ? std::vector{2, 8} : std::vector{1, 2, 8};
+  for (const int threads : all_threads) {
     const Executor executor(threads);
     Simulation simulation(swarm(testing::kSanitized ? 0.15 : 0.45), hall(), executor);
     ASSERT_EQ(simulation.vehicle_count(), 20u);
@@ -62,7 +66,7 @@ TEST(Swarm, Threads_TheSameBytesWithOneTwoAndEightThreads) {
     while (simulation.step(sink)) {
     }
     EXPECT_EQ(sink.scans, testing::kSanitized ? 20 : 80);
-    if (threads == 1) {
+    if (threads == all_threads.front()) {
       first = sink.hash();
       // they see each other and the obstacles
       int vehicles = 0;
