@@ -29,7 +29,6 @@ struct ScanFlags {
   std::uint64_t seed = 1;
   std::uint64_t index = 0;
   bool no_noise = false;
-  bool legacy = false;
   Surroundings surroundings;
   bool mark_unknown = false;
   bool truth = false;
@@ -92,11 +91,7 @@ void take_scan(const ScanFlags& flags) {
   for (const Named<ReturnMode>& mode : return_modes()) {
     if (flags.returns == mode.name) settings.detection.returns = mode.value;
   }
-  const Lidar lidar(
-      settings,
-      0,
-      nullptr,
-      flags.legacy ? std::nullopt : std::optional(surroundings_in(*map, flags.surroundings)));
+  const Lidar lidar(settings, 0, nullptr, surroundings_in(*map, flags.surroundings));
   const auto renderer = make_renderer(flags.renderer, Scene{map});
   const Executor executor(flags.threads);
   ScanRequest request;
@@ -141,30 +136,21 @@ void add_scan_command(CLI::App& parent, int& /*exit_code*/) {
   app->add_option("--index", flags->index, "Which scan of a pattern that does not repeat")
       ->check(CLI::Range(0, 1 << 30));
   app->add_flag("--no-noise", flags->no_noise, "Exact ranges");
-  auto* legacy =
-      app->add_flag("--legacy",
-                    flags->legacy,
-                    "All that a beam meets within range_max comes back, with the map's intensity, "
-                    "instead of what the hardware would report by reflectivity, range and sun");
-  for (CLI::Option* option : add_surroundings_flags(*app, flags->surroundings)) {
-    option->excludes(legacy);
-  }
+  add_surroundings_flags(*app, flags->surroundings);
   app->add_option(
          "--sub-rays",
          flags->sub_rays,
          "Rays over each beam's cross-section: 0: as many as it takes, 1: beams are lines, "
          "-1: as the sensor file says")
       ->check(CLI::Range(-1, 4096))
-      ->capture_default_str()
-      ->excludes(legacy);
+      ->capture_default_str();
   std::vector<std::string> modes;
   for (const Named<ReturnMode>& mode : return_modes()) modes.emplace_back(mode.name);
   app->add_option("--returns",
                   flags->returns,
                   "Which echoes of a beam are reported, instead of the sensor file's: one, or dual "
                   "(strongest and last), or triple")
-      ->check(CLI::IsMember(modes))
-      ->excludes(legacy);
+      ->check(CLI::IsMember(modes));
   auto* output = app->add_option(
       "-o,--output",
       flags->output,

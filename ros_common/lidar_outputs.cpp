@@ -124,7 +124,7 @@ std::vector<OutputType> lidar_outputs() {
        .large = true,
        .depth = 5},
       {.name = "infrared",
-       .help = "infrared picture of a depth camera, mono8; not in legacy runs",
+       .help = "infrared picture of a depth camera, mono8",
        .make = made_by<Infrared, msg::Image>(),
        .per = kLidar,
        .frame = Frame::kOptical,

@@ -69,6 +69,12 @@ std::map<std::string, std::string> snapshot(const std::string& folder);
 void write_file(const std::string& path, std::string_view bytes);
 std::string read_file(const std::string& path);
 
+/// A copy of a shipped vehicle's file with one text in place of another; its path.
+std::string changed_vehicle(const TemporaryFolder& folder,
+                            const std::string& name,
+                            const std::string& from,
+                            const std::string& to);
+
 /// A map of sampled shapes; `points_per_cell` points a resolution squared of surface.
 std::shared_ptr<const SurfelMap> map_of(const ShapeScene& scene,
                                         double resolution,

@@ -134,7 +134,7 @@ void describe_grid(SettingsVisitor& v, GridSettings& s) {
                  0,
                  1000},
                 s.projector_klx);
-        w.section({"stereo", "", "of two imagers, this grid the left one; not in legacy runs"},
+        w.section({"stereo", "", "of two imagers, this grid the left one"},
                   [&](SettingsVisitor& u) { describe_stereo(u, s.stereo); });
       });
 }
@@ -274,14 +274,15 @@ void describe(SettingsVisitor& v, LidarSettings& s) {
            0,
            1e5},
           s.range_min);
-  v.value({"range_max",
-           "m",
-           "longest range (with detection.rated: of legacy runs); of a pinhole grid: depth along "
-           "the axis",
-           0.01,
-           1e5,
-           true},
-          s.range_max);
+  v.value(
+      {"range_max",
+       "m",
+       "longest range, where detection.rated does not say it; of a pinhole grid: depth along the "
+       "axis",
+       0.01,
+       1e5,
+       true},
+      s.range_max);
   v.value({"image_resolution_deg", "deg", "theta_res of the paper renderer", 0.01, 10},
           s.image_resolution_deg);
   v.section({"noise", "", "Gaussian range noise"},

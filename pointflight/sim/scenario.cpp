@@ -171,12 +171,6 @@ void describe(SettingsVisitor& v, Scenario& s) {
   v.value(required({"map", "", ".pfmap to fly in"}), s.map);
   v.value({"map_hash", "", "of the map; another one is refused; empty: any will do"}, s.map_hash);
   v.value({"seed", "", "of everything random", 0, 9e15}, s.seed);
-  v.value(
-      {"legacy",
-       "",
-       "LiDARs, IMUs and rotors of version 0.1: all that a beam meets within range_max comes back, "
-       "IMUs have white noise and walk alone, thrust does not depend on the air's speed"},
-      s.legacy);
   v.value({"duration", "s", "0: as long as the mission takes", 0, 1e6}, s.duration);
   v.value({"physics_step", "s", "of the integrator", 0.0001, 0.005}, s.physics_step);
   if (s.is_short) {
@@ -200,10 +194,8 @@ void describe(SettingsVisitor& v, Scenario& s) {
     w.value({"ground_effect", "", "more thrust near the ground, for vehicles with rotor.radius"},
             s.air.ground_effect);
   });
-  v.only_if(!s.legacy, "legacy: false", [&](SettingsVisitor& u) {
-    u.section({"surroundings", "", "what the returns of LiDARs depend on"},
-              [&](SettingsVisitor& w) { describe(w, s.surroundings); });
-  });
+  v.section({"surroundings", "", "what the returns of LiDARs depend on"},
+            [&](SettingsVisitor& w) { describe(w, s.surroundings); });
   v.section({"output", "", "what is written"},
             [&](SettingsVisitor& w) { describe_output(w, s.output); });
   for (const ScenarioSection& row : scenario_sections().rows()) {

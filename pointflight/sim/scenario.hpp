@@ -124,10 +124,7 @@ struct Scenario {
   std::vector<ObstacleSettings> obstacles;  ///< What moves by itself.
   AirSetup air;                             ///< Wind and ground effect.
   Surroundings surroundings;                ///< What LiDARs' returns depend on.
-  /// LiDARs, IMUs and rotors of version 0.1, bit for bit (`Lidar` without surroundings,
-  /// `make_legacy`). For results that must stay comparable.
-  bool legacy = false;
-  OutputSetup output;  ///< What is written.
+  OutputSetup output;                       ///< What is written.
   /// What other floors and programs read (`scenario_sections`), by name.
   std::map<std::string, std::any> sections;
   /// YAML of `ros` and `share`, by name, in a program that does not read them.

@@ -28,7 +28,6 @@ VehicleSettings settings_of(const Scenario& scenario,
                             const VehicleSetup& setup) {
   VehicleSettings s = scenario.at(scenario.vehicle_key(number, "model"),
                                   [&] { return load_vehicle(setup.model, scenario.folder()); });
-  if (scenario.legacy) make_legacy(s);
   ControllerSettings& c = s.controller;
   if (setup.controller) c.kind = *setup.controller;
   const auto override_with = [](double value, double& setting) {
@@ -123,9 +122,7 @@ void VehicleAgent::mount_sensors(const Scenario& scenario, SharedParts& shared) 
     const std::string key = scenario.vehicle_key(number_, fmt::format("lidars[{}].model", i));
     auto lidar = scenario.at(key, [&] {
       const SharedParts::LidarModel& model = shared.lidar(entry.model);
-      const auto surroundings =
-          scenario.legacy ? std::nullopt
-                          : std::optional(surroundings_in(shared.map(), scenario.surroundings));
+      const Surroundings surroundings = surroundings_in(shared.map(), scenario.surroundings);
       LidarSettings settings = model.settings;
       if (entry.sub_rays >= 0) settings.optics.sub_rays = entry.sub_rays;
       Lidar made(settings, MountedLidar::entity_of(site(i)), model.beams, surroundings);

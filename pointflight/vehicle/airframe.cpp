@@ -108,14 +108,11 @@ void describe_imu(SettingsVisitor& v, ImuSettings& i) {
   v.value({"position", "m", "in the body frame", -10, 10}, i.position);
   v.value({"rotation_rpy_deg", "deg", "roll, pitch, yaw of its axes in the body", -360, 360},
           i.rotation_rpy_deg);
-  v.value({"part",
-           "",
-           "name of a shipped part (below), whose errors it has; noise and walk beside it count in "
-           "legacy runs"},
-          i.part);
-  describe_noise(v, i.errors);
-  v.only_if(
-      i.part.empty(), "no `part`", [&](SettingsVisitor& w) { describe_beyond_noise(w, i.errors); });
+  v.value({"part", "", "name of a shipped part (below), whose errors it has"}, i.part);
+  v.only_if(i.part.empty(), "no `part`", [&](SettingsVisitor& w) {
+    describe_noise(w, i.errors);
+    describe_beyond_noise(w, i.errors);
+  });
 }
 
 void describe_vibration(SettingsVisitor& v, VibrationSettings& s) {
@@ -276,26 +273,6 @@ void describe(SettingsVisitor& v, VehicleSettings& s) {
             [&](SettingsVisitor& w) { describe_battery(w, s.battery); });
   v.section({"airframe", "", "what LiDARs see of it; what is 0 follows from where the rotors sit"},
             [&](SettingsVisitor& w) { describe_looks(w, s.airframe); });
-}
-
-void make_legacy(VehicleSettings& settings) {
-  settings.controller.reallocate = false;
-  settings.controller.legacy = true;
-  ImuErrors& errors = settings.imu.errors;
-  const auto noise_of = [](const TriadErrors& triad) {
-    TriadErrors noise;
-    noise.noise_density = triad.noise_density;
-    noise.bias_walk = triad.bias_walk;
-    return noise;
-  };
-  errors = {.gyro = noise_of(errors.gyro), .accel = noise_of(errors.accel)};
-  settings.imu.part.clear();
-  settings.imu.part_errors.reset();
-  settings.vibration = {};
-  settings.airframe.seen_as_hull = true;
-  settings.rotor.advance_ratios.clear();
-  settings.rotor.thrust_shares.clear();
-  settings.rotor.torque_shares.clear();
 }
 
 std::string_view to_string(CommandLevel level) {

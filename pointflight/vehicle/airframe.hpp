@@ -71,7 +71,6 @@ struct ControllerSettings {
   double integral_max = 4.0;              ///< Disturbance that the position loops allow for, m/s^2.
   double body_rate_max = 10.0;            ///< Demanded rates, rad/s.
   bool reallocate = true;                 ///< Rotors that fail are allowed for.
-  bool legacy = false;                    ///< As in version 0.1 (`make_legacy`); no key of files.
 };
 
 /// Where an IMU sits and how it errs (REP 145 axes).
@@ -81,8 +80,7 @@ struct ImuSettings {
   Vector3d rotation_rpy_deg = Vector3d::Zero();  ///< Of its axes in the body.
   std::string part;  ///< Name of a shipped part (`load_imu_part`), whose errors it has; or empty.
   std::optional<ImuErrors> part_errors;  ///< The part's, once the file is read.
-  /// Of an IMU that is no shipped part. Of one that is: noise and walk in legacy runs.
-  ImuErrors errors;
+  ImuErrors errors;                      ///< Of an IMU that is no shipped part.
 
   /// The part's errors, or its own.
   [[nodiscard]] const ImuErrors& in_use() const { return part_errors ? *part_errors : errors; }
@@ -173,10 +171,6 @@ struct VehicleSettings {
   /// body frame, m/s^2.
   [[nodiscard]] Vector3d drag_in_still_air(const Vector3d& v_body) const;
 };
-
-/// Takes away what vehicles did not have in version 0.1: errors of the IMU beyond noise and walk,
-/// vibration, rotors that feel the air's speed. For runs that must stay comparable.
-void make_legacy(VehicleSettings& settings);
 
 /// As files have it: "rotor_speeds", ...
 std::string_view to_string(CommandLevel level);

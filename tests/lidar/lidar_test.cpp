@@ -246,11 +246,11 @@ TEST(Lidar, Statistics_TruthIsWhatIsThereAndWhereExactDeskewingPutsThePoint) {
                      {quaternion_from_rpy(0.3 * s, 0, kPi * s), {3.0 * s, 0.5, 0}}});
   }
   const PoseTrack moving(poses);
-  for (const bool legacy : {false, true}) {
+  for (const bool ideal : {false, true}) {
     const Lidar lidar(load_lidar("mid360"),
                       0,
                       nullptr,
-                      legacy ? std::nullopt : std::optional<Surroundings>(Surroundings{}));
+                      ideal ? std::nullopt : std::optional<Surroundings>(Surroundings{}));
     ScanRequest request;
     request.start = SimTime(std::chrono::milliseconds(50));
     const Scan plain = lidar.take(request, moving, *renderer, Executor(2));
@@ -287,7 +287,7 @@ TEST(Lidar, Statistics_TruthIsWhatIsThereAndWhereExactDeskewingPutsThePoint) {
       if (apart.sum() - apart.maxCoeff() - nearest < 0.25) continue;
       ++looked_at;
       const double cosine = std::abs(direction[axis]);
-      const double blur = legacy ? 0.0 : 5.0 * 0.075 * kDegree * *range * std::sqrt(2.0);
+      const double blur = ideal ? 0.0 : 5.0 * 0.075 * kDegree * *range * std::sqrt(2.0);
       EXPECT_NEAR(truth.range, *range, 0.01 / cosine + blur / cosine) << i;
       EXPECT_NEAR(truth.incidence, std::acos(cosine), 0.06) << i;
       EXPECT_EQ(truth.depth, 0.0f);

@@ -13,6 +13,7 @@ import math
 import os
 import pathlib
 import random
+import re
 import shutil
 import signal
 import subprocess
@@ -443,7 +444,6 @@ def faults(kinds):
 
 NINE = """map: {map}
 duration: {duration}
-legacy: true
 vehicles:
 {vehicles}
 obstacles:
@@ -460,6 +460,7 @@ def nine(folder, duration, how, **more):
     folder.mkdir(parents=True)
     model = pathlib.Path(program).parents[3] / "data/vehicles/quad_330.yaml"
     text = "".join(line for line in model.read_text().splitlines(True) if not line.startswith("radius:"))
+    text = re.sub(r"^airframe:.*", "airframe: {seen_as_hull: true}", text, flags=re.M)
     (folder / "box.yaml").write_text(text + f"shape: box\nsize: {SIZE.tolist()}\n")
     vehicles = []
     for i in range(9):

@@ -93,15 +93,17 @@ double seconds_of(const msg::Time& t) {
 }
 
 /// With an IMU whose errors do not hide its axes and units.
-Scenario plain_flight() {
+Scenario plain_flight(const testing::TemporaryFolder& folder) {
   Scenario scenario = flight();
-  scenario.legacy = true;
+  scenario.vehicles[0].model =
+      testing::changed_vehicle(folder, "quad_330", "part: icm40609", "gyro_noise_density: 6.63e-5");
   return scenario;
 }
 
 TEST(RosBridge, SendsTheDefaultProfile) {
+  const testing::TemporaryFolder folder;
   Keeper keeper;
-  fly(plain_flight(), load_ros_profile("default"), keeper);
+  fly(plain_flight(folder), load_ros_profile("default"), keeper);
   const auto odometry = keeper.of<msg::Odometry>("/drone0/odom");
   ASSERT_EQ(odometry.size(), 201u);
   EXPECT_EQ(odometry[0].header.frame_id, "world");
@@ -377,8 +379,9 @@ TEST(RosBridge, SettingsOfAProfile) {
       "imu_unit: g\nimu_gravity: down\noutputs:\n  - {kind: imu, topic: /imu, rate: 50}\n"
       "  - {kind: cloud, topic: /livox/lidar, layout: livox_custom, rate: 5}\n",
       "p.yaml");
+  const testing::TemporaryFolder folder;
   Keeper keeper;
-  fly(plain_flight(), profile, keeper);
+  fly(plain_flight(folder), profile, keeper);
   const auto imu = keeper.of<msg::Imu>("/imu");
   ASSERT_EQ(imu.size(), 51u);
   EXPECT_NEAR(imu[0].linear_acceleration.z, -1.0, 0.03);

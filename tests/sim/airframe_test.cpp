@@ -96,9 +96,11 @@ TEST(Airframe, OthersAreSeenAsTheyAreBuiltAndWhereTheirBladesStand) {
   EXPECT_GT(blades, 50u);
 }
 
-TEST(Airframe, ByItsFileOrInLegacyRunsTheHullIsSeen) {
+TEST(Airframe, ByItsFileTheHullIsSeen) {
+  const testing::TemporaryFolder folder;
   Scenario scenario = two_that_hover(2.0);
-  scenario.legacy = true;
+  scenario.vehicles[1].model = testing::changed_vehicle(
+      folder, "hexa_550", "mass:", "airframe: {seen_as_hull: true}\nmass:");
   const Flown flown = fly(scenario);
   const Pose T_body_world = flown.T_world_body[1].inverse();
   std::size_t seen = 0;

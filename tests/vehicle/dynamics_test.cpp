@@ -66,7 +66,7 @@ TEST(Multirotor, TorqueFreeSpinConservesMomentumAndEnergy) {
 TEST(Multirotor, RungeKuttaShowsItsOrder) {
   // everything on: lag, drag, gyroscopic torque, tumbling
   VehicleSettings settings = load_vehicle("quad_330");
-  make_legacy(settings);  // kinks of the rotors' curve would hide it
+  settings.rotor.advance_ratios.clear();  // kinks of the rotors' curve would hide it
   const Multirotor vehicle(settings);
   const std::vector<double> commands = {900, 1100, 1000, 1050};
   const auto end_state = [&](double dt) {
@@ -214,7 +214,7 @@ TEST(Multirotor, ThrustFallsWithTheAdvanceRatio) {
   EXPECT_LT(fastest, 30.0);
   EXPECT_GT(fastest, 15.0);
   // without the curve drag alone would hold it
-  make_legacy(settings);
+  settings.rotor.advance_ratios.clear();
   EXPECT_EQ(settings.rotor.thrust_share(20.0, rotor.speed_max), 1.0);
 }
 

@@ -304,7 +304,7 @@ TEST(Imu, ItsClockIsLateAndJitters) {
 
 TEST(Imu, RotorsAndBladesShakeAtTheirFrequencies) {
   VehicleSettings vehicle = load_vehicle("quad_330");
-  make_legacy(vehicle);
+  vehicle.imu.part_errors.reset();
   vehicle.imu.errors = {};
   vehicle.imu.rate = 1000.0;
   vehicle.vibration = {.rotor_accel = 0.5, .blade_accel = 0.8, .rotor_gyro = 0.0, .blades = 3};
@@ -357,16 +357,6 @@ TEST(ImuParts, AreShippedAndSaidWhereTheyAreNot) {
   expect_contains(changed("icm40609", "icm40608"), "did you mean 'icm40609'");
   expect_contains(changed("part: icm40609", "part: icm40609\n  clock_jitter: 0.001"),
                   "clock_jitter");
-}
-
-TEST(ImuParts, LegacyVehiclesHaveNoiseAndWalkAlone) {
-  VehicleSettings vehicle = load_vehicle("quad_330");
-  make_legacy(vehicle);
-  EXPECT_EQ(vehicle.imu.in_use().gyro.noise_density, 6.63e-5);
-  EXPECT_EQ(vehicle.imu.in_use().gyro.bias_walk, 1e-5);
-  EXPECT_EQ(vehicle.imu.in_use().gyro.turn_on_bias, 0.0);
-  EXPECT_EQ(vehicle.imu.in_use().bits, 0);
-  EXPECT_TRUE(vehicle.vibration.is_off());
 }
 
 }  // namespace

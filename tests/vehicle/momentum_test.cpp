@@ -106,7 +106,8 @@ struct Tumble {
   VehicleState start;
 
   explicit Tumble(const char* name) : settings(load_vehicle(name)) {
-    make_legacy(settings);  // kinks of a rotor's curve would hide the order of the integrator
+    // kinks of a rotor's curve would hide the order of the integrator
+    settings.rotor.advance_ratios.clear();
     const Multirotor vehicle(settings);
     start = vehicle.hover_at({1, 2, 30}, 0.4);
     start.body.v_world = {3, -2, 1};

@@ -244,9 +244,7 @@ Vector3d LoopController::position_loop(const RigidBodyState& state,
   const Vector3d v_wanted = command.v_world + 0.5 * wn.cwiseProduct(e_p).cwiseQuotient(z);
   const Vector3d v_ref = limited(v_wanted, c.speed_max);
   memory.limits.speed = differ(v_wanted, v_ref);
-  const Vector3d drag =
-      drag_of(state, c.legacy ? limited(command.v_world, c.speed_max) : state.v_world);
-  const Vector3d d = memory.disturbance + drag;
+  const Vector3d d = memory.disturbance + drag_of(state, state.v_world);
   const Vector3d a = 2.0 * z.cwiseProduct(wn).cwiseProduct(v_ref - state.v_world);
   return allowed(command.a_world + a - d, memory);
 }
