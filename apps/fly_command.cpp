@@ -218,7 +218,7 @@ void print_result(const FlyFlags& flags, const Simulation& simulation, double wa
              to_string(simulation.end()),
              to_seconds(simulation.time()),
              reason.empty() ? "" : ": " + reason);
-  for (const std::size_t v : simulation.own_vehicles()) print_vehicle(simulation, v);
+  for (const std::size_t v : simulation.flying_here()) print_vehicle(simulation, v);
   fmt::print("  real-time factor  {:.1f}\n", to_seconds(simulation.simulated()) / wall);
   if (flags.output.empty() || flags.no_picture) return;
   fmt::print("  picture           {}\n", (fs::path(flags.output) / "overview.png").string());
@@ -244,8 +244,8 @@ void say_waits(const RunLoop& loop, const RosFlags& ros) {
                     1e3 * delays.below(0.5),
                     1e3 * delays.below(0.99)));
   }
-  if (loop.unanswered_scans() > 0) {
-    log(fmt::format("{} scans had no command within {} s", loop.unanswered_scans(), ros.lockstep));
+  if (loop.unanswered() > 0) {
+    log(fmt::format("{} scans had no command within {} s", loop.unanswered(), ros.lockstep));
   }
 }
 
@@ -254,7 +254,7 @@ void say_waits(const RunLoop& loop, const RosFlags& ros) {
 void resume(const FlyFlags& flags, Simulation& simulation) {
   const bool wanted = share_setup_of(simulation.scenario()).on_return == OnReturn::kLog;
   if (!wanted || flags.output.empty()) return;
-  const auto ended = ended_run(flags.output, simulation, simulation.own_vehicles());
+  const auto ended = ended_run(flags.output, simulation, simulation.flying_here());
   if (!ended) return;
   if (!was_run_of(ended->scenario, simulation)) {
     log(fmt::format(

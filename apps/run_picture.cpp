@@ -99,7 +99,7 @@ void write_titles(const RunFigures& f, RunPicture& picture) {
 
 void describe_run(const Simulation& simulation, RunPicture& picture) {
   RunFigures figures;
-  figures.vehicles = simulation.own_vehicles().size();
+  figures.vehicles = simulation.flying_here().size();
   figures.others = simulation.vehicle_count() - figures.vehicles;
   figures.time = to_seconds(simulation.time());
   figures.end = to_string(simulation.end());

@@ -115,10 +115,9 @@ SharedRun::SharedRun(const ShareFlags& flags,
   transport.lease = setup.lease;
   transport.localhost_only = flags.localhost;
   transport.ahead = setup.ahead;
-  const std::vector<std::size_t> own = options.vehicles;
   transport_ = dds_module().share(transport);
   share_ = std::make_unique<FleetShare>(simulation, *transport_, std::move(options));
-  simulation.share(own, *share_);
+  share_->take_part(simulation);
   link_ = std::make_unique<ShareLink>(simulation, *share_);
 }
 

@@ -77,9 +77,10 @@ class Fog : public Renderer {
  public:
   explicit Fog(const Scene& scene) : clear_(make_renderer("beam", scene)) {}
 
-  void render(const RayBatch& batch, std::span<Hit> hits, const Executor& executor) const override {
-    clear_->render(batch, hits, executor);
-    for (Hit& hit : hits) {
+ protected:
+  void render_one(const RenderJob& job, const Executor& executor) const override {
+    clear_->render({&job, 1}, executor);
+    for (Hit& hit : job.hits) {
       if (hit.range > 3.0f) hit = {};
     }
   }

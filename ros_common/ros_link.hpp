@@ -45,6 +45,9 @@ class RosLink : public Link {
   void on_sample(const Sample& sample) override { bridge_.on_sample(sample); }
   void on_step(const StepDone& step) override;
   void on_wait(SimTime now, Waiting why) override;
+  [[nodiscard]] bool wants_answer(const Sample& sample) const override {
+    return options_.lockstep && std::holds_alternative<ScanSample>(sample);
+  }
   std::vector<Order> take_orders() override;
   void on_reset(SimTime reached) override;
   void on_seek(SimTime to) override;

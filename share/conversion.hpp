@@ -3,8 +3,8 @@
 
 #include <cstdint>
 
-#include "pointflight/sim/fleet_exchange.hpp"
 #include "share/messages.hpp"
+#include "share/shared_step.hpp"
 
 namespace pointflight {
 

@@ -50,9 +50,14 @@ FleetShare::FleetShare(const Simulation& simulation,
       parts_(common_ground(simulation, setup_.time == ShareTime::kFree ? options_.rate : 0.0)),
       others_(simulation.vehicle_count()) {
   for (std::size_t v = 0; v < others_.size(); ++v) {
-    others_[v].summary.vehicle = static_cast<std::uint32_t>(v);
+    others_[v].report.vehicle = static_cast<std::uint32_t>(v);
+    any_may_stop_ =
+        any_may_stop_ || simulation.vehicle(v).setup().on_collision == CollisionReaction::kStop;
   }
-  std::sort(options_.vehicles.begin(), options_.vehicles.end());
+  met_.vehicles.resize(others_.size());
+  std::vector<std::size_t>& own = options_.vehicles;
+  std::sort(own.begin(), own.end());
+  own.erase(std::unique(own.begin(), own.end()), own.end());
 }
 
 FleetShare::~FleetShare() {
@@ -367,21 +372,6 @@ void FleetShare::leave() {
     for (const Bytes& bytes : last_sent_) transport_.send(ShareChannel::kStates, bytes);
     transport_.wait(kMillisecond);
   }
-}
-
-std::vector<VehicleEvent> FleetShare::take_events() {
-  return std::exchange(events_, {});
-}
-
-std::vector<ApartSummary> FleetShare::apart() const {
-  std::vector<ApartSummary> all;
-  for (std::size_t v = 0; v < others_.size(); ++v) {
-    if (std::binary_search(options_.vehicles.begin(), options_.vehicles.end(), v)) continue;
-    ApartSummary summary = others_[v].summary;
-    if (others_[v].seen && !others_[v].there) summary.apart += now_ - others_[v].lost_at;
-    all.push_back(std::move(summary));
-  }
-  return all;
 }
 
 std::vector<FleetShare::PeerReport> FleetShare::peers() const {

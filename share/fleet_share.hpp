@@ -8,13 +8,13 @@
 #include <string>
 #include <vector>
 
-#include "pointflight/sim/fleet_exchange.hpp"
 #include "pointflight/sim/simulation.hpp"
 #include "share/clock_estimate.hpp"
 #include "share/messages.hpp"
 #include "share/other_track.hpp"
 #include "share/share_setup.hpp"
 #include "share/share_transport.hpp"
+#include "share/shared_step.hpp"
 
 namespace pointflight {
 
@@ -34,13 +34,18 @@ struct FleetShareOptions {
 };
 
 /// One process of a shared run (docs/swarms.md): introduces itself, refuses what does not fit,
-/// tells where its vehicles are, knows where the others' are. All from one thread.
-class FleetShare : public FleetExchange {
+/// tells where its vehicles are, knows where the others' are. To the simulation it is the source of
+/// each vehicle that another process flies, and the agreement on the end of the run. All from one
+/// thread.
+class FleetShare : public EndingAgreement {
  public:
   /// `simulation` and `transport` must outlive it.
   FleetShare(const Simulation& simulation, ShareTransport& transport, FleetShareOptions options);
   ~FleetShare() override;
 
+  /// The simulation, which is the constructor's, flies its own vehicles from now on, and follows
+  /// the others.
+  void take_part(Simulation& simulation);
   /// Before the run: introduces itself and looks for others; true once it may start. Throws
   /// InputError where another process flies one of its vehicles, or in another world.
   bool is_ready();
@@ -58,13 +63,11 @@ class FleetShare : public FleetExchange {
   /// Why this process has to end; empty while it has not to: another one flies its vehicles.
   [[nodiscard]] const std::string& fault() const { return fault_; }
 
-  OtherVehicles meet(const SharedStep& own) override;
-  [[nodiscard]] bool decides_together() const override;
-  [[nodiscard]] std::optional<PoseTrack> track(std::size_t vehicle,
-                                               SimTime from,
-                                               SimTime until) const override;
-  std::vector<VehicleEvent> take_events() override;
-  [[nodiscard]] std::vector<ApartSummary> apart() const override;
+  /// True in lockstep: the run ends for all at once.
+  [[nodiscard]] bool decides_together() const;
+  RunOutlook agree(const RunOutlook& own) override;
+  /// What is known of a vehicle of another process, by number.
+  [[nodiscard]] SourceReport report(std::size_t vehicle) const;
 
   /// Another process, for reports.
   struct PeerReport {
@@ -115,13 +118,23 @@ class FleetShare : public FleetExchange {
     bool jumped = false;     ///< It is not where it was: came, or came back.
     double moved = 0.0;      ///< For how long it was moved on last, s.
     bool asks_past = false;  ///< What happened while it was lost is still to be found out.
-    ApartSummary summary;
+    SourceReport report;
   };
   /// Where an own vehicle was.
   struct OwnPast {
     SimTime time;
     share_msg::VehicleState state;
   };
+
+  class RemoteVehicle;
+  [[nodiscard]] std::optional<SourcedState> state_at(std::size_t vehicle, SimTime time);
+  [[nodiscard]] std::optional<PoseTrack> track(std::size_t vehicle,
+                                               SimTime from,
+                                               SimTime until) const;
+  [[nodiscard]] std::vector<VehicleEvent> take_events();
+  [[nodiscard]] SharedStep own_step(bool is_verdict) const;
+  void exchange(SimTime time);
+  OtherVehicles meet(const SharedStep& own);
 
   void introduce(share_msg::Phase phase);
   void begin();
@@ -187,7 +200,10 @@ class FleetShare : public FleetExchange {
   std::vector<Other> others_;  ///< By number in the fleet; own ones are not used.
   std::deque<OwnPast> past_;
   std::vector<VehicleEvent> events_;
-  SimTime now_;  ///< Of the last meeting.
+  SimTime now_;  ///< Of the last exchange.
+  std::optional<SimTime> exchanged_at_;
+  OtherVehicles met_;          ///< In the step under way.
+  bool any_may_stop_ = false;  ///< A vehicle of the fleet has on_collision: stop.
   share_msg::Introduction own_;
   share_msg::Phase phase_ = share_msg::Phase::kJoining;
   bool introduced_ = false;

@@ -87,7 +87,7 @@ void FleetShare::find_missed(std::uint32_t number, const OtherTrack& track) {
   Other& other = others_[number];
   // what is forgotten by now may have had contacts in it
   const SimTime known_from = std::max(past_.front().time, track.oldest());
-  if (known_from > other.lost_at + lease_) ++other.summary.unknown_contacts;
+  if (known_from > other.lost_at + lease_) ++other.report.unknown_contacts;
   const VehicleAgent& agent = simulation_.vehicle(number);
   std::map<std::uint32_t, bool> inside;
   for (const OwnPast& past : past_) {
@@ -100,7 +100,7 @@ void FleetShare::find_missed(std::uint32_t number, const OtherTrack& track) {
         agent.shape(), there->T_world_body(), agent.label(), own.hull(), own_pose, 0.0);
     const bool meets = contact && contact->distance <= 0.0;
     if (meets && !inside[past.state.number]) {
-      ++other.summary.missed_contacts;
+      ++other.report.missed_contacts;
       VehicleEvent event;
       event.vehicle = past.state.number;
       event.time = now_;
@@ -122,7 +122,7 @@ void FleetShare::give_up_past() {
   for (Other& other : others_) {
     if (!other.asks_past || now_ - other.back_at < kPastPatience) continue;
     other.asks_past = false;
-    ++other.summary.unknown_contacts;
+    ++other.report.unknown_contacts;
   }
 }
 

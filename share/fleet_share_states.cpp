@@ -56,11 +56,11 @@ void FleetShare::lose(Peer& peer, const char* kind, const std::string& words) {
     Other& other = others_[v];
     if (!other.seen || other.process != peer.intro.head.process) continue;
     if (!other.there && !left) continue;
-    if (!other.there) other.summary.apart += std::max(Duration{0}, now_ - other.lost_at);
+    if (!other.there) other.report.apart += std::max(Duration{0}, now_ - other.lost_at);
     other.lost_at = other.track.empty() ? now_ : std::min(now_, other.track.newest());
     other.there = false;
     if (left) other.seen = false;  // its body goes with it
-    if (!left) ++other.summary.losses;
+    if (!left) ++other.report.losses;
     note(v, kind, fmt::format("{} {}{}", peer.intro.name, words, then));
   }
   look_again_at_the_rest();
@@ -85,18 +85,18 @@ void FleetShare::mark_present(std::uint32_t number, Peer& peer) {
   Other& other = others_[number];
   const bool same = other.process == peer.intro.head.process;
   other.process = peer.intro.head.process;
-  other.summary.flown_by = peer.intro.name;
+  other.report.flown_by = peer.intro.name;
   if (std::exchange(other.there, true)) return;
   other.jumped = true;
   const bool was_seen = std::exchange(other.seen, true);
   if (!was_seen) return;
   const Duration apart = std::max(Duration{0}, now_ - other.lost_at);
-  other.summary.apart += apart;
+  other.report.apart += apart;
   other.back_at = now_;
   if (same) {
     other.asks_past = true;
   } else {
-    ++other.summary.unknown_contacts;
+    ++other.report.unknown_contacts;
   }
   note(number,
        "back",
@@ -221,10 +221,10 @@ void FleetShare::place(OtherVehicles& met, std::size_t number) {
     // after a long silence it is elsewhere: it did not fly there in one step
     met.vehicles[number]->jumped =
         std::exchange(other.jumped, false) || (before > kJump && moved < before);
-    if (moved > other.summary.extrapolated_max) {
+    if (moved > other.report.extrapolated_max) {
       const VehicleAgent& agent = simulation_.vehicle(number);
-      other.summary.extrapolated_max = moved;
-      other.summary.extrapolation_bound =
+      other.report.extrapolated_max = moved;
+      other.report.extrapolation_bound =
           extrapolation_bound(agent.settings(), bounding_radius(agent.hull()), moved);
     }
   } else if (setup_.on_loss == OnLoss::kHold) {

@@ -22,6 +22,19 @@ std::vector<Order> ShareLink::take_orders() {
   return {};
 }
 
+std::string ShareLink::objection(const Order& order) const {
+  if (std::holds_alternative<ResetOrder>(order)) {
+    return "a run that other processes share cannot begin again";
+  }
+  const bool moves_clock =
+      std::holds_alternative<PauseOrder>(order) || std::holds_alternative<RateOrder>(order);
+  if (moves_clock && !share_.decides_together()) {
+    return "a run that other processes share by their clocks cannot be paused or go at another "
+           "rate";
+  }
+  return {};
+}
+
 void ShareLink::close() {
   share_.leave();
 }

@@ -16,8 +16,13 @@ class ShareLink : public Link {
 
   bool is_ready() override;
   std::vector<Order> take_orders() override;
+  [[nodiscard]] std::string objection(const Order& order) const override;
   void close() override;
   [[nodiscard]] bool is_over() const override { return !share_.fault().empty(); }
+  // others' rates are the same, and would have to be changed with this one's
+  [[nodiscard]] std::string remedy_when_behind() const override {
+    return "share: {time: lockstep}";
+  }
   /// Nobody flies for its sake alone.
   [[nodiscard]] bool is_in_use() const override { return false; }
 

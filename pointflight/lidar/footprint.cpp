@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/math.hpp"
@@ -136,15 +137,6 @@ bool may_count(float range, const Echoes& echoes, const ReturnModel& returns) {
 
 }  // namespace
 
-/// What all sub-rays of a scan are traced with.
-struct Footprint::Task {
-  const WideBeams& beams;
-  const Renderer& renderer;
-  const ReturnModel& returns;
-  std::span<Echoes> echoes;
-  const Executor& executor;
-};
-
 Footprint::Footprint(const OpticsSettings& optics)
     : sub_rays_(optics.sub_rays),
       sigma_across_(static_cast<float>(optics.divergence_horizontal_deg * kDegree / kFwhmPerSigma)),
@@ -254,58 +246,69 @@ bool Footprint::judge(std::size_t level,
   return in_doubt || (has_more && may_count(known, echoes, returns));
 }
 
-/// Finds the echoes of these beams; returns those that need more sub-rays.
-std::vector<std::uint32_t> Footprint::trace_with(const Task& task,
-                                                 std::size_t level,
-                                                 std::span<const std::uint32_t> beams) const {
-  const RayBatch& middles = task.beams.middles;
-  const std::span<const SubRay> sub_rays = levels_[level];
+FootprintRounds::FootprintRounds(const Footprint& footprint,
+                                 const WideBeams& beams,
+                                 const ReturnModel& returns,
+                                 std::span<Echoes> echoes)
+    : footprint_(footprint), beams_(beams), returns_(returns), echoes_(echoes) {}
+
+std::optional<RenderJob> FootprintRounds::next(const Executor& executor) {
+  const RayBatch& middles = beams_.middles;
+  if (!std::exchange(has_begun_, true)) {
+    wanted_.assign(middles.order.begin(), middles.order.end());
+    if (wanted_.size() != middles.rays.size()) wanted_ = direction_order(middles.rays, executor);
+  }
+  if (done_ == wanted_.size()) {
+    ++level_;
+    done_ = 0;
+    wanted_ = std::exchange(more_, {});
+  }
+  if (wanted_.empty() || level_ == footprint_.levels_.size()) return std::nullopt;
+  const std::span<const Footprint::SubRay> sub_rays = footprint_.levels_[level_];
+  const std::size_t n = sub_rays.size();
+  const std::size_t at_once = std::max<std::size_t>(1, kRaysAtOnce / n);
+  now_ = std::span(wanted_).subspan(done_, std::min(at_once, wanted_.size() - done_));
+  done_ += now_.size();
+  rays_.resize(now_.size() * n);
+  hits_.resize(rays_.size());
+  nearest_.resize(rays_.size() / kSubRays);
+  offsets_.resize(middles.time_offsets.empty() ? 0 : rays_.size());
+  executor.parallel_for(now_.size(), kBeamsPerChunk, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t b = begin; b < end; ++b) {
+      footprint_.aim(beams_, now_[b], sub_rays, std::span(rays_).subspan(b * n, n));
+      if (offsets_.empty()) continue;
+      std::fill_n(&offsets_[b * n], n, middles.time_offsets[now_[b]]);
+    }
+  });
+  RenderJob job{middles, hits_, nearest_};
+  job.batch.rays = rays_;
+  job.batch.order = {};
+  job.batch.time_offsets = offsets_;
+  return job;
+}
+
+void FootprintRounds::receive(const Executor& executor) {
+  const std::span<const Footprint::SubRay> sub_rays = footprint_.levels_[level_];
   const std::size_t n = sub_rays.size();
   const std::size_t groups = n / kSubRays;
-  const std::size_t at_once = std::max<std::size_t>(1, kRaysAtOnce / n);
-  std::vector<Ray> rays;
-  std::vector<Duration> offsets;
-  std::vector<Hit> hits;
-  std::vector<float> nearest;
-  std::vector<std::uint8_t> wants_more;
-  std::vector<std::uint32_t> more;
-  for (std::size_t from = 0; from < beams.size(); from += at_once) {
-    const std::span now = beams.subspan(from, std::min(at_once, beams.size() - from));
-    rays.resize(now.size() * n);
-    hits.resize(rays.size());
-    nearest.resize(now.size() * groups);
-    wants_more.assign(now.size(), 0);
-    offsets.resize(middles.time_offsets.empty() ? 0 : rays.size());
-    task.executor.parallel_for(now.size(), kBeamsPerChunk, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t b = begin; b < end; ++b) {
-        aim(task.beams, now[b], sub_rays, std::span(rays).subspan(b * n, n));
-        if (offsets.empty()) continue;
-        std::fill_n(&offsets[b * n], n, middles.time_offsets[now[b]]);
+  std::vector<std::uint8_t> wants_more(now_.size(), 0);
+  executor.parallel_for(now_.size(), kBeamsPerChunk, [&](std::size_t begin, std::size_t end) {
+    std::vector<BeamPart> parts(n);
+    for (std::size_t b = begin; b < end; ++b) {
+      for (std::size_t i = 0; i < n; ++i) {
+        parts[i] = part_of(hits_[b * n + i], sub_rays[i].share, i, returns_);
       }
-    });
-    RayBatch batch = middles;
-    batch.rays = rays;
-    batch.order = {};
-    batch.time_offsets = offsets;
-    task.renderer.render_footprints(batch, hits, nearest, task.executor);
-
-    task.executor.parallel_for(now.size(), kBeamsPerChunk, [&](std::size_t begin, std::size_t end) {
-      std::vector<BeamPart> parts(n);
-      for (std::size_t b = begin; b < end; ++b) {
-        for (std::size_t i = 0; i < n; ++i) {
-          parts[i] = part_of(hits[b * n + i], sub_rays[i].share, i, task.returns);
-        }
-        const float known = *std::min_element(&nearest[b * groups], &nearest[b * groups] + groups);
-        const float range_max = middles.rays[now[b]].range_max;
-        wants_more[b] =
-            judge(level, parts, known, range_max, task.returns, task.echoes[now[b]]) ? 1 : 0;
-      }
-    });
-    for (std::size_t b = 0; b < now.size(); ++b) {
-      if (wants_more[b] != 0) more.push_back(now[b]);
+      const auto nearest = std::span(nearest_).subspan(b * groups, groups);
+      const float known = *std::min_element(nearest.begin(), nearest.end());
+      const float range_max = beams_.middles.rays[now_[b]].range_max;
+      const bool more =
+          footprint_.judge(level_, parts, known, range_max, returns_, echoes_[now_[b]]);
+      wants_more[b] = more ? 1 : 0;
     }
+  });
+  for (std::size_t b = 0; b < now_.size(); ++b) {
+    if (wants_more[b] != 0) more_.push_back(now_[b]);
   }
-  return more;
 }
 
 void Footprint::trace(const WideBeams& beams,
@@ -313,16 +316,10 @@ void Footprint::trace(const WideBeams& beams,
                       const ReturnModel& returns,
                       std::span<Echoes> echoes,
                       const Executor& executor) const {
-  std::vector<std::uint32_t> own_order;
-  std::span<const std::uint32_t> order = beams.middles.order;
-  if (order.size() != beams.middles.rays.size()) {
-    own_order = direction_order(beams.middles.rays, executor);
-    order = own_order;
-  }
-  const Task task{beams, renderer, returns, echoes, executor};
-  std::vector<std::uint32_t> more(order.begin(), order.end());
-  for (std::size_t level = 0; level < levels_.size() && !more.empty(); ++level) {
-    more = trace_with(task, level, more);
+  FootprintRounds rounds(*this, beams, returns, echoes);
+  while (const std::optional<RenderJob> job = rounds.next(executor)) {
+    renderer.render({&*job, 1}, executor);
+    rounds.receive(executor);
   }
 }
 

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -51,7 +52,7 @@ class Footprint {
   struct SubRay {
     float x, y, share;
   };
-  struct Task;
+  friend class FootprintRounds;
 
   [[nodiscard]] static std::vector<SubRay> rim();
   [[nodiscard]] static std::vector<SubRay> spread(std::size_t count);
@@ -65,15 +66,43 @@ class Footprint {
                            float range_max,
                            const ReturnModel& returns,
                            Echoes& echoes) const;
-  [[nodiscard]] std::vector<std::uint32_t> trace_with(const Task& task,
-                                                      std::size_t level,
-                                                      std::span<const std::uint32_t> beams) const;
-
   std::int64_t sub_rays_;
   float sigma_across_, sigma_up_;               ///< rad
   float merge_;                                 ///< m, of `echoes_of`.
   std::vector<std::vector<SubRay>> levels_;     ///< The next where one is not enough.
   std::array<std::array<float, 2>, 64> turns_;  ///< Cosine and sine.
+};
+
+/// The echoes of one scan's beams, found round by round: each round asks for the sub-rays of some
+/// beams, at most `kRaysAtOnce`; first few for all beams, then more for those that need them.
+class FootprintRounds {
+ public:
+  /// All must outlive it; `echoes`: of each beam, as they are found.
+  FootprintRounds(const Footprint& footprint,
+                  const WideBeams& beams,
+                  const ReturnModel& returns,
+                  std::span<Echoes> echoes);
+
+  /// The sub-rays of the next round, valid until `receive`; nothing: all echoes are found.
+  [[nodiscard]] std::optional<RenderJob> next(const Executor& executor);
+  /// The hits of the round are there.
+  void receive(const Executor& executor);
+
+ private:
+  const Footprint& footprint_;
+  WideBeams beams_;
+  const ReturnModel& returns_;
+  std::span<Echoes> echoes_;
+  bool has_begun_ = false;
+  std::size_t level_ = 0;
+  std::vector<std::uint32_t> wanted_;   ///< Beams of this level.
+  std::size_t done_ = 0;                ///< Of `wanted_`.
+  std::vector<std::uint32_t> more_;     ///< Beams of the next level.
+  std::span<const std::uint32_t> now_;  ///< Beams of this round.
+  std::vector<Ray> rays_;
+  std::vector<Duration> offsets_;
+  std::vector<Hit> hits_;
+  std::vector<float> nearest_;
 };
 
 }  // namespace pointflight

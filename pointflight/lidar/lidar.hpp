@@ -6,6 +6,7 @@
 #include "pointflight/core/parallel.hpp"
 #include "pointflight/geometry/motion.hpp"
 #include "pointflight/lidar/beam_pattern.hpp"
+#include "pointflight/lidar/exposure.hpp"
 #include "pointflight/lidar/footprint.hpp"
 #include "pointflight/lidar/lidar_settings.hpp"
 #include "pointflight/lidar/return_model.hpp"
@@ -53,8 +54,15 @@ class Lidar {
   /// The longest ray that it can see something at, m from the sensor.
   [[nodiscard]] double reach() const;
 
-  /// Takes one scan in arrears: the track of the sensor and the bodies must know all instants of
-  /// the scan. The result does not depend on the executor's threads.
+  /// Begins a scan in arrears: the track of the sensor and the bodies must know all instants of the
+  /// scan. LiDAR, renderer and what the request refers to must outlive the exposure. The result
+  /// does not depend on the executor's threads.
+  [[nodiscard]] std::unique_ptr<Exposure> aim(const ScanRequest& request,
+                                              const PoseTrack& T_world_sensor,
+                                              const Renderer& renderer,
+                                              const Executor& executor) const;
+
+  /// Takes one scan: aims, has its rays rendered as long as there are some, and finishes it.
   [[nodiscard]] Scan take(const ScanRequest& request,
                           const PoseTrack& T_world_sensor,
                           const Renderer& renderer,
@@ -71,43 +79,36 @@ class Lidar {
   }
 
  private:
-  /// The beams of a scan in the world.
-  struct WorldBeams {
-    std::vector<Ray> rays;          ///< Their axes.
-    std::vector<Vector3f> across;   ///< `WideBeams::across`; none where beams are lines.
-    std::vector<Duration> offsets;  ///< Their times, where bodies move meanwhile.
-  };
-  [[nodiscard]] WorldBeams in_world(std::span<const Beam> beams,
-                                    const ScanRequest& request,
-                                    const PoseTrack& T_world_sensor,
-                                    bool snapshot,
-                                    const Executor& executor) const;
-  void shake(const ScanRequest& request, std::span<Ray> rays, const Executor& executor) const;
-  [[nodiscard]] std::vector<Return> returns_of(const ScanRequest& request,
-                                               std::span<const Beam> beams,
-                                               std::span<const Echoes> echoes,
-                                               const Executor& executor) const;
-  [[nodiscard]] std::vector<Return> noisy_ranges(const ScanRequest& request,
-                                                 std::span<const Beam> beams,
-                                                 std::span<const Hit> hits,
-                                                 const Executor& executor) const;
-  [[nodiscard]] std::vector<Return> depths_of(const ScanRequest& request,
-                                              std::span<const Beam> beams,
-                                              std::span<const Hit> hits,
-                                              const Executor& executor) const;
-  [[nodiscard]] std::vector<std::uint8_t> infrared_of(std::span<const Beam> beams,
-                                                      std::span<const Hit> hits) const;
-  /// What comes of a scan's beams.
-  struct Measured {
-    std::vector<Return> returns;         ///< As many places for each as it may have returns.
+  struct Aimed;
+  class OneScan;
+  void aim_beams(const PoseTrack& T_world_sensor, Aimed& aimed, const Executor& executor) const;
+  void add_direction_noise(Aimed& aimed, const Executor& executor) const;
+  [[nodiscard]] RayBatch batch_of(const Aimed& aimed) const;
+
+  /// What came back of a scan's beams.
+  struct Received {
+    std::vector<Return> returns;         ///< `most` for each beam, in its order.
+    std::size_t most = 1;                ///< Returns that a beam may have.
     std::vector<std::uint8_t> infrared;  ///< `Scan::infrared`
   };
-  [[nodiscard]] Measured measured(const ScanRequest& request,
-                                  std::span<const Beam> beams,
-                                  const WorldBeams& world,
-                                  const RayBatch& batch,
-                                  const Renderer& renderer,
+  [[nodiscard]] Received received(const Aimed& aimed,
+                                  std::span<const Hit> hits,
                                   const Executor& executor) const;
+  [[nodiscard]] Received received(const Aimed& aimed,
+                                  std::span<const Echoes> echoes,
+                                  const Executor& executor) const;
+  [[nodiscard]] Received received_as_ideal(const Aimed& aimed,
+                                           std::span<const Hit> hits,
+                                           const Executor& executor) const;
+  [[nodiscard]] Received received_as_stereo(const Aimed& aimed,
+                                            std::span<const Hit> hits,
+                                            const Executor& executor) const;
+  [[nodiscard]] std::vector<std::uint8_t> infrared_of(std::span<const Beam> beams,
+                                                      std::span<const Hit> hits) const;
+  [[nodiscard]] Scan written(const Aimed& aimed,
+                             const PoseTrack& T_world_sensor,
+                             Received received,
+                             const Executor& executor) const;
   [[nodiscard]] float depth_share(const Beam& beam) const;
   [[nodiscard]] double range_limit() const;
 

@@ -24,50 +24,35 @@ const SurfelMap& map_of(const Scene& scene) {
 BeamRenderer::BeamRenderer(const Scene& scene, BeamGrouping grouping)
     : map_(scene.map), kernel_map_(kernel_map_of(map_of(scene))), grouping_(grouping) {}
 
-/// Traces the rays of `order` in chunks with `trace`.
-template <class Trace>
-void BeamRenderer::render_with(const RayBatch& batch,
-                               std::span<const std::uint32_t> order,
-                               std::span<Hit> hits,
-                               const Executor& executor,
-                               const Trace& trace) const {
-  std::vector<KernelHit> found(batch.rays.size());
-  executor.parallel_for(order.size(), kChunk, [&](std::size_t begin, std::size_t end) {
-    const std::span part(order.data() + begin, end - begin);
-    const std::uint64_t overflows = trace(part, std::span(found));
-    if (overflows > 0) overflows_ += overflows;
-    for (const std::uint32_t i : part) hits[i] = hit_of(found[i]);
-  });
-  render_bodies(batch, hits, executor);
+/// Traces the rays of `part`; how many lists of hits overflowed.
+std::uint64_t BeamRenderer::trace_part(const RenderJob& job,
+                                       std::span<const std::uint32_t> part,
+                                       std::span<KernelHit> found) const {
+  const std::span<const Ray> rays = job.batch.rays;
+  return job.nearest.empty() ? trace_beams(kernel_map_, rays, part, found, grouping_)
+                             : trace_footprints(kernel_map_, rays, part, found, job.nearest);
 }
 
-void BeamRenderer::render(const RayBatch& batch,
-                          std::span<Hit> hits,
-                          const Executor& executor) const {
-  check(batch, hits);
+void BeamRenderer::render_one(const RenderJob& job, const Executor& executor) const {
+  const RayBatch& batch = job.batch;
   std::vector<std::uint32_t> own_order;
   std::span<const std::uint32_t> order = batch.order;
-  if (order.size() != batch.rays.size()) {
+  if (!job.nearest.empty()) {  // a beam's sub-rays follow each other
+    own_order.resize(batch.rays.size());
+    std::iota(own_order.begin(), own_order.end(), 0u);
+    order = own_order;
+  } else if (order.size() != batch.rays.size()) {
     own_order = direction_order(batch.rays, executor);
     order = own_order;
   }
-  render_with(batch, order, hits, executor, [&](std::span<const std::uint32_t> part, auto found) {
-    return trace_beams(kernel_map_, batch.rays, part, found, grouping_);
+  std::vector<KernelHit> found(batch.rays.size());
+  executor.parallel_for(order.size(), kChunk, [&](std::size_t begin, std::size_t end) {
+    const std::span part(order.data() + begin, end - begin);
+    const std::uint64_t overflows = trace_part(job, part, found);
+    if (overflows > 0) overflows_ += overflows;
+    for (const std::uint32_t i : part) job.hits[i] = hit_of(found[i]);
   });
-}
-
-void BeamRenderer::render_footprints(const RayBatch& batch,
-                                     std::span<Hit> hits,
-                                     std::span<float> nearest,
-                                     const Executor& executor) const {
-  check(batch, hits);
-  require_argument(batch.rays.size() == kSubRays * nearest.size(),
-                   "render_footprints: eight rays per beam are wanted");
-  std::vector<std::uint32_t> order(batch.rays.size());
-  std::iota(order.begin(), order.end(), 0u);
-  render_with(batch, order, hits, executor, [&](std::span<const std::uint32_t> part, auto found) {
-    return trace_footprints(kernel_map_, batch.rays, part, found, nearest);
-  });
+  render_bodies(batch, job.hits, executor);
 }
 
 Hit BeamRenderer::trace(const Ray& ray) const {

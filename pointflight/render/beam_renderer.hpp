@@ -17,13 +17,6 @@ class BeamRenderer : public Renderer {
  public:
   explicit BeamRenderer(const Scene& scene, BeamGrouping grouping = BeamGrouping::kAsSuits);
 
-  void render(const RayBatch& batch, std::span<Hit> hits, const Executor& executor) const override;
-
-  void render_footprints(const RayBatch& batch,
-                         std::span<Hit> hits,
-                         std::span<float> nearest,
-                         const Executor& executor) const override;
-
   [[nodiscard]] Hit trace(const Ray& ray) const override;
 
   /// Beams whose list of surfels overflowed and lost its farthest entry: there the result may
@@ -32,13 +25,13 @@ class BeamRenderer : public Renderer {
 
   [[nodiscard]] Scene scene() const { return {map_}; }
 
+ protected:
+  void render_one(const RenderJob& job, const Executor& executor) const override;
+
  private:
-  template <class Trace>
-  void render_with(const RayBatch& batch,
-                   std::span<const std::uint32_t> order,
-                   std::span<Hit> hits,
-                   const Executor& executor,
-                   const Trace& trace) const;
+  [[nodiscard]] std::uint64_t trace_part(const RenderJob& job,
+                                         std::span<const std::uint32_t> part,
+                                         std::span<KernelHit> found) const;
   [[nodiscard]] Hit hit_of(const KernelHit& found) const;
 
   std::shared_ptr<const SurfelMap> map_;

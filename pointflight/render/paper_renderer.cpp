@@ -308,10 +308,9 @@ void PaperRenderer::draw_bodies(const RayBatch& batch,
   }
 }
 
-void PaperRenderer::render(const RayBatch& batch,
-                           std::span<Hit> hits,
-                           const Executor& executor) const {
-  check(batch, hits);
+void PaperRenderer::render_one(const RenderJob& job, const Executor& executor) const {
+  const RayBatch& batch = job.batch;
+  const std::span<Hit> hits = job.hits;
   if (batch.rays.empty()) return;
   const Pose T_sensor_world = batch.T_world_sensor.inverse();
   const Matrix3f turn = T_sensor_world.rotation.toRotationMatrix().cast<float>();

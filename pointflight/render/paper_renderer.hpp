@@ -27,9 +27,10 @@ class PaperRenderer : public Renderer {
  public:
   PaperRenderer(const Scene& scene, const PaperOptions& options);
 
-  void render(const RayBatch& batch, std::span<Hit> hits, const Executor& executor) const override;
-
   [[nodiscard]] bool is_snapshot() const override { return true; }
+
+ protected:
+  void render_one(const RenderJob& job, const Executor& executor) const override;
 
  private:
   struct Voxel {

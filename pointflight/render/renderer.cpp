@@ -11,33 +11,21 @@
 #include "pointflight/render/paper_renderer.hpp"
 
 namespace pointflight {
+namespace {
 
-Registry<RendererKind>& RendererKind::table() {
-  static Registry<RendererKind> table = {
-      {.name = "beam",
-       .help = "each ray by itself, through surfels",
-       .make = [](const Scene& scene) { return std::make_unique<BeamRenderer>(scene); },
-       .one_pose = false},
-      {.name = "paper",
-       .help = "the MARSIM paper's image of points",
-       .make =
-           [](const Scene& scene) {
-             return std::make_unique<PaperRenderer>(scene, PaperOptions{});
-           },
-       .one_pose = true}};
-  return table;
-}
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
-void Renderer::render_footprints(const RayBatch& batch,
-                                 std::span<Hit> hits,
-                                 std::span<float> nearest,
-                                 const Executor& executor) const {
-  std::fill(nearest.begin(), nearest.end(), std::numeric_limits<float>::infinity());
-  render(batch, hits, executor);
-}
+/// All is there already.
+class Rendered : public Rendering {
+ public:
+  void collect() override {}
+};
 
-void Renderer::check(const RayBatch& batch, std::span<const Hit> hits) {
-  require_argument(hits.size() == batch.rays.size(), "render: as many hits as rays are wanted");
+void check(const RenderJob& job) {
+  const RayBatch& batch = job.batch;
+  require_argument(job.hits.size() == batch.rays.size(), "render: as many hits as rays are wanted");
+  require_argument(job.nearest.empty() || batch.rays.size() == kSubRays * job.nearest.size(),
+                   "render: eight rays for each beam are wanted");
   require_argument(batch.order.empty() || batch.order.size() == batch.rays.size(),
                    "render: an order of all rays is wanted, or none");
   require_argument(batch.time_offsets.empty() || batch.time_offsets.size() == batch.rays.size(),
@@ -55,6 +43,43 @@ void Renderer::check(const RayBatch& batch, std::span<const Hit> hits) {
     return ray.origin_world.allFinite() && ray.direction_world.allFinite() &&
            !std::isnan(ray.range_max);
   }));
+}
+
+}  // namespace
+
+Registry<RendererKind>& RendererKind::table() {
+  static Registry<RendererKind> table = {
+      {.name = "beam",
+       .help = "each ray by itself, through surfels",
+       .make = [](const Scene& scene) { return std::make_unique<BeamRenderer>(scene); },
+       .one_pose = false},
+      {.name = "paper",
+       .help = "the MARSIM paper's image of points",
+       .make =
+           [](const Scene& scene) {
+             return std::make_unique<PaperRenderer>(scene, PaperOptions{});
+           },
+       .one_pose = true}};
+  return table;
+}
+
+void Renderer::render(std::span<const RenderJob> jobs, const Executor& executor) const {
+  submit(jobs, executor)->collect();
+}
+
+void Renderer::render(const RayBatch& batch, std::span<Hit> hits, const Executor& executor) const {
+  const RenderJob job{batch, hits, {}};
+  render({&job, 1}, executor);
+}
+
+std::unique_ptr<Rendering> Renderer::submit(std::span<const RenderJob> jobs,
+                                            const Executor& executor) const {
+  for (const RenderJob& job : jobs) check(job);
+  executor.parallel_for(jobs.size(), 1, [&](std::size_t k, std::size_t) {
+    std::fill(jobs[k].nearest.begin(), jobs[k].nearest.end(), kInfinity);
+    render_one(jobs[k], executor);
+  });
+  return std::make_unique<Rendered>();
 }
 
 Hit Renderer::trace(const Ray& ray) const {

@@ -44,7 +44,7 @@ struct RayBatch {
   }
 };
 
-/// Rays that stand for one beam in `Renderer::render_footprints`.
+/// Rays that stand for one beam where `RenderJob::nearest` is asked for.
 inline constexpr std::size_t kSubRays = 8;
 
 /// No surfel of the map.
@@ -63,31 +63,45 @@ struct Hit {
   [[nodiscard]] bool is_return() const { return range >= 0.0f; }
 };
 
+/// What a renderer is asked for. What it refers to must stay as it is until the hits are there.
+struct RenderJob {
+  RayBatch batch;       ///< Of one scan.
+  std::span<Hit> hits;  ///< Of `batch.rays[i]`, written.
+  /// For beams of eight sub-rays each: rays 8 k to 8 k + 7 are beam k's and leave from one
+  /// position; beams that follow each other should point the same way, `batch.order` is not used.
+  /// Written: how far the nearest surface of the map is that reaches between beam k's sub-rays, m;
+  /// infinity if the renderer does not look. A beam with something there that none of its sub-rays
+  /// hit needs more of them. Empty: each ray is a beam.
+  std::span<float> nearest;
+};
+
+/// Jobs that a renderer has been given (`Renderer::submit`).
+class Rendering {
+ public:
+  virtual ~Rendering() = default;
+  /// Waits until all hits are written. Once. Throws what went wrong.
+  virtual void collect() = 0;
+};
+
 /// Turns rays into hits. Results do not depend on the executor's threads.
 ///
 /// To add one: derive, write its file in render/, add one row to the table in renderer.cpp and a
 /// test that compares it with `beam` on the scenes of tests/render. Programs add rows of their own:
-/// `RendererKind::table().add(...)`.
+/// `RendererKind::table().add(...)`. One that runs on another device overrides `submit`.
 class Renderer {
  public:
   virtual ~Renderer() = default;
 
-  /// Writes `hits[i]` for `batch.rays[i]`; both have the same length. Rays are finite, which debug
-  /// builds assert; throws std::invalid_argument where sizes do not fit, the pose is not finite or
-  /// a body lacks its shape.
-  virtual void render(const RayBatch& batch,
-                      std::span<Hit> hits,
-                      const Executor& executor) const = 0;
+  /// Writes the hits of all jobs. Rays are finite, which debug builds assert; throws
+  /// std::invalid_argument if sizes do not fit, a pose is not finite or a body lacks its shape.
+  void render(std::span<const RenderJob> jobs, const Executor& executor) const;
+  /// The same of one scan's rays, each a beam; `hits` has their length.
+  void render(const RayBatch& batch, std::span<Hit> hits, const Executor& executor) const;
 
-  /// The same for beams of eight sub-rays each: rays 8 k to 8 k + 7 are beam k's and leave from one
-  /// place. Beams that follow each other should point the same way; `batch.order` is not used.
-  /// `nearest[k]`: how far the nearest surface of the map is that reaches between beam k's
-  /// sub-rays, m; infinity, as here, where the renderer does not look. A beam with something there
-  /// that none of its sub-rays met needs more of them.
-  virtual void render_footprints(const RayBatch& batch,
-                                 std::span<Hit> hits,
-                                 std::span<float> nearest,
-                                 const Executor& executor) const;
+  /// The same for callers that have other things to do meanwhile. All that the jobs refer to must
+  /// outlive the rendering. Here: everything is rendered at once.
+  [[nodiscard]] virtual std::unique_ptr<Rendering> submit(std::span<const RenderJob> jobs,
+                                                          const Executor& executor) const;
 
   /// One ray against the map by itself.
   [[nodiscard]] virtual Hit trace(const Ray& ray) const;
@@ -96,8 +110,8 @@ class Renderer {
   [[nodiscard]] virtual bool is_snapshot() const { return false; }
 
  protected:
-  /// What `render` states above; every renderer calls it first.
-  static void check(const RayBatch& batch, std::span<const Hit> hits);
+  /// One job, which is valid; `nearest` is infinity everywhere.
+  virtual void render_one(const RenderJob& job, const Executor& executor) const = 0;
 };
 
 /// A row of the table of renderers.

@@ -40,10 +40,18 @@ class Link : public SampleSink {
   /// The run stands still at a time.
   virtual void on_wait(SimTime /*now*/, Waiting /*why*/) {}
 
+  /// In lockstep: true if the run is to wait, after the step in which it came, until this link has
+  /// answered the sample by an order that is an answer: a planner's command for a scan, a flight
+  /// controller's for an IMU sample.
+  [[nodiscard]] virtual bool wants_answer(const Sample& /*sample*/) const { return false; }
   /// What this link asks for since it was last asked, in order; obeyed between steps.
   virtual std::vector<Order> take_orders() { return {}; }
   /// One of its commands was not taken, and why.
   virtual void on_rejected(const VehicleOrder& /*order*/, const std::string& /*why*/) {}
+
+  /// Why an order cannot be obeyed as long as this link takes part, whoever gave it: a line for
+  /// users; empty if it can.
+  [[nodiscard]] virtual std::string objection(const Order& /*order*/) const { return {}; }
 
   /// The run is about to start again at time zero; it has come to `reached`.
   virtual void on_reset(SimTime /*reached*/) {}
@@ -57,6 +65,9 @@ class Link : public SampleSink {
   /// False once nothing of the run reaches anybody through it: a recording that failed. A run ends
   /// where no link is in use any more.
   [[nodiscard]] virtual bool is_in_use() const { return true; }
+  /// What users can do, besides making it cheaper, about a run that falls behind the wall clock;
+  /// empty: go at a lower rate.
+  [[nodiscard]] virtual std::string remedy_when_behind() const { return {}; }
   /// Samples, or messages made of them, that somebody was too slow for.
   [[nodiscard]] virtual std::uint64_t dropped() const { return 0; }
 };

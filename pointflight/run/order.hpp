@@ -12,8 +12,9 @@ namespace pointflight {
 struct VehicleOrder {
   std::size_t vehicle = 0;  ///< Number in the fleet.
   Command command;          ///< In the program's units and frames.
-  bool is_answer = false;   ///< A planner's: what lockstep waits for.
+  bool is_answer = false;   ///< What lockstep waits for (`Link::wants_answer`).
 };
+struct AnswerOrder {};  ///< The answer of one who has nothing to command.
 /// Stop the run, or go on.
 struct PauseOrder {
   bool pause = true;  ///< False: go on.
@@ -40,6 +41,7 @@ struct HurryOrder {
 
 /// What may be told to a run from outside; those without a vehicle are about the run.
 using Order = std::variant<VehicleOrder,
+                           AnswerOrder,
                            PauseOrder,
                            StepOrder,
                            ResetOrder,

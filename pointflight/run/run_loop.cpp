@@ -68,7 +68,10 @@ class RunLoop::Splitter : public SampleSink {
   explicit Splitter(RunLoop& loop) : loop_(loop) {}
 
   void on_sample(const Sample& sample) override {
-    for (Link* link : loop_.links_) link->on_sample(sample);
+    for (Link* link : loop_.links_) {
+      link->on_sample(sample);
+      if (loop_.options_.lockstep > 0.0 && link->wants_answer(sample)) loop_.ask(*link);
+    }
     if (const auto* status = std::get_if<StatusSample>(&sample)) {
       if (status->rejected > 0) loop_.say_rejected(status->vehicle, status->last_rejection);
     }
@@ -179,27 +182,31 @@ bool RunLoop::is_over() const {
 void RunLoop::after_step(double took) {
   const std::uint64_t scans = std::exchange(scans_, 0);
   for (Link* link : links_) link->on_step({simulation_.time(), took, scans});
-  if (options_.lockstep > 0.0 && scans > 0) wait_for_answer();
+  if (!asked_.empty()) wait_for_answers();
   if (scans > 0) step_once_ = false;
   take_orders();
 }
 
-void RunLoop::wait_for_answer() {
-  const std::uint64_t before = answers_;
+void RunLoop::ask(const Link& link) {
+  if (std::find(asked_.begin(), asked_.end(), &link) == asked_.end()) asked_.push_back(&link);
+}
+
+void RunLoop::wait_for_answers() {
   const auto until = Clock::now() + std::chrono::duration<double>(options_.lockstep);
-  while (answers_ == before && !paused_ && !reset_ && !is_over()) {
+  while (!asked_.empty() && !paused_ && !reset_ && !is_over()) {
     if (Clock::now() > until) {
-      if (unanswered_++ > 0) return;
-      say(fmt::format(
-          "warning: no command within {} s of the scan at {:.1f} s; flying on (said once)",
-          options_.lockstep,
-          to_seconds(simulation_.time())));
-      return;
+      if (unanswered_++ == 0) {
+        say(fmt::format("warning: no command within {} s at {:.1f} s; flying on (said once)",
+                        options_.lockstep,
+                        to_seconds(simulation_.time())));
+      }
+      break;
     }
     std::this_thread::sleep_for(kAnswerLook);
     for (Link* link : links_) link->on_wait(simulation_.time(), Waiting::kForAnswer);
     take_orders();
   }
+  asked_.clear();
 }
 
 void RunLoop::take_orders() {
@@ -210,14 +217,15 @@ void RunLoop::take_orders() {
 
 void RunLoop::obey(Link& link, const Order& order) {
   if (const auto* vehicle = std::get_if<VehicleOrder>(&order)) {
-    answers_ += vehicle->is_answer ? 1 : 0;
+    if (vehicle->is_answer) std::erase(asked_, &link);
     const auto why = simulation_.command(vehicle->vehicle, vehicle->command);
     if (!why) return;
     link.on_rejected(*vehicle, *why);
     say_rejected(vehicle->vehicle, *why);
-  } else if (is_kept_by_clocks() && (std::holds_alternative<PauseOrder>(order) ||
-                                     std::holds_alternative<RateOrder>(order))) {
-    say("a run that other processes share by their clocks cannot be paused or go at another rate");
+  } else if (std::holds_alternative<AnswerOrder>(order)) {
+    std::erase(asked_, &link);
+  } else if (const std::string why_not = objection(order); !why_not.empty()) {
+    say(why_not);
   } else if (const auto* pause = std::get_if<PauseOrder>(&order)) {
     if (paused_ != pause->pause) say(pause->pause ? "paused" : "going on");
     paused_ = pause->pause;
@@ -225,8 +233,7 @@ void RunLoop::obey(Link& link, const Order& order) {
   } else if (std::holds_alternative<StepOrder>(order)) {
     step_once_ = paused_;
   } else if (std::holds_alternative<ResetOrder>(order)) {
-    reset_ = simulation_.others() == nullptr;
-    if (!reset_) say("a run that other processes share cannot begin again");
+    reset_ = true;
   } else if (const auto* rate = std::get_if<RateOrder>(&order)) {
     pace_ = Pace(rate->rate);
     pace_.restart_at(simulation_.time());
@@ -240,9 +247,13 @@ void RunLoop::obey(Link& link, const Order& order) {
   }
 }
 
-/// Other processes take part, each by its own clock.
-bool RunLoop::is_kept_by_clocks() const {
-  return simulation_.others() != nullptr && !simulation_.others()->decides_together();
+/// The first that a link has.
+std::string RunLoop::objection(const Order& order) const {
+  std::string why_not;
+  for (const Link* link : links_) {
+    if (why_not.empty()) why_not = link->objection(order);
+  }
+  return why_not;
 }
 
 void RunLoop::say_rejected(std::size_t vehicle, const std::string& why) {
@@ -271,12 +282,14 @@ void RunLoop::reset() {
 void RunLoop::say_behind() {
   const auto behind = pace_.fallen_behind(simulation_.time());
   if (!behind) return;
-  // others' rates are the same, and would have to be changed with this one's
-  const std::string instead =
-      simulation_.others() != nullptr
-          ? std::string("share: {time: lockstep}")
-          : fmt::format("--rate {:.1f}, or --lockstep",
-                        std::max(0.1, std::floor(9.0 * behind->rate) / 10.0));
+  std::string instead;
+  for (const Link* link : links_) {
+    if (instead.empty()) instead = link->remedy_when_behind();
+  }
+  if (instead.empty()) {
+    instead = fmt::format("--rate {:.1f}, or --lockstep",
+                          std::max(0.1, std::floor(9.0 * behind->rate) / 10.0));
+  }
   say(
       fmt::format("warning: {:.1f} s behind: this machine manages a rate of {:.2f}, not {}; "
                   "use fewer LiDARs, a coarser map or {}",

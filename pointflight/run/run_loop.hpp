@@ -69,8 +69,10 @@ class ScanDelays {
 
 /// How a simulation is run.
 struct RunOptions {
-  double rate = 0.0;      ///< Simulated seconds per second; 0: as fast as it goes.
-  double lockstep = 0.0;  ///< After each scan wait so long for a planner's command, s; 0: do not.
+  double rate = 0.0;  ///< Simulated seconds per second; 0: as fast as it goes.
+  /// Links are waited for so long until they have answered what they want to
+  /// (`Link::wants_answer`), s; 0: they are not.
+  double lockstep = 0.0;
   /// Lines for users: what the run fell behind, that it was paused.
   std::function<void(const std::string& line)> log;
   Progress progress;                  ///< Of the run's length.
@@ -102,8 +104,8 @@ class RunLoop {
   [[nodiscard]] std::optional<SimTime> due_at(std::chrono::steady_clock::time_point wall) const;
   /// From a scan's end until it was handed over, where the run is held to the wall clock.
   [[nodiscard]] const ScanDelays& scan_delays() const { return delays_; }
-  /// Scans that lockstep waited for in vain.
-  [[nodiscard]] std::uint64_t unanswered_scans() const { return unanswered_; }
+  /// How often lockstep waited in vain for an answer.
+  [[nodiscard]] std::uint64_t unanswered() const { return unanswered_; }
   /// Of all links: the one place that counts.
   [[nodiscard]] std::uint64_t dropped() const;
 
@@ -113,10 +115,11 @@ class RunLoop {
 
   [[nodiscard]] bool is_over() const;
   void after_step(double took);
-  void wait_for_answer();
+  void ask(const Link& link);
+  void wait_for_answers();
   void take_orders();
   void obey(Link& link, const Order& order);
-  [[nodiscard]] bool is_kept_by_clocks() const;
+  [[nodiscard]] std::string objection(const Order& order) const;
   void say_rejected(std::size_t vehicle, const std::string& why);
   void wait_while_paused();
   void reset();
@@ -136,9 +139,9 @@ class RunLoop {
   bool paused_ = false;
   bool step_once_ = false;  ///< While paused: until a scan has come.
   bool reset_ = false;
-  bool ended_ = false;       ///< By an order.
-  std::uint64_t scans_ = 0;  ///< In the step under way.
-  std::uint64_t answers_ = 0;
+  bool ended_ = false;              ///< By an order.
+  std::uint64_t scans_ = 0;         ///< In the step under way.
+  std::vector<const Link*> asked_;  ///< In lockstep: those that have not answered yet.
   std::uint64_t unanswered_ = 0;
   bool said_rejected_ = false;
 };

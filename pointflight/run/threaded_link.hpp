@@ -24,8 +24,8 @@ class ThreadedLink : public Link {
   };
 
   /// `link` must outlive it; `capacity` in samples, at least 1. Between the first step and `close`
-  /// all calls of `link` but `is_over`, `is_in_use` and `dropped`, which must be callable from any
-  /// thread, come from its own thread.
+  /// all calls of `link` come from its own thread but `is_over`, `is_in_use`, `dropped`,
+  /// `wants_answer`, `objection` and `remedy_when_behind`, which must be callable from any thread.
   ThreadedLink(Link& link, std::size_t capacity, WhenFull when_full);
   ~ThreadedLink() override;
 
@@ -34,14 +34,24 @@ class ThreadedLink : public Link {
   void on_sample(const Sample& sample) override;
   void on_step(const StepDone& step) override;
   void on_wait(SimTime now, Waiting why) override;
+  [[nodiscard]] bool wants_answer(const Sample& sample) const override {
+    return link_.wants_answer(sample);
+  }
   std::vector<Order> take_orders() override;
   void on_rejected(const VehicleOrder& order, const std::string& why) override;
+  [[nodiscard]] std::string objection(const Order& order) const override {
+    return link_.objection(order);
+  }
+  /// Waits until the link has taken all that is queued: the run begins again then.
   void on_reset(SimTime reached) override;
   void on_seek(SimTime to) override;
   /// Waits until the link has taken all that is queued. Throws what it threw.
   void close() override;
   [[nodiscard]] bool is_over() const override { return link_.is_over(); }
   [[nodiscard]] bool is_in_use() const override { return link_.is_in_use(); }
+  [[nodiscard]] std::string remedy_when_behind() const override {
+    return link_.remedy_when_behind();
+  }
   [[nodiscard]] std::uint64_t dropped() const override;
 
  private:

@@ -103,7 +103,7 @@ nlohmann::ordered_json json_of(const Simulation& simulation, std::size_t number)
 }
 
 /// A vehicle that another process flew.
-nlohmann::ordered_json json_of(const Simulation& simulation, const ApartSummary& other) {
+nlohmann::ordered_json json_of(const Simulation& simulation, const SourceReport& other) {
   nlohmann::ordered_json json;
   json["name"] = simulation.vehicle(other.vehicle).setup().name;
   json["flown_by"] = other.flown_by;
@@ -183,7 +183,7 @@ FlightRecorder::FlightRecorder(const std::string& folder,
                                Existing existing)
     : folder_(folder, existing),
       write_scans_(simulation.scenario().output.scans),
-      shared_(simulation.others() != nullptr ? &simulation : nullptr),
+      shared_(simulation.ends_by_agreement() ? &simulation : nullptr),
       events_(path_for("events.csv")) {
   if (shared_ == nullptr) folder_.forget_killed();  // nobody goes on from it
   write_scenario_copy(simulation.scenario(), simulation.map(), folder_, folder_.path());
@@ -197,7 +197,7 @@ FlightRecorder::FlightRecorder(const std::string& folder,
   }
   for (std::size_t v = 0; v < simulation.vehicle_count(); ++v) {
     names_.push_back(simulation.vehicle(v).setup().name);
-    if (!simulation.is_own(v)) {
+    if (!simulation.flies_here(v)) {
       vehicles_.push_back(nullptr);  // another process writes it
       continue;
     }
@@ -395,13 +395,13 @@ std::string summary_json(const Simulation& simulation) {
   json["simulated_time"] = static_cast<double>(simulation.time().time_since_epoch().count()) / 1e9;
   json["obstacles"] = simulation.obstacle_count();
   json["vehicles"] = nlohmann::ordered_json::array();
-  for (const std::size_t v : simulation.own_vehicles()) {
+  for (const std::size_t v : simulation.flying_here()) {
     json["vehicles"].push_back(json_of(simulation, v));
   }
-  if (simulation.others() != nullptr) {
+  if (simulation.ends_by_agreement()) {
     json["skipped_time"] = to_seconds(simulation.state().skipped);
     json["others"] = nlohmann::ordered_json::array();
-    for (const ApartSummary& other : simulation.others()->apart()) {
+    for (const SourceReport& other : simulation.source_reports()) {
       json["others"].push_back(json_of(simulation, other));
     }
   }

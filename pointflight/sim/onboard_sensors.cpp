@@ -46,6 +46,33 @@ Sample OnboardImu::measure(const InstantInput& input, std::any& memory) const {
   return sample;
 }
 
+namespace {
+
+/// A scan of a LiDAR on a vehicle.
+class ScanUnderWay : public IntervalMeasurement {
+ public:
+  ScanUnderWay(std::unique_ptr<Exposure> exposure, PoseTrack track, const SensorSite& site)
+      : exposure_(std::move(exposure)), T_world_sensor_(std::move(track)), site_(site) {}
+
+  std::optional<RenderJob> next(const Executor& executor) override {
+    return exposure_->next(executor);
+  }
+  void receive(const Executor& executor) override { exposure_->receive(executor); }
+  Sample finish(const Executor& executor) override {
+    auto scan = std::make_shared<Scan>(exposure_->finish(executor));
+    scan->vehicle = site_.vehicle;
+    scan->sensor = site_.sensor;
+    return ScanSample{std::move(scan), T_world_sensor_};
+  }
+
+ private:
+  std::unique_ptr<Exposure> exposure_;
+  PoseTrack T_world_sensor_;
+  SensorSite site_;
+};
+
+}  // namespace
+
 MountedLidar::MountedLidar(const LidarMount& mount,
                            Lidar lidar,
                            const SensorSite& site,
@@ -78,7 +105,7 @@ bool MountedLidar::loses(std::int64_t index) const {
   return lost > 0.0 && chance.uniform(static_cast<std::uint64_t>(index)) < lost;
 }
 
-Sample MountedLidar::measure(const IntervalInput& input) const {
+std::unique_ptr<IntervalMeasurement> MountedLidar::begin(const IntervalInput& input) const {
   ScanRequest request;
   request.index = static_cast<std::uint64_t>(input.index);
   request.start = input.start;
@@ -89,10 +116,8 @@ Sample MountedLidar::measure(const IntervalInput& input) const {
   request.seed = site_.seed;
   request.bodies = input.bodies;
   const PoseTrack track = input.T_world_body.with_mount(T_body_sensor_);
-  auto scan = std::make_shared<Scan>(lidar_.take(request, track, *renderer_, input.executor));
-  scan->vehicle = site_.vehicle;
-  scan->sensor = site_.sensor;
-  return ScanSample{std::move(scan), track};
+  return std::make_unique<ScanUnderWay>(
+      lidar_.aim(request, track, *renderer_, input.executor), track, site_);
 }
 
 }  // namespace pointflight

@@ -85,7 +85,9 @@ class MountedLidar : public IntervalSensor {
   [[nodiscard]] double reach() const override;
   [[nodiscard]] bool sees_own_vehicle() const override { return own_airframe_; }
   [[nodiscard]] bool loses(std::int64_t index) const override;
-  [[nodiscard]] Sample measure(const IntervalInput& input) const override;
+  [[nodiscard]] const Renderer* renderer() const override { return renderer_.get(); }
+  [[nodiscard]] std::unique_ptr<IntervalMeasurement> begin(
+      const IntervalInput& input) const override;
 
  private:
   SensorSite site_;

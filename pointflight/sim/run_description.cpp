@@ -22,7 +22,7 @@ RunDescription describe_run(const Simulation& simulation) {
       vehicle.sensors.push_back(sensor.kind != nullptr ? sensor.kind->name : "");
     }
     vehicle.at_start = simulation.status_sample(v);
-    vehicle.own = simulation.is_own(v);
+    vehicle.own = simulation.flies_here(v);
   }
   return run;
 }

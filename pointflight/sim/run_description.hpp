@@ -28,7 +28,7 @@ struct VehicleDescription {
   /// Kinds by `Measurement::sensor`; empty for odometry, IMU and LiDARs.
   std::vector<std::string> sensors;
   StatusSample at_start;  ///< Before the first step.
-  bool own = true;        ///< False: another process simulates it; there are no samples of it.
+  bool own = true;        ///< False: it is flown elsewhere; there are no samples of it.
 };
 
 /// A run. Topics and frames follow from names, models and the profile.

@@ -77,7 +77,24 @@ struct IntervalInput {
   const Executor& executor;       ///< The result must not depend on its threads.
 };
 
-/// Measures from one instant of its schedule to the next: LiDARs, cameras.
+/// A measurement that takes time, under way: `next` and `receive` in turn until nothing is to be
+/// rendered any more, then `finish`, once. Called from any thread, one at a time.
+class IntervalMeasurement {
+ public:
+  virtual ~IntervalMeasurement() = default;
+  /// The rays to be rendered next by the sensor's renderer; what the job refers to is valid until
+  /// `receive` has returned.
+  [[nodiscard]] virtual std::optional<RenderJob> next(const Executor& /*executor*/) {
+    return std::nullopt;
+  }
+  /// The hits of the last job are there.
+  virtual void receive(const Executor& /*executor*/) {}
+  /// What was measured.
+  [[nodiscard]] virtual Sample finish(const Executor& executor) = 0;
+};
+
+/// Measures from one instant of its schedule to the next: LiDARs, cameras. All that is due at an
+/// instant is rendered together.
 class IntervalSensor : public Sensor {
  public:
   using Sensor::Sensor;
@@ -87,8 +104,11 @@ class IntervalSensor : public Sensor {
   [[nodiscard]] virtual bool sees_own_vehicle() const { return false; }
   /// True where a measurement comes to nothing: it is not made.
   [[nodiscard]] virtual bool loses(std::int64_t /*index*/) const { return false; }
-  /// One measurement. Called from any thread.
-  [[nodiscard]] virtual Sample measure(const IntervalInput& input) const = 0;
+  /// What renders its rays; null: it has none.
+  [[nodiscard]] virtual const Renderer* renderer() const { return nullptr; }
+  /// Begins a measurement; what the input refers to outlives it. Called from any thread.
+  [[nodiscard]] virtual std::unique_ptr<IntervalMeasurement> begin(
+      const IntervalInput& input) const = 0;
 };
 
 /// When a sample reaches the sinks.

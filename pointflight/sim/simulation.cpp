@@ -9,45 +9,27 @@
 
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/input_error.hpp"
-#include "pointflight/sim/simulation_setup.hpp"
+#include "pointflight/sim/neighbourhood.hpp"
+#include "pointflight/sim/sensing.hpp"
 #include "pointflight/sim/start_check.hpp"
 
 namespace pointflight {
 namespace {
 
-constexpr double kGoalTolerance = 0.5;        // m
-constexpr double kStartRoom = 1.0;            // m that random obstacles keep from starts
-constexpr std::size_t kVehiclesPerChunk = 4;  // that one thread steps
+constexpr double kGoalTolerance = 0.5;  // m
+constexpr double kStartRoom = 1.0;      // m that random obstacles keep from starts
 
 }  // namespace
 
-const char* to_string(RunEnd end) {
-  switch (end) {
-    case RunEnd::kRunning:
-      return "running";
-    case RunEnd::kCompleted:
-      return "completed";
-    case RunEnd::kMissionUnfinished:
-      return "mission unfinished";
-    case RunEnd::kCollision:
-      return "collision";
-    case RunEnd::kLeftMap:
-      return "left the map";
-    case RunEnd::kInterrupted:
-      return "interrupted";
-    case RunEnd::kIdle:
-      return "idle";
-  }
-  return "";
-}
-
-const char* reason_of(RunEnd end) {
-  if (end == RunEnd::kIdle) {
-    return "nothing left to do, no command for 10 s, and the scenario has no duration";
-  }
-  if (end == RunEnd::kLeftMap) return "over 50 m beside or below it, or 500 m above";
-  return "";
-}
+/// What does not change in a run; copies of a simulation share it.
+struct Simulation::Setup {
+  Scenario scenario;
+  std::shared_ptr<const SurfelMap> map;
+  Obstacles obstacles;
+  Duration step{0};
+  SimTime end_time;
+  Schedule obstacle_schedule{10.0};
+};
 
 Simulation::Simulation(const Scenario& scenario,
                        std::shared_ptr<const SurfelMap> map,
@@ -79,9 +61,10 @@ Simulation::Simulation(const Scenario& scenario,
     return scenario.place(scenario.lines.contains(name) ? name : item) + ": " + name;
   };
   double busy = 0.0;
+  std::vector<std::shared_ptr<const VehicleAgent>> agents;
   for (std::size_t i = 0; i < fleet.size(); ++i) {
-    setup->agents.push_back(std::make_unique<VehicleAgent>(scenario, i, fleet[i], shared));
-    const VehicleAgent& agent = *setup->agents.back();
+    agents.push_back(std::make_shared<const VehicleAgent>(scenario, i, fleet[i], shared));
+    const VehicleAgent& agent = *agents.back();
     state_.vehicles.push_back(agent.start());
     world.keep_free.push_back({fleet[i].start, bounding_radius(agent.hull()) + kStartRoom});
     busy = std::max(busy, agent.busy_time());
@@ -89,27 +72,9 @@ Simulation::Simulation(const Scenario& scenario,
   setup->obstacles = Obstacles(scenario.obstacles, world, executor);
   const double natural = busy > 0.0 ? busy : kIdleTime;
   setup->end_time = SimTime(from_seconds(scenario.duration > 0.0 ? scenario.duration : natural));
-  sources_.resize(fleet.size());
-  for (std::size_t i = 0; i < fleet.size(); ++i) own_.push_back(i);
   setup_ = std::move(setup);
+  fleet_ = Fleet(std::move(agents));
   for (std::size_t i = 0; i < vehicle_count(); ++i) check_start(i);
-}
-
-SimTime Simulation::end_time() const {
-  if (others_ != nullptr && others_->decides_together()) return met_.end_time;
-  return own_end_time();
-}
-
-/// As far as this process is concerned.
-SimTime Simulation::own_end_time() const {
-  if (setup_->scenario.duration > 0.0) return setup_->end_time;
-  return std::max(setup_->end_time + state_.skipped, state_.busy_until);
-}
-
-void Simulation::require_vehicle(std::size_t number) const {
-  if (number < vehicle_count()) return;
-  throw std::out_of_range(
-      fmt::format("vehicle {} of a run with {}; they count from 0", number, vehicle_count()));
 }
 
 const Scenario& Simulation::scenario() const {
@@ -121,8 +86,7 @@ const SurfelMap& Simulation::map() const {
 }
 
 const VehicleAgent& Simulation::vehicle(std::size_t number) const {
-  require_vehicle(number);
-  return *setup_->agents[number];
+  return fleet_.vehicle(number);
 }
 
 std::shared_ptr<const SurfelMap> Simulation::shared_map() const {
@@ -130,8 +94,7 @@ std::shared_ptr<const SurfelMap> Simulation::shared_map() const {
 }
 
 const VehicleStatus& Simulation::status(std::size_t number) const {
-  require_vehicle(number);
-  return state_.vehicles[number];
+  return state_.vehicles[fleet_.vehicle(number).number()];  // throws without such a vehicle
 }
 
 std::size_t Simulation::obstacle_count() const {
@@ -155,7 +118,7 @@ void Simulation::check_start(std::size_t number) const {
 
 std::optional<std::string> Simulation::command(std::size_t vehicle_number, const Command& command) {
   const VehicleAgent& agent = vehicle(vehicle_number);
-  if (!is_own(vehicle_number)) return "another process flies it";
+  if (!flies_here(vehicle_number)) return "another process flies it";
   VehicleStatus& status = state_.vehicles[vehicle_number];
   if (auto reason = agent.command(status, command, state_.time)) return reason;
   status.scripted = false;
@@ -168,9 +131,25 @@ std::optional<std::string> Simulation::command(std::size_t vehicle_number, const
   return std::nullopt;
 }
 
-void Simulation::follow(std::size_t vehicle, std::shared_ptr<StateSource> source) {
-  require_vehicle(vehicle);
-  sources_[vehicle] = std::move(source);
+void Simulation::follow(std::size_t vehicle, std::shared_ptr<VehicleSource> source) {
+  fleet_.follow(vehicle, std::move(source));
+  state_.vehicles[vehicle].present = flies_here(vehicle);
+}
+
+void Simulation::agree_by(EndingAgreement* agreement) {
+  agreement_ = agreement;
+  agreed_end_ = outlook().end_time;
+}
+
+std::vector<SourceReport> Simulation::source_reports() const {
+  std::vector<SourceReport> reports;
+  for (std::size_t i = 0; i < vehicle_count(); ++i) {
+    const VehicleSource* source = fleet_.source(i);
+    if (auto report = source != nullptr ? source->report() : std::nullopt) {
+      reports.push_back(*std::move(report));
+    }
+  }
+  return reports;
 }
 
 void Simulation::restore(const SimulationState& state) {
@@ -182,104 +161,54 @@ void Simulation::restore(const SimulationState& state) {
 }
 
 void Simulation::interrupt() {
-  state_.end = RunEnd::kInterrupted;
+  state_.ending = {RunEnd::kInterrupted, state_.time};
 }
 
 void Simulation::complete() {
-  state_.end = RunEnd::kCompleted;
+  state_.ending = {RunEnd::kCompleted, state_.time};
 }
 
 bool Simulation::advance_to(SimTime time, SampleSink& sink) {
   while (state_.time < time) {
     if (!step(sink)) return false;
   }
-  return state_.end == RunEnd::kRunning;
+  return !state_.ending.is_over();
 }
 
-/// What is near each hull, now that everybody is where they are.
-void Simulation::sense(std::vector<StepSamples>& samples) {
+bool Simulation::step(SampleSink& sink) {
+  if (state_.ending.is_over()) return false;
   const SimTime now = state_.time;
-  const SimTime before = state_.step_number > 0 ? now - setup_->step : now;
-  std::vector<PlacedBody> vehicles;
-  vehicles.reserve(vehicle_count());
-  std::vector<PlacedBody> own(vehicle_count());
-  for (std::size_t i = 0; i < vehicle_count(); ++i) {
-    if (!status(i).present) continue;
-    const VehicleAgent& agent = vehicle(i);
-    const Pose pose = status(i).state.body.T_world_body();
-    const ProximityState& known = status(i).proximity;
-    vehicles.push_back({agent.label(),
-                        &agent.shape(),
-                        bounding_radius(agent.hull()),
-                        known.started ? known.T_world_body : pose,
-                        pose});
-    own[i] = vehicles.back();
+  std::vector<VehicleStatus>& vehicles = state_.vehicles;
+  std::vector<StepSamples> samples(vehicle_count());
+  fleet_.place(vehicles, now);
+  sense_neighbourhood({fleet_, *setup_->map, setup_->obstacles, setup_->step, kClearanceReach},
+                      now,
+                      state_.step_number == 0,
+                      vehicles,
+                      samples,
+                      *executor_);
+  state_.ending = judge(react(samples));
+  // the last step is an instant
+  const SimTime until = state_.ending.is_over() ? now + Duration{1} : now + setup_->step;
+  act(until, samples);
+  for (VehicleEvent& event : fleet_.take_events()) {
+    samples[event.vehicle].items.push_back({event.time, kEventRank, event});
   }
-  executor_->parallel_for(own_.size(), kVehiclesPerChunk, [&](std::size_t begin, std::size_t end) {
-    std::vector<PlacedBody> bodies = vehicles;
-    for (std::size_t k = begin; k < end; ++k) {
-      bodies.resize(vehicles.size());  // without the obstacles near the one before
-      sense_one(own_[k], before, own[own_[k]], bodies, samples[own_[k]]);
-    }
-  });
+  deliver(samples, sink);
+  sample_obstacles(until, sink);
+  sense_intervals(fleet_, setup_->obstacles, now, vehicles, sink, *executor_);
+  if (state_.ending.is_over()) return false;
+  advance();
+  sample_status(sink);
+  return true;
 }
 
-/// An action for each own vehicle, by all threads.
-void Simulation::for_own(const std::function<void(std::size_t)>& action) const {
-  executor_->parallel_for(own_.size(), kVehiclesPerChunk, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t k = begin; k < end; ++k) action(own_[k]);
-  });
-}
-
-/// What is near one hull. `bodies`: all vehicles where they are; obstacles are added.
-void Simulation::sense_one(std::size_t number,
-                           SimTime before,
-                           const PlacedBody& own,
-                           std::vector<PlacedBody>& bodies,
-                           StepSamples& samples) {
-  const SimTime now = state_.time;
-  VehicleStatus& status = state_.vehicles[number];
-  const VehicleAgent& agent = vehicle(number);
-  ProximityQuery query;
-  query.vehicle = agent.number();
-  query.own_label = agent.label();
-  query.hull = &agent.hull();
-  query.T_world_body = own.now;
-  query.now = now;
-  query.step = setup_->step;
-  query.reach = kClearanceReach;
-  query.ignores_map = status.landed || status.crashed;
-  // obstacles that are near enough to be met or to be the nearest
-  const double moved = (own.now.translation - own.before.translation).norm();
-  const std::vector<Body> near =
-      setup_->obstacles.near(own.now.translation, own.radius + query.reach + moved, before, now);
-  for (const Body& body : near) {
-    if (body.until <= now || body.from > now) continue;  // was replaced within the step
-    const Pose pose = body.T_world_body(now);
-    bodies.push_back({body.label,
-                      &body.shape,
-                      bounding_radius(body.shape),
-                      body.from > before ? pose : body.T_world_body(before),
-                      pose});
-  }
-  sense_proximity(query, *setup_->map, bodies, status.proximity, samples.collisions);
-  const auto& nearest = status.proximity.nearest;
-  VehicleSummary& summary = status.summary;
-  if (nearest && !status.crashed &&
-      (!summary.closest_approach || nearest->distance < *summary.closest_approach)) {
-    summary.closest_approach = nearest->distance;
-    summary.closest_place_world = nearest->place_world;
-    summary.closest_label = nearest->label;
-  }
-  if (status.crashed) samples.collisions.clear();  // it is a wreck already
-}
-
-/// Collisions of this step: who stops, who falls. True where the run ends.
+/// Collisions of this step: who stops, who falls. True if one of them ends the run.
 bool Simulation::react(std::vector<StepSamples>& samples) {
   bool stops = false;
-  for (const std::size_t i : own_) {
-    const VehicleAgent& agent = vehicle(i);
+  for (const std::size_t i : flying_here()) {
     VehicleStatus& status = state_.vehicles[i];
+    const VehicleAgent& agent = vehicle(i);
     for (const CollisionEvent& event : samples[i].collisions) {
       if (!event.entered) continue;
       ++status.summary.collisions;
@@ -290,113 +219,75 @@ bool Simulation::react(std::vector<StepSamples>& samples) {
   return stops;
 }
 
-bool Simulation::step(SampleSink& sink) {
-  if (state_.end != RunEnd::kRunning) return false;
-  const SimTime now = state_.time;
-  const double dt = to_seconds(setup_->step);
-  std::vector<StepSamples> samples(vehicle_count());
-  if (others_ != nullptr) meet_others();
-  sense(samples);
-  if (others_ != nullptr) {
-    for (std::size_t i = 0; i < vehicle_count(); ++i) {
-      if (!is_own(i)) place_other(i);
-    }
+/// Whether the run ends in this step; `stops`: because of a collision.
+Ending Simulation::judge(bool stops) {
+  RunOutlook outlook = this->outlook();
+  outlook.stops = stops;
+  if (agreement_ != nullptr) {
+    outlook = agreement_->agree(outlook);
+    agreed_end_ = outlook.end_time;
   }
-  const bool met_something = react(samples);
-  const bool last = now >= end_time() && !is_landing();
-  const bool stops = agree(met_something, last);
-  const SimTime samples_end = stops || last ? now + Duration{1} : now + setup_->step;
-  for_own([&](std::size_t i) {
+  return ending_of(outlook, state_.time);
+}
+
+/// Vehicles control themselves, and say what falls due before `until`.
+void Simulation::act(SimTime until, std::vector<StepSamples>& samples) {
+  const SimTime now = state_.time;
+  fleet_.for_each_here(*executor_, [&](std::size_t i) {
     VehicleStatus& status = state_.vehicles[i];
     status.history.record(now, status.state.body.T_world_body());
     vehicle(i).control(status, *setup_->map, now, setup_->step, state_.step_number);
-    vehicle(i).sample(status, now, samples_end, samples[i]);
+    vehicle(i).sample(status, now, until, samples[i]);
   });
-  deliver(samples, sink);
-  sample_obstacles(samples_end, sink);
-  take_due_scans(sink);
-  if (stops) {
-    state_.end = RunEnd::kCollision;
-    return false;
-  }
-  if (last) {
-    finish_run();
-    return false;
-  }
-  if (has_left_map()) {
-    state_.end = RunEnd::kLeftMap;
-    return false;
-  }
-  std::vector<char> fine(vehicle_count(), 1);
-  for_own([&](std::size_t i) {
-    if (!sources_[i]) fine[i] = vehicle(i).integrate(state_.vehicles[i], dt) ? 1 : 0;
-  });
-  for (const std::size_t i : own_) {
-    if (sources_[i]) {
-      VehicleStatus& status = state_.vehicles[i];
-      const auto state = sources_[i]->state_at(now + setup_->step);
-      if (state && state->is_finite()) {
-        status.summary.distance_flown += (state->p_world - status.state.body.p_world).norm();
-        status.state.body = *state;
-      }
-    }
-    if (fine[i] != 0) continue;
-    throw InputError(fmt::format(
-        "{}: the dynamics of {} diverged at {:.3f} s; give a smaller physics_step or softer loops",
-        setup_->scenario.place("physics_step"),
-        vehicle(i).setup().name,
-        to_seconds(now)));
-  }
-  state_.time = now + setup_->step;
+}
+
+/// The physics of the step.
+void Simulation::advance() {
+  fleet_.integrate(state_.vehicles,
+                   state_.time,
+                   to_seconds(setup_->step),
+                   setup_->scenario.place("physics_step"),
+                   *executor_);
+  state_.time += setup_->step;
   ++state_.step_number;
-  sample_status(sink);
-  return true;
 }
 
-void Simulation::finish_run() {
-  if (!arrived()) {
-    state_.end = RunEnd::kMissionUnfinished;
-  } else {
-    state_.end = is_idle() ? RunEnd::kIdle : RunEnd::kCompleted;
+SimTime Simulation::end_time() const {
+  if (agreement_ != nullptr) return agreed_end_;
+  if (setup_->scenario.duration > 0.0) return setup_->end_time;
+  return std::max(setup_->end_time + state_.skipped, state_.busy_until);
+}
+
+RunOutlook Simulation::outlook() const {
+  RunOutlook outlook;
+  outlook.has_duration = setup_->scenario.duration > 0.0;
+  outlook.end_time = outlook.has_duration
+                         ? setup_->end_time
+                         : std::max(setup_->end_time + state_.skipped, state_.busy_until);
+  outlook.is_landing = !outlook.has_duration && is_landing();
+  outlook.vehicles.resize(vehicle_count());
+  for (const std::size_t i : flying_here()) {
+    const VehicleStatus& s = status(i);
+    outlook.vehicles[i] = {.has_plan = vehicle(i).busy_time() > 0.0,
+                           .arrived = has_arrived(i),
+                           .commanded = s.commanded,
+                           .crashed = s.crashed,
+                           .is_lost = is_lost(*setup_->map, s.state.body.p_world)};
   }
+  return outlook;
 }
 
-/// True while a vehicle comes down at a program's word in a run without a duration.
+/// A vehicle that flies here comes down at a program's word.
 bool Simulation::is_landing() const {
-  // as it was told: all processes must see the same last step
-  if (others_ != nullptr) return met_.is_landing;
-  return setup_->scenario.duration <= 0.0 && lands();
-}
-
-/// An own vehicle comes down at a program's word.
-bool Simulation::lands() const {
-  return std::any_of(own_.begin(), own_.end(), [this](std::size_t i) {
+  const auto& here = flying_here();
+  return std::any_of(here.begin(), here.end(), [this](std::size_t i) {
     const VehicleStatus& s = status(i);
     return s.commanded && s.autopilot.armed &&
            std::holds_alternative<LandCommand>(s.autopilot.command);
   });
 }
 
-/// True where nothing but the lack of commands ends the run: programs gave some, or nobody did.
-bool Simulation::is_idle() const {
-  if (setup_->scenario.duration > 0.0) return false;
-  bool had_plan = false;
-  for (std::size_t i = 0; i < vehicle_count(); ++i) {
-    if (is_judged(i) && is_commanded(i)) return true;
-    had_plan = had_plan || vehicle(i).busy_time() > 0.0;
-  }
-  return !had_plan;
-}
-
-/// All that have a mission and nothing else to do are at their goals; nobody lies broken or empty.
-bool Simulation::arrived() const {
-  for (std::size_t i = 0; i < vehicle_count(); ++i) {
-    if (is_judged(i) && !(is_own(i) ? has_arrived(i) : met_.vehicles[i]->arrived)) return false;
-  }
-  return true;
-}
-
-/// The same of an own vehicle.
+/// Nothing is left of a vehicle's mission, and it is neither broken nor empty.
 bool Simulation::has_arrived(std::size_t number) const {
   const VehicleSetup& setup = vehicle(number).setup();
   const VehicleStatus& s = status(number);
@@ -408,19 +299,93 @@ bool Simulation::has_arrived(std::size_t number) const {
   return away < kGoalTolerance && to_seconds(state_.time - s.skipped) >= mission.duration();
 }
 
-/// Somebody flies where nothing can be measured any more, or falls through a hole in the floor. A
-/// wreck that does so ends nothing while others fly.
-bool Simulation::has_left_map() const {
-  bool flying = false;
-  bool lost = false;
-  for (std::size_t i = 0; i < vehicle_count(); ++i) {
-    if (!is_judged(i)) continue;
-    const bool is_out = is_lost(*setup_->map, status(i).state.body.p_world);
-    if (is_out && !status(i).crashed) return true;
-    lost = lost || is_out;
-    flying = flying || !status(i).crashed;
+void Simulation::move_schedules_to(SimTime time) {
+  if (time < state_.time || time.time_since_epoch() % setup_->step != Duration{0}) {
+    throw std::invalid_argument(fmt::format("from {} s to {} s: not a whole number of steps ahead",
+                                            to_seconds(state_.time),
+                                            to_seconds(time)));
   }
-  return lost && !flying;
+  state_.time = time;
+  state_.step_number = static_cast<std::uint64_t>(time.time_since_epoch() / setup_->step);
+  state_.next_obstacle_sample = setup_->obstacle_schedule.first_from(time);
+  state_.next_status = Schedule(kStatusRate).first_from(time);
+  for (const std::size_t i : flying_here()) {
+    vehicle(i).move_schedules_to(state_.vehicles[i], time);
+  }
+}
+
+void Simulation::skip_to(SimTime time) {
+  if (time == state_.time) return;
+  const Duration by = time - state_.time;
+  move_schedules_to(time);
+  state_.skipped += by;
+  state_.busy_until += by;
+  for (VehicleStatus& s : state_.vehicles) {  // nobody has flown through what lies between
+    s.history.clear();
+    s.proximity = {};
+    s.present_since = time;
+  }
+  for (const std::size_t i : flying_here()) {
+    state_.vehicles[i].skipped += by;
+    state_.vehicles[i].autopilot.since += by;
+  }
+}
+
+void Simulation::resume_at(SimTime time,
+                           Duration skipped,
+                           const std::map<std::size_t, VehicleState>& states) {
+  move_schedules_to(time);
+  state_.skipped = skipped;
+  state_.earlier = time.time_since_epoch() - skipped;
+  for (const std::size_t i : flying_here()) state_.vehicles[i].skipped = skipped;
+  for (const auto& [number, state] : states) {
+    vehicle(number).resume(state_.vehicles[number], state, time);
+  }
+}
+
+void Simulation::sample_obstacles(SimTime until, SampleSink& sink) {
+  if (setup_->obstacles.size() == 0) return;
+  for (;; ++state_.next_obstacle_sample) {
+    const SimTime time = setup_->obstacle_schedule.at(state_.next_obstacle_sample);
+    if (time >= until) return;
+    ObstacleSample sample;
+    sample.time = time;
+    for (Body& body : obstacles(time, time)) {
+      if (time < body.from || time >= body.until) continue;
+      sample.obstacles.push_back({body.label, body.T_world_body(time), std::move(body.shape)});
+    }
+    if (!sample.obstacles.empty()) sink.on_sample(sample);
+  }
+}
+
+StatusSample Simulation::status_sample(std::size_t number) const {
+  const VehicleStatus& status = this->status(number);
+  StatusSample sample;
+  sample.vehicle = vehicle(number).number();
+  sample.time = state_.time;
+  sample.state = status.state.body;
+  sample.crashed = status.crashed;
+  sample.landed = status.landed;
+  sample.touches = !status.proximity.touching.empty();
+  sample.armed = status.autopilot.armed;
+  sample.command = name_of(status.autopilot.command);
+  if (status.proximity.nearest) sample.clearance = status.proximity.nearest->distance;
+  sample.collisions = status.summary.collisions;
+  sample.scans = status.summary.scans;
+  sample.rejected = status.autopilot.rejected;
+  sample.last_rejection = status.autopilot.last_rejection;
+  sample.timeouts = status.autopilot.timeouts;
+  return sample;
+}
+
+/// After a step that came to an instant of the schedule.
+void Simulation::sample_status(SampleSink& sink) {
+  const Schedule schedule(kStatusRate);
+  if (schedule.at(state_.next_status) > state_.time) return;
+  while (schedule.at(state_.next_status) <= state_.time) ++state_.next_status;
+  for (std::size_t v = 0; v < vehicle_count(); ++v) {
+    if (status(v).present) sink.on_sample(status_sample(v));
+  }
 }
 
 }  // namespace pointflight

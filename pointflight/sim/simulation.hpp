@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -9,29 +8,12 @@
 #include <vector>
 
 #include "pointflight/core/parallel.hpp"
-#include "pointflight/sim/fleet_exchange.hpp"
+#include "pointflight/sim/ending.hpp"
+#include "pointflight/sim/fleet.hpp"
 #include "pointflight/sim/samples.hpp"
 #include "pointflight/sim/scenario.hpp"
-#include "pointflight/sim/state_source.hpp"
-#include "pointflight/sim/vehicle_agent.hpp"
 
 namespace pointflight {
-
-/// How a run ended, or that it goes on.
-enum class RunEnd {
-  kRunning,            ///< Not yet ended.
-  kCompleted,          ///< All that was to be done is done.
-  kMissionUnfinished,  ///< Time was up with a vehicle away from its goal, crashed or empty.
-  kCollision,          ///< A vehicle with on_collision: stop met something.
-  kLeftMap,            ///< `is_lost` (sim/start_check.hpp).
-  kInterrupted,        ///< `Simulation::interrupt`.
-  kIdle  ///< Nothing to do and no commands for `Simulation::kIdleTime`; the scenario has no
-         ///< duration.
-};
-/// The word in summary.json and for users: "completed", "mission unfinished", ...
-const char* to_string(RunEnd end);
-/// Why, where the word alone does not say it: half a sentence, or empty.
-const char* reason_of(RunEnd end);
 
 /// Everything of a run that changes: a value. What it holds by pointer (trajectories that are
 /// flown) is immutable.
@@ -40,7 +22,7 @@ struct SimulationState {
   std::uint64_t step_number = 0;          ///< Steps that were done.
   std::int64_t next_obstacle_sample = 0;  ///< Index in the schedule of output.obstacle_rate.
   std::int64_t next_status = 0;           ///< Index in the schedule of `kStatusRate`.
-  RunEnd end = RunEnd::kRunning;          ///< How it ended; no step is done after that.
+  Ending ending;                          ///< No step is done once it is over.
   SimTime busy_until;   ///< That commands from the program last and what is waited after them.
   Duration skipped{0};  ///< Time that was jumped over (`Simulation::skip_to`).
   Duration earlier{0};  ///< Time that an earlier process simulated (`Simulation::resume_at`).
@@ -80,20 +62,21 @@ class Simulation {
   /// vehicle, as all functions do that take its number.
   std::optional<std::string> command(std::size_t vehicle, const Command& command);
 
-  /// From now on the vehicle's states come from elsewhere; null: from the local dynamics again.
-  /// Scans, collisions and samples see no difference. Not part of `state`.
-  void follow(std::size_t vehicle, std::shared_ptr<StateSource> source);
-
-  /// From now on only the vehicles of `own` (by number) are simulated here: sensed, controlled,
-  /// told of. The others are where `others` says, which must outlive the run: seen in scans, met,
-  /// and nothing else. Throws std::out_of_range, std::invalid_argument without an own vehicle.
-  void share(const std::vector<std::size_t>& own, FleetExchange& others);
-  /// True where it is simulated here.
-  [[nodiscard]] bool is_own(std::size_t vehicle) const;
-  /// Numbers of those that are, ascending.
-  [[nodiscard]] const std::vector<std::size_t>& own_vehicles() const { return own_; }
-  /// The other processes; null where the run is not shared.
-  [[nodiscard]] const FleetExchange* others() const { return others_; }
+  /// From now on the vehicle's state comes from elsewhere; null: from its own dynamics again. Not
+  /// part of `state`. One that is flown elsewhere as a whole (`VehicleSource::flies_elsewhere`) is
+  /// seen in scans and can be hit, and takes no commands.
+  void follow(std::size_t vehicle, std::shared_ptr<VehicleSource> source);
+  /// From now on the run ends when this agreement says so, which must outlive it; null: when the
+  /// vehicles that fly here do.
+  void agree_by(EndingAgreement* agreement);
+  /// True with an agreement.
+  [[nodiscard]] bool ends_by_agreement() const { return agreement_ != nullptr; }
+  /// True if the vehicle's sensors and controllers are here.
+  [[nodiscard]] bool flies_here(std::size_t vehicle) const { return fleet_.flies_here(vehicle); }
+  /// Numbers of those, ascending.
+  [[nodiscard]] const std::vector<std::size_t>& flying_here() const { return fleet_.flying_here(); }
+  /// What the sources of the others say of how well they know them.
+  [[nodiscard]] std::vector<SourceReport> source_reports() const;
 
   /// Goes on at a later time, as if none had passed for the vehicles: they are where they were,
   /// what they were told lasts as long as it would have, sensors begin with their next measurement.
@@ -129,7 +112,9 @@ class Simulation {
   /// commands, which moves as a program gives more; then a landing under way is waited for.
   [[nodiscard]] SimTime end_time() const;
   /// `RunEnd::kRunning` until a step returns false or the run was ended.
-  [[nodiscard]] RunEnd end() const { return state_.end; }
+  [[nodiscard]] RunEnd end() const { return state_.ending.why; }
+  /// What matters for the end of the run of the vehicles that fly here, at `time`; no collision.
+  [[nodiscard]] RunOutlook outlook() const;
   /// As it was given; copies of vehicles are not written out.
   [[nodiscard]] const Scenario& scenario() const;
   /// The one that is flown in.
@@ -158,57 +143,22 @@ class Simulation {
  private:
   struct Setup;
 
-  void require_vehicle(std::size_t number) const;
   void check_start(std::size_t number) const;
-  void sense(std::vector<StepSamples>& samples);
-  void sense_one(std::size_t number,
-                 SimTime before,
-                 const PlacedBody& own,
-                 std::vector<PlacedBody>& bodies,
-                 StepSamples& samples);
   [[nodiscard]] bool react(std::vector<StepSamples>& samples);
-  void deliver(std::vector<StepSamples>& samples, SampleSink& sink);
-  void sample_obstacles(SimTime end, SampleSink& sink);
+  [[nodiscard]] Ending judge(bool stops);
+  void act(SimTime until, std::vector<StepSamples>& samples);
+  void sample_obstacles(SimTime until, SampleSink& sink);
   void sample_status(SampleSink& sink);
-  void take_due_scans(SampleSink& sink);
-  void finish_run();
-  /// A measurement whose interval has ended.
-  struct DueInterval {
-    std::size_t vehicle = 0;
-    std::size_t sensor_number = 0;
-    const IntervalSensor* sensor = nullptr;
-    std::int64_t index = 0;
-    SimTime start, end;
-  };
-  [[nodiscard]] std::vector<DueInterval> due_intervals();
-  [[nodiscard]] PoseTrack track_of(std::size_t number, SimTime from, SimTime until) const;
-  [[nodiscard]] std::vector<Body> bodies_for(std::size_t number,
-                                             const IntervalSensor& sensor,
-                                             std::span<const PoseTrack> tracks,
-                                             SimTime from,
-                                             SimTime until) const;
-  void for_own(const std::function<void(std::size_t)>& action) const;
-  [[nodiscard]] SimTime own_end_time() const;
-  [[nodiscard]] SharedStep shared_step(bool is_verdict) const;
-  void meet_others();
-  void place_other(std::size_t number);
-  [[nodiscard]] bool agree(bool stops, bool last);
-  [[nodiscard]] bool is_judged(std::size_t number) const;
-  [[nodiscard]] bool is_commanded(std::size_t number) const;
+  void advance();
   void move_schedules_to(SimTime time);
   [[nodiscard]] bool has_arrived(std::size_t number) const;
-  [[nodiscard]] bool arrived() const;
-  [[nodiscard]] bool has_left_map() const;
-  [[nodiscard]] bool is_idle() const;
   [[nodiscard]] bool is_landing() const;
-  [[nodiscard]] bool lands() const;
 
   std::shared_ptr<const Setup> setup_;
   const Executor* executor_;
-  std::vector<std::shared_ptr<StateSource>> sources_;
-  std::vector<std::size_t> own_;
-  FleetExchange* others_ = nullptr;
-  OtherVehicles met_;  ///< In the step under way.
+  Fleet fleet_;
+  EndingAgreement* agreement_ = nullptr;
+  SimTime agreed_end_;  ///< With an agreement.
   SimulationState state_;
 };
 

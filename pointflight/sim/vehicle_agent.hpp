@@ -13,6 +13,7 @@
 #include "pointflight/sim/scenario.hpp"
 #include "pointflight/sim/shared_parts.hpp"
 #include "pointflight/sim/state_history.hpp"
+#include "pointflight/sim/step_samples.hpp"
 #include "pointflight/vehicle/autopilot.hpp"
 #include "pointflight/vehicle/battery.hpp"
 #include "pointflight/vehicle/multirotor.hpp"
@@ -81,28 +82,9 @@ struct VehicleStatus {
   double squared_error_sum = 0.0;      ///< Of the tracking error, m^2.
   std::uint64_t steps = 0;             ///< That it was summed over.
   VehicleSummary summary;              ///< What happened so far.
-  bool present = true;                 ///< False: another process', and not there.
+  bool present = true;                 ///< False: flown elsewhere, and not there.
   SimTime present_since = SimTime::min();  ///< Since when it has been there.
   Duration skipped{0};  ///< The scenario's commands come so much later (`Simulation::skip_to`).
-};
-
-/// The order of a vehicle's samples at one instant: what happened first.
-///@{
-inline constexpr std::size_t kCollisionRank = 0, kEventRank = 1, kStateRank = 2;
-///@}
-inline constexpr std::size_t kSensorRank = 3;  ///< Of the first sensor; the others follow.
-
-/// What one vehicle says within a step.
-struct StepSamples {
-  /// A sample and its place among those of its instant: what happened first, then what happened on
-  /// board, the truth, sensors in their order.
-  struct Item {
-    SimTime time;          ///< When it arrives.
-    std::size_t rank = 0;  ///< Among those of its instant.
-    Sample sample;         ///< What is said.
-  };
-  std::vector<CollisionEvent> collisions;  ///< Entered or left in this step.
-  std::vector<Item> items;                 ///< All else.
 };
 
 /// A sensor on a vehicle; one of `instant` and `interval` is not null.

@@ -21,9 +21,12 @@ class ExactRenderer : public Renderer {
  public:
   ExactRenderer(const ExactScene& scene, float offset, bool silent)
       : scene_(scene), offset_(offset), silent_(silent) {}
-  void render(const RayBatch& batch, std::span<Hit> hits, const Executor&) const override {
+
+ protected:
+  void render_one(const RenderJob& job, const Executor& /*executor*/) const override {
+    const std::span<Hit> hits = job.hits;
     for (std::size_t i = 0; i < hits.size(); ++i) {
-      const Ray& ray = batch.rays[i];
+      const Ray& ray = job.batch.rays[i];
       const auto t =
           scene_.geometry.intersect(ray.origin_world, ray.direction_world.cast<double>());
       hits[i] = {};

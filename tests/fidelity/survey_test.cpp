@@ -198,12 +198,14 @@ TEST(SeenSurfaces, OneReturnStandsForOthersOfItsDirectionAlone) {
 class TrueRenderer : public Renderer {
  public:
   TrueRenderer(const SceneTree& tree, float offset) : tree_(tree), offset_(offset) {}
-  void render(const RayBatch& batch, std::span<Hit> hits, const Executor&) const override {
-    for (std::size_t i = 0; i < hits.size(); ++i) {
-      const Ray& ray = batch.rays[i];
+
+ protected:
+  void render_one(const RenderJob& job, const Executor& /*executor*/) const override {
+    for (std::size_t i = 0; i < job.hits.size(); ++i) {
+      const Ray& ray = job.batch.rays[i];
       const auto met = tree_.intersect(ray.origin_world, ray.direction_world.cast<double>());
-      hits[i] = {};
-      if (met) hits[i].range = static_cast<float>(met->range) + offset_;
+      job.hits[i] = {};
+      if (met) job.hits[i].range = static_cast<float>(met->range) + offset_;
     }
   }
 

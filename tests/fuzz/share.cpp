@@ -97,7 +97,7 @@ void listen(std::span<const std::uint8_t> data) {
   };
   options.interrupted = [] { return true; };
   FleetShare share(simulation, *end, options);
-  simulation.share({0}, share);
+  share.take_part(simulation);
   ShareLink link(simulation, share);
   share_msg::Introduction intro;
   intro.name = "host:2";
@@ -139,7 +139,7 @@ void listen(std::span<const std::uint8_t> data) {
     if (!simulation.status(1).state.body.is_finite()) __builtin_trap();
   }
   static_cast<void>(share.peers());
-  static_cast<void>(share.apart());
+  static_cast<void>(simulation.source_reports());
 }
 
 }  // namespace

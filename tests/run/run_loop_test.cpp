@@ -129,14 +129,21 @@ TEST(RunLoop, LockstepWaitsForAnswers) {
   const Executor executor(2);
   RunOptions options;
   options.lockstep = 0.002;
+  class Asked : public Probe {
+   public:
+    [[nodiscard]] bool wants_answer(const Sample& sample) const override {
+      return std::holds_alternative<ScanSample>(sample);
+    }
+  };
   Simulation silent(short_run(), hall(), executor);
-  Probe nobody;
+  Asked nobody;
   RunLoop alone(silent, options);
   alone.add(nobody);
   alone.run();
-  EXPECT_EQ(alone.unanswered_scans(), 5u);
-  // one that answers each scan is waited for no longer
-  class Planner : public Probe {
+  EXPECT_EQ(alone.unanswered(), 5u);
+  // one that answers each scan is waited for no longer; beside it one that answers each IMU sample
+  // and commands nothing
+  class Planner : public Asked {
    public:
     std::vector<Order> take_orders() override {
       if (scans == answered) return {};
@@ -145,13 +152,36 @@ TEST(RunLoop, LockstepWaitsForAnswers) {
     }
     int answered = 0;
   } planner;
+  class Controller : public Probe {
+   public:
+    void on_sample(const Sample& sample) override {
+      Probe::on_sample(sample);
+      asked += wants_answer(sample) ? 1 : 0;
+    }
+    [[nodiscard]] bool wants_answer(const Sample& sample) const override {
+      return std::holds_alternative<ImuSample>(sample);
+    }
+    void on_wait(SimTime now, Waiting why) override {
+      Probe::on_wait(now, why);
+      EXPECT_EQ(asked, answered + 1) << "the run went on before the last one was answered";
+    }
+    std::vector<Order> take_orders() override {
+      if (asked == answered || ++looks % 3 != 0) return {};
+      answered = asked;
+      return {AnswerOrder{}};
+    }
+    int asked = 0, answered = 0, looks = 0;
+  } controller;
   options.lockstep = 60.0;
   Simulation flown(short_run(), hall(), executor);
   RunLoop loop(flown, options);
   loop.add(planner);
+  loop.add(controller);
   loop.run();
   EXPECT_EQ(planner.answered, 5);
-  EXPECT_EQ(loop.unanswered_scans(), 0u);
+  EXPECT_GT(controller.asked, 80);
+  EXPECT_EQ(controller.answered, controller.asked);
+  EXPECT_EQ(loop.unanswered(), 0u);
 }
 
 TEST(RunLoop, EndsWhereNobodyIsLeftOrSomebodyWantsIt) {

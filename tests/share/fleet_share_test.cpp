@@ -61,7 +61,7 @@ TEST(FleetShare, OthersAreWhereTheyAreWithinTheBound) {
     const RigidBodyState& now = b.simulation.status(1).state.body;
     worst = std::max(worst, (taken.p_world - (now.p_world - 1e-3 * now.v_world)).norm());
   }
-  const auto apart = a.share->apart();
+  const auto apart = a.simulation.source_reports();
   ASSERT_EQ(apart.size(), 1u);
   EXPECT_EQ(apart[0].flown_by, "host:2");
   EXPECT_EQ(apart[0].losses, 0u);
@@ -141,7 +141,7 @@ TEST(FleetShare, WhoIsSilentIsLostAndWhatWasMissedIsSaidAfterwards) {
     EXPECT_EQ(missed.partner, kFirstVehicle + 1);
     EXPECT_GT(missed.penetration, 0.0);
     for (const Member* member : {&a, &b}) {
-      const ApartSummary apart = member->share->apart().front();
+      const SourceReport apart = member->simulation.source_reports().front();
       EXPECT_EQ(apart.losses, 1u);
       EXPECT_NEAR(to_seconds(apart.apart), 10.0, 0.2);
       EXPECT_GE(apart.missed_contacts, 1u);
@@ -167,8 +167,8 @@ TEST(FleetShare, WhatIsForgottenWhenTheyMeetAgainIsUnknown) {
   world.bus.loses = nullptr;
   world.pass(0.5);
   for (const Member* member : {&a, &b}) {
-    EXPECT_EQ(member->share->apart().front().losses, 1u);
-    EXPECT_EQ(member->share->apart().front().unknown_contacts, 1u);
+    EXPECT_EQ(member->simulation.source_reports().front().losses, 1u);
+    EXPECT_EQ(member->simulation.source_reports().front().unknown_contacts, 1u);
   }
 }
 
@@ -229,8 +229,8 @@ TEST(FleetShare, WhoIsStartedAgainBeforeItsLeaseHasRunOutIsTakenThen) {
   world.pass(2.0, {&b});
   EXPECT_EQ(a.sink.kinds(), std::vector<std::string>({"lost", "back"}));
   EXPECT_TRUE(a.simulation.status(1).present);
-  EXPECT_EQ(a.share->apart().front().flown_by, "host:3");
-  EXPECT_EQ(a.share->apart().front().unknown_contacts, 1u);
+  EXPECT_EQ(a.simulation.source_reports().front().flown_by, "host:3");
+  EXPECT_EQ(a.simulation.source_reports().front().unknown_contacts, 1u);
   EXPECT_TRUE(again.simulation.status(0).present);
 }
 
@@ -243,7 +243,7 @@ TEST(FleetShare, WhoLeavesIsGoneAtOnce) {
   world.pass(0.01, {&b});
   EXPECT_EQ(a.sink.kinds(), std::vector<std::string>({"left"}));
   EXPECT_FALSE(a.simulation.status(1).present);
-  EXPECT_EQ(a.share->apart().front().losses, 0u);
+  EXPECT_EQ(a.simulation.source_reports().front().losses, 0u);
 }
 
 TEST(FleetShare, WhoDoesNotFitIsRefusedOrLeftOut) {

@@ -84,12 +84,13 @@ void expect_as_one_process(const Scenario& scenario,
     EXPECT_EQ(member->simulation.end(), end);
     EXPECT_EQ(member->simulation.time(), time);
     for (const auto& [vehicle, sink] : member->sink.sinks) {
-      EXPECT_TRUE(member->simulation.is_own(vehicle));
+      EXPECT_TRUE(member->simulation.flies_here(vehicle));
       EXPECT_EQ(sink.hash(), alone.sinks.at(vehicle).hash()) << vehicle;
     }
-    EXPECT_EQ(member->sink.sinks.size(), member->simulation.own_vehicles().size());
+    EXPECT_EQ(member->sink.sinks.size(), member->simulation.flying_here().size());
     for (const VehicleEvent& event : member->sink.events) {
-      EXPECT_TRUE(member->simulation.is_own(event.vehicle)) << event.kind << ": " << event.words;
+      EXPECT_TRUE(member->simulation.flies_here(event.vehicle))
+          << event.kind << ": " << event.words;
     }
   }
 }
@@ -172,7 +173,7 @@ TEST(FleetShare, LockstepGoesOnWithoutWhoIsLostAndTakesItBack) {
     const auto kinds = member->sink.kinds();
     EXPECT_EQ(std::count(kinds.begin(), kinds.end(), "lost"), member == members[2] ? 2 : 1);
     EXPECT_EQ(std::count(kinds.begin(), kinds.end(), "back"), member == members[2] ? 2 : 1);
-    for (const ApartSummary& other : member->share->apart()) {
+    for (const SourceReport& other : member->simulation.source_reports()) {
       EXPECT_EQ(other.losses, member == members[2] || other.vehicle == 2 ? 1u : 0u);
       EXPECT_EQ(other.unknown_contacts, 0u);  // they have told each other where they were
     }

@@ -67,7 +67,7 @@ struct Member {
     options.log = [this](const std::string& line) { lines.push_back(line); };
     options.interrupted = [this] { return interrupted; };
     share = std::make_unique<FleetShare>(simulation, *end, options);
-    simulation.share(vehicles, *share);
+    share->take_part(simulation);
     link = std::make_unique<ShareLink>(simulation, *share);
   }
 

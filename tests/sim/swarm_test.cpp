@@ -117,12 +117,13 @@ TEST(Swarm, ARunIsSavedRestoredAndBranched) {
 }
 
 /// States that another run has recorded.
-class Recorded : public StateSource {
+class Recorded : public VehicleSource {
  public:
   std::map<SimTime, RigidBodyState> states;
-  std::optional<RigidBodyState> state_at(SimTime time) override {
+  std::optional<SourcedState> state_at(SimTime time) override {
     const auto found = states.find(time);
-    return found == states.end() ? std::nullopt : std::optional(found->second);
+    if (found == states.end()) return std::nullopt;
+    return SourcedState{.body = found->second};
   }
 };
 

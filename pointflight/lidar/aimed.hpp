@@ -1,0 +1,23 @@
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "pointflight/lidar/lidar.hpp"
+
+namespace pointflight {
+
+/// The beams of a scan in the world.
+struct Lidar::Aimed {
+  ScanRequest request;
+  std::shared_ptr<const ScanBeams::Ordered> ordered;
+  bool snapshot = false;
+  Pose middle;                    ///< T_world_sensor in the middle of the scan.
+  std::vector<Ray> rays;          ///< Their axes.
+  std::vector<Vector3f> across;   ///< `WideBeams::across`; none where beams are lines.
+  std::vector<Duration> offsets;  ///< Their times, where bodies move meanwhile.
+
+  [[nodiscard]] const std::vector<Beam>& beams() const { return ordered->beams; }
+};
+
+}  // namespace pointflight

@@ -1,0 +1,284 @@
+// What a LiDAR makes of what its beams hit.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include "pointflight/core/math.hpp"
+#include "pointflight/core/random.hpp"
+#include "pointflight/lidar/aimed.hpp"
+
+namespace pointflight {
+namespace {
+
+constexpr std::size_t kReturnsPerChunk = 2048;  // beams
+
+/// Standard normals for the beams of a scan. Two neighbours share a draw of two: half the price
+/// where a scan's beams are asked for one after the other.
+class BeamNormals {
+ public:
+  BeamNormals(const RandomStream& random, std::uint64_t scan) : random_(random), scan_(scan) {}
+  double operator()(std::size_t beam) {
+    if (beam / 2 != pair_) {
+      pair_ = beam / 2;
+      normals_ = random_.normal2(scan_ << 32 | pair_);
+    }
+    return normals_[beam % 2];
+  }
+
+ private:
+  const RandomStream& random_;
+  std::uint64_t scan_;
+  std::uint64_t pair_ = ~std::uint64_t{0};
+  std::array<double, 2> normals_{};
+};
+
+/// Range (of a depth camera: depth) with the sensor's Gaussian noise, where returns are not
+/// modelled.
+float with_noise(float range,
+                 const RangeNoiseSettings& noise,
+                 BeamNormals& normals,
+                 std::size_t beam) {
+  const double r = static_cast<double>(range);
+  const double far = noise.range_sigma_per_m2 * r * r;
+  const double sigma = std::sqrt(noise.range_sigma * noise.range_sigma + far * far);
+  return sigma > 0.0 ? static_cast<float>(r + sigma * normals(beam)) : range;
+}
+
+/// By the true range: noise takes no point into a wall. False alarms have none but their own.
+void mark_unknown(const KnownSpace& known,
+                  std::span<const Ray> rays,
+                  std::span<const float> true_ranges,
+                  Scan& scan,
+                  const Executor& executor) {
+  scan.marks.unknown = true;
+  executor.parallel_for(
+      scan.points.size(), kReturnsPerChunk, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) {
+          ScanPoint& point = scan.points[i];
+          const Ray& ray = rays[point.beam];
+          point.is_unknown = !known.is_seen_through(ray.origin_world,
+                                                    ray.direction_world.cast<double>(),
+                                                    static_cast<double>(true_ranges[i]));
+        }
+      });
+}
+
+/// `Scan::truth` of its points. `returns`: those of all beams, `most` places each.
+void tell_truth(std::span<const Return> returns, const PoseTrack& T_world_sensor, Scan& scan) {
+  scan.marks.truth = true;
+  scan.truth.reserve(scan.points.size());
+  const Pose T_start_world = T_world_sensor.at(scan.start).inverse();
+  std::size_t next = 0;
+  SimTime time = scan.start;
+  Pose T_start_seen;
+  for (const Return& made : returns) {
+    if (!made.is_return()) continue;
+    const ScanPoint& point = scan.points[next++];
+    if (scan.seen_at(point) != time) {
+      time = scan.seen_at(point);
+      T_start_seen = T_start_world * T_world_sensor.at(time);
+    }
+    const double cosine = std::clamp(static_cast<double>(made.origin.cos_incidence), 0.0, 1.0);
+    const bool is_false = made.parts == 0;
+    scan.truth.push_back({made.true_range,
+                          is_false ? 0.0f : static_cast<float>(math::acos(cosine)),
+                          made.depth,
+                          (T_start_seen * point.position_sensor.cast<double>()).cast<float>(),
+                          made.origin.surfel,
+                          made.origin.sub_ray,
+                          made.parts});
+  }
+}
+
+}  // namespace
+
+/// What the sensor reports of each beam's echoes; a negative range where it reports nothing.
+Lidar::Received Lidar::received(const Aimed& aimed,
+                                std::span<const Echoes> echoes,
+                                const Executor& executor) const {
+  const ScanRequest& request = aimed.request;
+  const std::vector<Beam>& beams = aimed.beams();
+  Received received;
+  received.most = most_returns(settings_.detection.returns);
+  const std::size_t most = received.most;
+  std::vector<Return>& returns = received.returns;
+  returns.resize(beams.size() * most);
+  const RandomStream noise(request.seed, StreamId::kLidarRangeNoise, sensor_);
+  const RandomStream detection(request.seed, StreamId::kLidarDetection, sensor_);
+  const RandomStream weather(request.seed, StreamId::kLidarWeather, sensor_);
+  executor.parallel_for(beams.size(), kReturnsPerChunk, [&](std::size_t begin, std::size_t end) {
+    BeamNormals normals(noise, request.index);
+    std::size_t i = begin;
+    const ChanceOf chance_of = [&](std::size_t echo) {
+      BeamChance chance;
+      const std::uint64_t address = request.index << 32 | i;
+      if (echo == 0) {
+        const auto [detected, place] = detection.uniform2(address);
+        return BeamChance{request.noise ? normals(i) : 0.0, detected, place};
+      }
+      const RandomStream own(
+          request.seed, StreamId::kLidarEcho, static_cast<std::uint32_t>(echo) << 28 | sensor_);
+      chance.normal = request.noise ? own.normal(2 * address) : 0.0;
+      chance.detection = own.uniform(2 * address + 1);
+      if (echo == Echoes::kMost) {
+        const auto [drop, drop_place] = weather.uniform2(address);
+        chance.drop = drop;
+        chance.drop_place = drop_place;
+      }
+      return chance;
+    };
+    for (; i < end; ++i) {
+      const float share = depth_share(beams[i]);
+      Echoes seen = echoes[i];
+      for (std::size_t k = 0; k < seen.count; ++k) seen.all[k].range *= share;
+      const std::span<Return> made(returns.data() + i * most, most);
+      const std::size_t count = returns_->measure(seen.span(), chance_of, made);
+      for (std::size_t k = 0; k < count; ++k) {
+        made[k].range /= share;
+        made[k].true_range /= share;
+      }
+    }
+  });
+  return received;
+}
+
+/// Where returns are not modelled: whatever is hit comes back, with noise.
+Lidar::Received Lidar::received_as_ideal(const Aimed& aimed,
+                                         std::span<const Hit> hits,
+                                         const Executor& executor) const {
+  const ScanRequest& request = aimed.request;
+  const std::vector<Beam>& beams = aimed.beams();
+  Received received;
+  std::vector<Return>& returns = received.returns;
+  returns.resize(beams.size());
+  const RandomStream random(request.seed, StreamId::kLidarRangeNoise, sensor_);
+  const auto range_min = static_cast<float>(settings_.range_min);
+  executor.parallel_for(beams.size(), kReturnsPerChunk, [&](std::size_t begin, std::size_t end) {
+    BeamNormals normals(random, request.index);
+    for (std::size_t i = begin; i < end; ++i) {
+      if (!hits[i].is_return()) continue;
+      const float share = depth_share(beams[i]);
+      float range = hits[i].range;
+      if (request.noise) range = with_noise(range * share, settings_.noise, normals, i) / share;
+      // noise neither makes nor ends a return at the far limit; it may at the near one
+      if (range * share < range_min) continue;
+      returns[i] = {.range = range,
+                    .intensity = hits[i].intensity,
+                    .label = hits[i].label,
+                    .true_range = hits[i].range,
+                    .origin = {hits[i].cos_incidence, hits[i].surfel},
+                    .parts = 1};
+    }
+  });
+  return received;
+}
+
+/// By the disparities of a stereo camera.
+Lidar::Received Lidar::received_as_stereo(const Aimed& aimed,
+                                          std::span<const Hit> hits,
+                                          const Executor& executor) const {
+  const ScanRequest& request = aimed.request;
+  const std::vector<Beam>& beams = aimed.beams();
+  std::vector<float> shares(beams.size());
+  for (std::size_t i = 0; i < beams.size(); ++i) shares[i] = depth_share(beams[i]);
+  const RandomStream pixels(request.seed, StreamId::kLidarRangeNoise, sensor_);
+  const RandomStream windows(request.seed, StreamId::kStereo, sensor_);
+  Received received;
+  std::vector<Return>& returns = received.returns;
+  returns =
+      stereo_->measure(hits, shares, {pixels, windows, request.index, request.noise}, executor);
+  for (std::size_t i = 0; i < returns.size(); ++i) {
+    returns[i].range /= shares[i];
+    returns[i].true_range /= shares[i];
+  }
+  return received;
+}
+
+/// What a camera's imager sees by the sun and by its own light, which falls off with the square of
+/// the depth; exposed so that the mean of what it meets is a third of the brightest.
+std::vector<std::uint8_t> Lidar::infrared_of(std::span<const Beam> beams,
+                                             std::span<const Hit> hits) const {
+  constexpr double kMean = 85.0;
+  std::vector<double> light(hits.size(), 0.0);
+  double sum = 0.0;
+  double lit = 0.0;
+  for (std::size_t i = 0; i < hits.size(); ++i) {
+    if (!hits[i].is_return()) continue;
+    const auto depth = static_cast<double>(std::max(hits[i].range * depth_share(beams[i]), 0.1f));
+    light[i] = returns_->reflectivity(hits[i]) *
+               (returns_->sun_klx() + settings_.grid.projector_klx / (depth * depth));
+    sum += light[i];
+    lit += 1.0;
+  }
+  std::vector<std::uint8_t> infrared(hits.size(), 0);
+  if (!(sum > 0.0)) return infrared;
+  for (std::size_t i = 0; i < hits.size(); ++i) {
+    infrared[i] = static_cast<std::uint8_t>(std::min(255.0, kMean * light[i] * lit / sum + 0.5));
+  }
+  return infrared;
+}
+
+/// Of beams that are lines.
+Lidar::Received Lidar::received(const Aimed& aimed,
+                                std::span<const Hit> hits,
+                                const Executor& executor) const {
+  if (!returns_) return received_as_ideal(aimed, hits, executor);
+  Received made;
+  if (stereo_) {
+    made = received_as_stereo(aimed, hits, executor);
+  } else {
+    std::vector<Echoes> echoes(hits.size());
+    for (std::size_t i = 0; i < hits.size(); ++i) {
+      if (!hits[i].is_return()) continue;
+      echoes[i].all[0] = returns_->echo_of(hits[i]);
+      echoes[i].count = 1;
+    }
+    made = received(aimed, std::span<const Echoes>(echoes), executor);
+  }
+  if (measures_depth_) made.infrared = infrared_of(aimed.beams(), hits);
+  return made;
+}
+
+/// The returns as points.
+Scan Lidar::written(const Aimed& aimed,
+                    const PoseTrack& T_world_sensor,
+                    Received received,
+                    const Executor& executor) const {
+  const ScanRequest& request = aimed.request;
+  const std::vector<Beam>& beams = aimed.beams();
+  Scan scan;
+  scan.index = request.index;
+  scan.sensor = sensor_;
+  scan.start = request.start;
+  scan.end = request.start + period();
+  scan.beams = beams.size();
+  scan.snapshot = aimed.snapshot;
+  scan.middle = middle_of(request.start, beams, aimed.snapshot);
+  scan.infrared = std::move(received.infrared);
+  scan.marks.echoes = reports_echoes();
+  scan.points.reserve(beams.size());
+  std::vector<float> true_ranges;
+  for (std::size_t i = 0; i < received.returns.size(); ++i) {
+    const Return& made = received.returns[i];
+    if (!made.is_return()) continue;
+    const std::size_t number = i / received.most;
+    const Beam& beam = beams[number];
+    scan.points.push_back({beam.origin_sensor + made.range * beam.direction_sensor,
+                           made.range,
+                           made.intensity,
+                           beam.time_offset,
+                           beam.ring,
+                           static_cast<std::uint32_t>(number),
+                           made.label});
+    scan.points.back().echo = static_cast<std::uint8_t>(i % received.most);
+    if (request.known != nullptr) true_ranges.push_back(made.true_range);
+  }
+  if (request.truth) tell_truth(received.returns, T_world_sensor, scan);
+  if (request.known != nullptr) {
+    mark_unknown(*request.known, aimed.rays, true_ranges, scan, executor);
+  }
+  return scan;
+}
+
+}  // namespace pointflight

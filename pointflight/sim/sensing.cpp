@@ -1,0 +1,183 @@
+#include "pointflight/sim/sensing.hpp"
+
+#include <algorithm>
+#include <map>
+#include <memory>
+#include <optional>
+#include <vector>
+
+namespace pointflight {
+namespace {
+
+constexpr double kBeamOrigin = 1.0;  // m: beams start no farther from their sensor
+
+/// A measurement whose interval has ended.
+struct DueInterval {
+  std::size_t vehicle = 0;
+  std::size_t sensor_number = 0;
+  const IntervalSensor* sensor = nullptr;
+  std::int64_t index = 0;
+  SimTime start, end;
+};
+
+/// What has ended by `now`: of all, those that ended first, at the same instant. If nothing has,
+/// vehicles forget where they were before what is still to be measured.
+std::vector<DueInterval> due_intervals(const Fleet& fleet,
+                                       std::span<VehicleStatus> statuses,
+                                       SimTime now) {
+  std::vector<DueInterval> due;
+  SimTime first_end = SimTime::max();
+  SimTime oldest_needed = now;
+  for (const std::size_t v : fleet.flying_here()) {
+    const auto sensors = fleet.vehicle(v).sensors();
+    for (std::size_t i = 0; i < sensors.size(); ++i) {
+      const IntervalSensor* sensor = sensors[i].interval;
+      if (sensor == nullptr) continue;
+      const std::int64_t number = statuses[v].sensors[i].next;
+      const SimTime start = sensor->schedule().at(number);
+      const SimTime end = sensor->schedule().at(number + 1);
+      oldest_needed = std::min(oldest_needed, start);
+      if (end > now || end > first_end) continue;
+      if (end < first_end) due.clear();
+      first_end = end;
+      due.push_back({v, i, sensor, number, start, end});
+    }
+  }
+  if (due.empty()) {
+    for (VehicleStatus& status : statuses) status.history.forget_before(oldest_needed);
+  }
+  return due;
+}
+
+/// What a sensor can hit: everybody else, and the obstacles that are near enough. `tracks` of all
+/// vehicles.
+std::vector<Body> bodies_for(const DueInterval& due,
+                             const Fleet& fleet,
+                             const Obstacles& obstacles,
+                             std::span<const VehicleStatus> statuses,
+                             std::span<const PoseTrack> tracks) {
+  const PoseTrack& own = tracks[due.vehicle];
+  const SimTime middle = due.start + (due.end - due.start) / 2;
+  const double moved = own.speed_max(due.start, due.end) * to_seconds(due.end - middle);
+  std::vector<Body> bodies = obstacles.near(
+      own.at(middle).translation, due.sensor->reach() + moved + kBeamOrigin, due.start, due.end);
+  for (std::size_t i = 0; i < fleet.size(); ++i) {
+    const bool is_own = i == due.vehicle;
+    if ((is_own && !due.sensor->sees_own_vehicle()) || !statuses[i].present) continue;
+    const VehicleAgent& vehicle = fleet.vehicle(i);
+    Body body;
+    body.label = vehicle.label();
+    body.shape = vehicle.shape();
+    body.look = vehicle.look();
+    body.intensity = static_cast<float>(vehicle.settings().intensity);
+    body.speed_max = tracks[i].speed_max(due.start, due.end);
+    body.motion = tracks[i];
+    body.from = statuses[i].present_since;
+    bodies.push_back(std::move(body));
+  }
+  return bodies;
+}
+
+void count(const Sample& sample, VehicleSummary& summary) {
+  const auto* scanned = std::get_if<ScanSample>(&sample);
+  if (scanned == nullptr) return;
+  ++summary.scans;
+  summary.beams += scanned->scan->beams;
+  summary.points += scanned->scan->points.size();
+}
+
+/// Measurements under way together: aim, one call of each renderer for the rays of all, receive,
+/// until no rays are left; then they are finished.
+class Together {
+ public:
+  Together(const Fleet& fleet,
+           const Obstacles& obstacles,
+           std::span<const VehicleStatus> statuses,
+           std::span<const PoseTrack> tracks,
+           std::span<const DueInterval> due,
+           const Executor& executor)
+      : due_(due), executor_(executor), bodies_(due.size()), measurements_(due.size()) {
+    executor.parallel_for(due.size(), 1, [&](std::size_t k, std::size_t) {
+      const DueInterval& d = due[k];
+      if (d.sensor->loses(d.index)) return;
+      bodies_[k] = bodies_for(d, fleet, obstacles, statuses, tracks);
+      measurements_[k] =
+          d.sensor->begin({d.index, d.start, d.end, tracks[d.vehicle], bodies_[k], executor});
+    });
+  }
+
+  /// By number of `due`; nothing of those that were lost.
+  std::vector<std::optional<Sample>> take() {
+    while (render_next()) {
+    }
+    std::vector<std::optional<Sample>> samples(due_.size());
+    executor_.parallel_for(due_.size(), 1, [&](std::size_t k, std::size_t) {
+      if (measurements_[k]) samples[k] = measurements_[k]->finish(executor_);
+      measurements_[k].reset();
+    });
+    return samples;
+  }
+
+ private:
+  /// False if nobody wants rays any more.
+  bool render_next() {
+    std::vector<std::optional<RenderJob>> wanted(due_.size());
+    executor_.parallel_for(due_.size(), 1, [&](std::size_t k, std::size_t) {
+      if (measurements_[k]) wanted[k] = measurements_[k]->next(executor_);
+    });
+    std::map<const Renderer*, std::vector<RenderJob>> jobs;
+    for (std::size_t k = 0; k < due_.size(); ++k) {
+      if (wanted[k]) jobs[due_[k].sensor->renderer()].push_back(*wanted[k]);
+    }
+    std::vector<std::unique_ptr<Rendering>> renderings;
+    for (const auto& [renderer, its_jobs] : jobs) {
+      renderings.push_back(renderer->submit(its_jobs, executor_));
+    }
+    for (const auto& rendering : renderings) rendering->collect();
+    executor_.parallel_for(due_.size(), 1, [&](std::size_t k, std::size_t) {
+      if (wanted[k]) measurements_[k]->receive(executor_);
+    });
+    return !jobs.empty();
+  }
+
+  std::span<const DueInterval> due_;
+  const Executor& executor_;
+  std::vector<std::vector<Body>> bodies_;
+  std::vector<std::unique_ptr<IntervalMeasurement>> measurements_;
+};
+
+}  // namespace
+
+void sense_intervals(const Fleet& fleet,
+                     const Obstacles& obstacles,
+                     SimTime now,
+                     std::span<VehicleStatus> statuses,
+                     SampleSink& sink,
+                     const Executor& executor) {
+  for (auto due = due_intervals(fleet, statuses, now); !due.empty();
+       due = due_intervals(fleet, statuses, now)) {
+    const SimTime end = due.front().end;
+    SimTime start = end;
+    for (const DueInterval& d : due) start = std::min(start, d.start);
+    std::vector<PoseTrack> tracks;
+    tracks.reserve(fleet.size());
+    for (std::size_t v = 0; v < fleet.size(); ++v) {
+      tracks.push_back(fleet.track(statuses[v], v, start, end));
+    }
+    // as many under way as there are threads: their beams, rays and hits take memory
+    const auto at_once = static_cast<std::size_t>(executor.threads());
+    for (std::size_t from = 0; from < due.size(); from += at_once) {
+      const std::span part = std::span(due).subspan(from, std::min(at_once, due.size() - from));
+      const auto samples = Together(fleet, obstacles, statuses, tracks, part, executor).take();
+      for (std::size_t k = 0; k < part.size(); ++k) {
+        VehicleStatus& status = statuses[part[k].vehicle];
+        ++status.sensors[part[k].sensor_number].next;
+        if (!samples[k]) continue;
+        count(*samples[k], status.summary);
+        sink.on_sample(*samples[k]);
+      }
+    }
+  }
+}
+
+}  // namespace pointflight

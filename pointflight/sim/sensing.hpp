@@ -1,0 +1,20 @@
+#pragma once
+
+#include <span>
+
+#include "pointflight/sim/fleet.hpp"
+#include "pointflight/world/obstacles.hpp"
+
+namespace pointflight {
+
+/// Takes what the interval sensors of vehicles that fly here have come to the end of by `now`: in
+/// arrears, from the recorded tracks of all bodies. Measurements that end together are taken
+/// together and reach the sink in the order of vehicles and sensors.
+void sense_intervals(const Fleet& fleet,
+                     const Obstacles& obstacles,
+                     SimTime now,
+                     std::span<VehicleStatus> statuses,
+                     SampleSink& sink,
+                     const Executor& executor);
+
+}  // namespace pointflight
