@@ -4,6 +4,7 @@
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <memory>
@@ -21,14 +22,10 @@
 #include "apps/view_flags.hpp"
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/core/number_text.hpp"
-#include "pointflight/core/output_file.hpp"
 #include "pointflight/core/resources.hpp"
-#include "pointflight/sim/ended_run.hpp"
 #include "pointflight/sim/flight_recorder.hpp"
 #include "pointflight/sim/scenario_maker.hpp"
 #include "pointflight/sim/start_check.hpp"
-#include "share/common_ground.hpp"
-#include "view/view_link.hpp"
 
 namespace pointflight::apps {
 namespace {
@@ -54,7 +51,6 @@ struct FlyFlags {
   bool no_picture = false;
   bool json = false;
   RosFlags ros;
-  ViewFlags view;
   ShareFlags share;
 };
 
@@ -137,18 +133,6 @@ Scenario load_input(const FlyFlags& flags, const Executor& executor) {
   }
   if (bounds) warn_of_starts_outside(scenario, *bounds);
   return scenario;
-}
-
-/// What is wrong with the folder is said before a long search; `RunFolder` says it for good.
-void check_folder(const FlyFlags& flags) {
-  std::error_code error;
-  if (fs::exists(flags.output, error) && !fs::is_directory(flags.output, error)) {
-    throw InputError(fmt::format("{}: is a file; give a folder with -o", flags.output));
-  }
-  if (!flags.force && fs::is_directory(flags.output, error) && !fs::is_empty(flags.output, error)) {
-    throw InputError(
-        fmt::format("{}: is not empty; choose another folder or give --force", flags.output));
-  }
 }
 
 /// Which limits cut what was asked for, and for how long.
@@ -236,36 +220,32 @@ int exit_code_of(RunEnd end) {
   }
 }
 
-/// How late scans left, what lockstep waited for in vain.
-void say_waits(const RunLoop& loop, const RosFlags& ros) {
-  const ScanDelays& delays = loop.scan_delays();
-  if (ros.is_live() && delays.count() > 0) {
-    log(fmt::format("scans left {:.1f} ms after their end (median), {:.1f} ms at p99",
-                    1e3 * delays.below(0.5),
-                    1e3 * delays.below(0.99)));
-  }
-  if (loop.unanswered() > 0) {
-    log(fmt::format("{} scans had no command within {} s", loop.unanswered(), ros.lockstep));
-  }
+/// Whom the flight is for, in the order in which they get its samples and are closed: what other
+/// processes hear of its end does not wait until a picture is drawn.
+std::vector<std::unique_ptr<FlightPart>> parts_of(const FlyFlags& flags, int threads) {
+  const Existing existing = flags.force ? Existing::kReplace : Existing::kRefuse;
+  std::vector<std::unique_ptr<FlightPart>> parts;
+  parts.push_back(std::make_unique<SharePart>(flags.share, flags.output));
+  parts.push_back(std::make_unique<FolderPart>(
+      FolderOptions{flags.output, existing, !flags.no_picture}, threads));
+  parts.push_back(std::make_unique<TerminalPart>());
+  parts.push_back(std::make_unique<RosPart>(flags.ros));
+  return parts;
 }
 
-/// A process of a shared run that was killed goes on where its trajectory ends, if the scenario
-/// says so.
-void resume(const FlyFlags& flags, Simulation& simulation) {
-  const bool wanted = share_setup_of(simulation.scenario()).on_return == OnReturn::kLog;
-  if (!wanted || flags.output.empty()) return;
-  const auto ended = ended_run(flags.output, simulation, simulation.flying_here());
-  if (!ended) return;
-  if (!was_run_of(ended->scenario, simulation)) {
-    log(fmt::format(
-        "{}: what an earlier run left there is of another scenario; begins at the start",
-        flags.output));
-    return;
-  }
-  simulation.resume_at(ended->time, ended->skipped, ended->states);
-  log(fmt::format("{}: goes on where an earlier run's trajectories end, at {:.2f} s",
-                  flags.output,
-                  to_seconds(ended->time)));
+RunOptions run_options(const FlyFlags& flags) {
+  RunOptions options;
+  if (!flags.rate.empty()) options.rate = parse_rate(flags.rate);
+  options.lockstep = flags.ros.lockstep;
+  options.log = [](const std::string& line) { log(line); };
+  options.progress = terminal_progress();
+  options.interrupted = interrupted;
+  return options;
+}
+
+void say_warnings(const Simulation& simulation, const Executor& executor) {
+  warn_about(simulation.scenario(), simulation.map());
+  for (const std::string& warning : start_warnings(simulation, executor)) log(warning);
 }
 
 int fly(const FlyFlags& flags) {
@@ -273,60 +253,30 @@ int fly(const FlyFlags& flags) {
     throw InputError(
         "give a folder for the results with -o, or --view, --ros1, --ros2 or --record");
   }
-  check_ros_flags(flags.ros);
-  check_share_flags(flags.share);
-  RunOptions options;
-  if (!flags.rate.empty()) options.rate = parse_rate(flags.rate);
-  options.lockstep = flags.ros.lockstep;
-  options.log = [](const std::string& line) { log(line); };
-  options.progress = terminal_progress();
-  options.interrupted = interrupted;
-  if (!flags.output.empty()) check_folder(flags);
   const Executor executor(flags.threads);
+  const auto parts = parts_of(flags, executor.threads());
+  for (const auto& part : parts) part->check();
+  RunOptions options = run_options(flags);
   Scenario scenario = load_input(flags, executor);
-  // others live on the wall clock
-  const bool in_real_time = flags.ros.is_live() || is_free(flags.share, scenario);
-  if (flags.rate.empty()) options.rate = in_real_time ? 1.0 : 0.0;
+  const bool is_live =
+      std::any_of(parts.begin(), parts.end(), [&](auto& part) { return part->is_live(scenario); });
+  if (flags.rate.empty()) options.rate = is_live ? 1.0 : 0.0;
+  for (const auto& part : parts) part->prepare(scenario, options.rate);
   const auto map = scenario.open_map();
-  prepare_for_ros(flags.ros, options.rate, scenario);
   Simulation simulation(scenario, map, executor);
-  warn_about(scenario, *map);
-  for (const std::string& warning : start_warnings(simulation, executor)) log(warning);
+  say_warnings(simulation, executor);
 
   RunLoop loop(simulation, options);
-  std::optional<SharedRun> shared;
-  if (flags.share.is_asked()) shared.emplace(flags.share, simulation, loop, options.rate);
-  if (shared) {
-    resume(flags, simulation);
-    loop.add(shared->link());  // first: that it leaves is said before pictures are drawn
-  }
-  std::optional<FolderLink> folder;
-  if (!flags.output.empty()) {
-    const Existing existing = flags.force ? Existing::kReplace : Existing::kRefuse;
-    folder.emplace(FolderOptions{flags.output, existing, !flags.no_picture},
-                   simulation,
-                   loop,
-                   executor.threads());
-    loop.add(*folder);
-  }
-  TerminalLink terminal(simulation);
-  loop.add(terminal);
   catch_interrupts();
-  const std::shared_ptr<LiveServer> server = start_viewing(flags.view, map);
-  const std::unique_ptr<RosLink> ros = make_ros_link(flags.ros, simulation, server);
-  if (ros) loop.add(*ros);
-  std::optional<ViewLink> view;
-  if (server) loop.add(view.emplace(server, ros->epoch()));
+  for (const auto& part : parts) part->connect(simulation, loop);
   const RunEnd end = loop.run();
   end_progress();
-  const bool failed = ros && has_failed_recording(*ros);
-  if (!loop.has_started()) return failed ? kWrongInput : kInterrupted;
-  if (ros) say_recordings(flags.ros, *ros);
-  say_waits(loop, flags.ros);
-  if (shared) shared->say();
-  print_result(flags, simulation, loop.wall_time());
-  if (shared && !shared->fleet().fault().empty()) throw InputError(shared->fleet().fault());
-  return failed ? kWrongInput : exit_code_of(end);
+  for (const auto& part : parts) part->report(loop);
+  const bool has_failed =
+      std::any_of(parts.begin(), parts.end(), [](auto& part) { return part->has_failed(); });
+  if (loop.has_started()) print_result(flags, simulation, loop.wall_time());
+  if (has_failed) return kWrongInput;
+  return loop.has_started() ? exit_code_of(end) : kInterrupted;
 }
 
 }  // namespace
@@ -372,11 +322,10 @@ void add_fly_command(CLI::App& parent, int& exit_code) {
   app->add_flag(
       "--snapshot", flags->snapshot, "All beams of a scan from one pose, as in the paper");
   add_ros_flags(*app, flags->ros);
-  add_view_flags(*app, flags->view);
+  add_view_flags(*app, flags->ros.view);
   add_share_flags(*app, flags->share);
   app->callback([flags, &exit_code] {
     flags->ros.overwrite = flags->force;
-    flags->ros.view = flags->view.is_asked();
     exit_code = fly(*flags);
   });
 }

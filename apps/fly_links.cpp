@@ -7,6 +7,7 @@
 
 #include "apps/pictures.hpp"
 #include "apps/terminal.hpp"
+#include "pointflight/core/input_error.hpp"
 #include "pointflight/core/number_text.hpp"
 #include "pointflight/core/output_file.hpp"
 #include "pointflight/core/resources.hpp"
@@ -45,6 +46,11 @@ void TerminalLink::say(const VehicleEvent& event) {
                         simulation_.vehicle(event.vehicle).setup().name,
                         to_seconds(event.time),
                         event.words));
+}
+
+void TerminalPart::connect(Simulation& simulation, RunLoop& loop) {
+  link_ = std::make_unique<TerminalLink>(simulation);
+  loop.add(*link_);
 }
 
 FolderLink::FolderLink(const FolderOptions& options,
@@ -94,6 +100,26 @@ void FolderLink::write_timing() const {
   OutputFile file(timing_path_);
   file.write(json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
   file.commit();
+}
+
+void FolderPart::check() const {
+  const std::string& folder = options_.folder;
+  if (folder.empty()) return;
+  std::error_code error;
+  if (fs::exists(folder, error) && !fs::is_directory(folder, error)) {
+    throw InputError(fmt::format("{}: is a file; give a folder with -o", folder));
+  }
+  if (options_.existing == Existing::kRefuse && fs::is_directory(folder, error) &&
+      !fs::is_empty(folder, error)) {
+    throw InputError(
+        fmt::format("{}: is not empty; choose another folder or give --force", folder));
+  }
+}
+
+void FolderPart::connect(Simulation& simulation, RunLoop& loop) {
+  if (options_.folder.empty()) return;
+  link_ = std::make_unique<FolderLink>(options_, simulation, loop, threads_);
+  loop.add(thread_.emplace(*link_, ThreadedLink::Options{.hold = kFilesWait}));
 }
 
 }  // namespace pointflight::apps

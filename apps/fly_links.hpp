@@ -1,10 +1,15 @@
 // What a flight is to the one who started it: lines on the terminal, files in a folder.
 #pragma once
 
+#include <memory>
+#include <optional>
 #include <string>
+#include <utility>
 
+#include "apps/flight_part.hpp"
 #include "apps/run_picture.hpp"
 #include "pointflight/run/run_loop.hpp"
+#include "pointflight/run/threaded_link.hpp"
 #include "pointflight/sim/flight_recorder.hpp"
 #include "pointflight/sim/simulation.hpp"
 
@@ -27,9 +32,18 @@ class TerminalLink : public Link {
   int events_ = 0;
 };
 
+/// The terminal as a part of a flight.
+class TerminalPart : public FlightPart {
+ public:
+  void connect(Simulation& simulation, RunLoop& loop) override;
+
+ private:
+  std::unique_ptr<TerminalLink> link_;
+};
+
 /// What a run leaves.
 struct FolderOptions {
-  std::string folder;
+  std::string folder;  ///< Empty: nothing.
   Existing existing;
   bool draws = true;  ///< overview.png
 };
@@ -57,6 +71,23 @@ class FolderLink : public Link {
   std::string picture_path_, timing_path_;  ///< In the run's folder.
   RunPicture picture_;
   bool ended_ = false;
+};
+
+/// A folder of results as a part of a flight; a thread of its own writes it.
+class FolderPart : public FlightPart {
+ public:
+  /// Of a flight on `threads`.
+  FolderPart(FolderOptions options, int threads)
+      : options_(std::move(options)), threads_(threads) {}
+  /// What is wrong with the folder is said before a long search; `RunFolder` says it for good.
+  void check() const override;
+  void connect(Simulation& simulation, RunLoop& loop) override;
+
+ private:
+  FolderOptions options_;
+  int threads_;
+  std::unique_ptr<FolderLink> link_;
+  std::optional<ThreadedLink> thread_;
 };
 
 }  // namespace pointflight::apps

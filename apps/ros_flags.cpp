@@ -6,6 +6,7 @@
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
 #include <algorithm>
+#include <chrono>
 #include <filesystem>
 
 #include "apps/flags.hpp"
@@ -92,31 +93,35 @@ void add_ros_flags(CLI::App& app, RosFlags& flags) {
       ->capture_default_str();
 }
 
-void check_ros_flags(const RosFlags& flags) {
-  for (const auto& [flag, given] : {std::pair{"--lockstep", flags.lockstep > 0.0},
-                                    std::pair{"--stay", flags.stay},
-                                    std::pair{"--no-wait", flags.no_wait}}) {
-    if (given && !flags.is_live()) {
+void RosPart::check() const {
+  for (const auto& [flag, given] : {std::pair{"--lockstep", flags_.lockstep > 0.0},
+                                    std::pair{"--stay", flags_.stay},
+                                    std::pair{"--no-wait", flags_.no_wait}}) {
+    if (given && !flags_.is_live()) {
       throw InputError(fmt::format("{}: has no effect without --ros1, --ros2 or --view", flag));
     }
   }
-  if (!flags.profile.empty() && !flags.any()) {
+  if (!flags_.profile.empty() && !flags_.any()) {
     throw InputError("--profile: has no effect without --ros1, --ros2, --view or --record");
   }
 }
 
-void prepare_for_ros(const RosFlags& flags, double rate, Scenario& scenario) {
-  if (!flags.any()) return;
-  const RosProfile profile = profile_for(scenario, flags.profile);
+bool RosPart::is_live(const Scenario& /*scenario*/) const {
+  return flags_.is_live();
+}
+
+void RosPart::prepare(Scenario& scenario, double rate) {
+  if (!flags_.any()) return;
+  const RosProfile profile = profile_for(scenario, flags_.profile);
   scenario.output.odometry_rate = std::max(scenario.output.odometry_rate, odometry_rate(profile));
   const bool planned = std::any_of(
       scenario.vehicles.begin(), scenario.vehicles.end(), [](const VehicleSetup& vehicle) {
         return !vehicle.mission.waypoints.empty() || !vehicle.commands.empty();
       });
-  if (!flags.is_live()) return;
+  if (!flags_.is_live()) return;
   const bool is_open = scenario.duration <= 0.0;
-  const bool stays = rate > 0.0 && flags.lockstep <= 0.0 && !flags.no_stay;
-  if (flags.stay || (is_open && (stays || !planned))) scenario.duration = kEndless;
+  const bool stays = rate > 0.0 && flags_.lockstep <= 0.0 && !flags_.no_stay;
+  if (flags_.stay || (is_open && (stays || !planned))) scenario.duration = kEndless;
 }
 
 namespace {
@@ -154,8 +159,7 @@ void check_twice(const std::vector<std::string>& paths) {
   }
 }
 
-}  // namespace
-
+/// ROS, recordings and the viewers of `view`, if any, with everything open. Throws InputError.
 std::unique_ptr<RosLink> make_ros_link(const RosFlags& flags,
                                        const Simulation& simulation,
                                        const std::shared_ptr<LiveServer>& view) {
@@ -191,19 +195,47 @@ std::unique_ptr<RosLink> make_ros_link(const RosFlags& flags,
   return link;
 }
 
-void say_recordings(const RosFlags& flags, const RosLink& link) {
-  for (std::size_t i = 0; i < flags.records.size(); ++i) {
+}  // namespace
+
+void RosPart::connect(Simulation& simulation, RunLoop& loop) {
+  if (!flags_.any()) return;
+  server_ = start_viewing(flags_.view, simulation.shared_map());
+  ros_ = make_ros_link(flags_, simulation, server_);
+  ThreadedLink::Options options;
+  if (!flags_.is_live()) options.hold = kFilesWait;
+  loop.add(thread_.emplace(*ros_, options));
+  if (!server_) return;
+  view_ = std::make_unique<ViewLink>(server_, ros_->epoch());
+  loop.add(*view_);
+}
+
+void RosPart::say_recordings() const {
+  for (std::size_t i = 0; i < flags_.records.size(); ++i) {
     std::error_code error;
-    const std::string& path = flags.records[i];
+    const std::string& path = flags_.records[i];
     const auto size = fs::file_size(path, error);
-    if (error || link.has_failed(i)) continue;  // it was said
+    if (error || ros_->has_failed(i)) continue;  // it was said
     log(fmt::format("recorded {}, {:.1f} MB", path, 1e-6 * static_cast<double>(size)));
   }
 }
 
-bool has_failed_recording(const RosLink& link) {
-  for (std::size_t i = 0; i < link.recordings(); ++i) {
-    if (link.has_failed(i)) return true;
+void RosPart::report(const RunLoop& loop) const {
+  if (!ros_ || !loop.has_started()) return;
+  say_recordings();
+  const ScanDelays& delays = loop.scan_delays();
+  if (flags_.is_live() && delays.count() > 0) {
+    log(fmt::format("scans were ready {:.1f} ms after their end (median), {:.1f} ms at p99",
+                    1e3 * delays.below(0.5),
+                    1e3 * delays.below(0.99)));
+  }
+  if (loop.unanswered() > 0) {
+    log(fmt::format("{} scans had no command within {} s", loop.unanswered(), flags_.lockstep));
+  }
+}
+
+bool RosPart::has_failed() const {
+  for (std::size_t i = 0; ros_ && i < ros_->recordings(); ++i) {
+    if (ros_->has_failed(i)) return true;
   }
   return false;
 }

@@ -2,11 +2,17 @@
 
 #include <CLI/App.hpp>
 #include <memory>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "apps/flight_part.hpp"
+#include "apps/view_flags.hpp"
+#include "pointflight/run/threaded_link.hpp"
 #include "ros_common/ros_link.hpp"
 #include "view/live_server.hpp"
+#include "view/view_link.hpp"
 
 namespace pointflight::apps {
 
@@ -26,35 +32,43 @@ struct RosFlags {
   std::string compression = "zstd";
   bool overwrite = false;  ///< Recordings that are there already.
 
-  bool view = false;  ///< Somebody watches by the protocol of Foxglove (`ViewFlags`).
+  ViewFlags view;  ///< Somebody watches by the protocol of Foxglove.
 
   /// Others' nodes may listen and command.
   [[nodiscard]] bool has_ros() const { return ros1 || ros2; }
   /// Somebody outside may listen and command.
-  [[nodiscard]] bool is_live() const { return has_ros() || view; }
+  [[nodiscard]] bool is_live() const { return has_ros() || view.is_asked(); }
   [[nodiscard]] bool any() const { return is_live() || !records.empty(); }
 };
 
 void add_ros_flags(CLI::App& app, RosFlags& flags);
 
-/// Throws InputError for a flag that has no effect without others.
-void check_ros_flags(const RosFlags& flags);
+/// ROS, recordings and viewers as a part of a flight, as the flags ask for; a thread of its own
+/// encodes and sends.
+class RosPart : public FlightPart {
+ public:
+  explicit RosPart(RosFlags flags) : flags_(std::move(flags)) {}
+  void check() const override;
+  [[nodiscard]] bool is_live(const Scenario& scenario) const override;
+  /// Samples as often as the profile sends them. A live flight goes on until it is interrupted if
+  /// nobody has planned it, and after its mission if it is flown in real time and not told to end
+  /// (--no-stay, a duration, lockstep).
+  void prepare(Scenario& scenario, double rate) override;
+  void connect(Simulation& simulation, RunLoop& loop) override;
+  /// Which recordings were made and how large they are, how late scans left, what lockstep waited
+  /// for in vain.
+  void report(const RunLoop& loop) const override;
+  /// Some recording could not be written to its end.
+  [[nodiscard]] bool has_failed() const override;
 
-/// What a profile needs of a scenario: samples as often as it sends them. A live flight goes on
-/// until it is interrupted where nobody has planned it, and after its mission where it is flown in
-/// real time (`rate` > 0) and not told to end (--no-stay, a duration, lockstep). Throws InputError.
-void prepare_for_ros(const RosFlags& flags, double rate, Scenario& scenario);
+ private:
+  void say_recordings() const;
 
-/// ROS, recordings and viewers (those of `view`, if any) as a link, as the flags ask for, with
-/// everything open; null where they ask for none. Throws InputError.
-std::unique_ptr<RosLink> make_ros_link(const RosFlags& flags,
-                                       const Simulation& simulation,
-                                       const std::shared_ptr<LiveServer>& view);
-
-/// Says which recordings were made and how large they are.
-void say_recordings(const RosFlags& flags, const RosLink& link);
-
-/// True where some recording could not be written to its end; it was said.
-bool has_failed_recording(const RosLink& link);
+  RosFlags flags_;
+  std::shared_ptr<LiveServer> server_;
+  std::unique_ptr<RosLink> ros_;
+  std::unique_ptr<ViewLink> view_;
+  std::optional<ThreadedLink> thread_;  ///< Around `ros_`; ends before the others do.
+};
 
 }  // namespace pointflight::apps

@@ -13,7 +13,9 @@
 #include "apps/modules.hpp"
 #include "apps/terminal.hpp"
 #include "pointflight/core/input_error.hpp"
+#include "pointflight/sim/ended_run.hpp"
 #include "ros_common/ros_names.hpp"
+#include "share/common_ground.hpp"
 #include "share/vehicle_list.hpp"
 
 namespace pointflight::apps {
@@ -68,41 +70,49 @@ void add_share_flags(CLI::App& app, ShareFlags& flags) {
   app.add_flag("--share-localhost", flags.localhost, "With --share: on this machine alone");
 }
 
-void check_share_flags(const ShareFlags& flags) {
-  if (!flags.is_asked()) {
-    if (!flags.vehicles.empty()) throw InputError("--vehicles: has no effect without --share");
-    if (flags.localhost) throw InputError("--share-localhost: has no effect without --share");
+void SharePart::check() const {
+  if (!flags_.is_asked()) {
+    if (!flags_.vehicles.empty()) throw InputError("--vehicles: has no effect without --share");
+    if (flags_.localhost) throw InputError("--share-localhost: has no effect without --share");
     return;
   }
-  if (!is_ros_word(flags.name) || flags.name.size() > kNameMost) {
+  if (!is_ros_word(flags_.name) || flags_.name.size() > kNameMost) {
     throw InputError(fmt::format(
-        "--share: '{}'; letters, digits and _ only, {} at most", flags.name, kNameMost));
+        "--share: '{}'; letters, digits and _ only, {} at most", flags_.name, kNameMost));
   }
-  if (flags.vehicles.empty()) {
+  if (flags_.vehicles.empty()) {
     throw InputError("--share: say which vehicles this process flies with --vehicles 0-3");
   }
 }
 
-bool is_free(const ShareFlags& flags, const Scenario& scenario) {
-  return flags.is_asked() && share_setup_of(scenario).time == ShareTime::kFree;
+bool SharePart::is_live(const Scenario& scenario) const {
+  return flags_.is_asked() && share_setup_of(scenario).time == ShareTime::kFree;
 }
 
-SharedRun::SharedRun(const ShareFlags& flags,
-                     Simulation& simulation,
-                     const RunLoop& loop,
-                     double rate) {
-  const ShareSetup& setup = share_setup_of(simulation.scenario());
-  if (setup.time == ShareTime::kFree && rate <= 0.0) {
+void SharePart::prepare(Scenario& scenario, double rate) {
+  rate_ = rate;
+  if (is_live(scenario) && rate <= 0.0) {
     throw InputError(
         "--rate max: processes that keep time by their clocks need a rate; give one, or "
         "share: {time: lockstep} in the scenario");
   }
+}
+
+void SharePart::connect(Simulation& simulation, RunLoop& loop) {
+  if (!flags_.is_asked()) return;
+  join(simulation, loop);
+  resume(simulation);
+  loop.add(*link_);
+}
+
+void SharePart::join(Simulation& simulation, const RunLoop& loop) {
+  const ShareSetup& setup = share_setup_of(simulation.scenario());
   FleetShareOptions options;
-  options.run = flags.name;
+  options.run = flags_.name;
   options.process = process_name();
   options.id = random_id();
-  options.vehicles = vehicles_of(flags, simulation);
-  options.rate = rate;
+  options.vehicles = vehicles_of(flags_, simulation);
+  options.rate = rate_;
   options.steady = steady_ns;
   options.clock = [&loop](std::int64_t steady) {
     return loop.due_at(std::chrono::steady_clock::time_point(Duration(steady)));
@@ -110,10 +120,10 @@ SharedRun::SharedRun(const ShareFlags& flags,
   options.log = [](const std::string& line) { log(line); };
   options.interrupted = interrupted;
   ShareTransportOptions transport;
-  transport.name = flags.name;
+  transport.name = flags_.name;
   transport.lockstep = setup.time == ShareTime::kLockstep;
   transport.lease = setup.lease;
-  transport.localhost_only = flags.localhost;
+  transport.localhost_only = flags_.localhost;
   transport.ahead = setup.ahead;
   transport_ = dds_module().share(transport);
   share_ = std::make_unique<FleetShare>(simulation, *transport_, std::move(options));
@@ -121,7 +131,29 @@ SharedRun::SharedRun(const ShareFlags& flags,
   link_ = std::make_unique<ShareLink>(simulation, *share_);
 }
 
-void SharedRun::say() const {
+/// A process that was killed goes on where its trajectory ends, if the scenario says so.
+void SharePart::resume(Simulation& simulation) const {
+  const bool wanted = share_setup_of(simulation.scenario()).on_return == OnReturn::kLog;
+  if (!wanted || folder_.empty()) return;
+  const auto ended = ended_run(folder_, simulation, simulation.flying_here());
+  if (!ended) return;
+  if (!was_run_of(ended->scenario, simulation)) {
+    log(fmt::format(
+        "{}: what an earlier run left there is of another scenario; begins at the start", folder_));
+    return;
+  }
+  simulation.resume_at(ended->time, ended->skipped, ended->states);
+  log(fmt::format("{}: goes on where an earlier run's trajectories end, at {:.2f} s",
+                  folder_,
+                  to_seconds(ended->time)));
+}
+
+bool SharePart::has_failed() const {
+  return share_ != nullptr && !share_->fault().empty();
+}
+
+void SharePart::report(const RunLoop& loop) const {
+  if (share_ == nullptr) return;
   for (const FleetShare::PeerReport& peer : share_->peers()) {
     std::string line = fmt::format("{} flew {} vehicle{}",
                                    peer.process,
@@ -135,10 +167,11 @@ void SharedRun::say() const {
     line += fmt::format("; {} messages, {} lost", peer.received, peer.missing);
     log(line);
   }
-  if (share_->peers().empty()) log("nobody else took part");
+  if (share_->peers().empty() && loop.has_started()) log("nobody else took part");
   if (share_->foreign() > 0) {
     log(fmt::format("{} messages were of somebody else and left out", share_->foreign()));
   }
+  if (has_failed()) log(share_->fault());
 }
 
 }  // namespace pointflight::apps

@@ -3,8 +3,10 @@
 #include <CLI/App.hpp>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "apps/flight_part.hpp"
 #include "pointflight/run/run_loop.hpp"
 #include "share/share_link.hpp"
 
@@ -21,25 +23,30 @@ struct ShareFlags {
 
 void add_share_flags(CLI::App& app, ShareFlags& flags);
 
-/// Throws InputError for what does not go together.
-void check_share_flags(const ShareFlags& flags);
-
-/// True where processes keep time by their wall clocks.
-bool is_free(const ShareFlags& flags, const Scenario& scenario);
-
 /// A process' part in a shared run, with all that it consists of.
-class SharedRun {
+class SharePart : public FlightPart {
  public:
-  /// Joins: the simulation knows from then on which vehicles are its own. All must outlive it.
-  /// Throws InputError.
-  SharedRun(const ShareFlags& flags, Simulation& simulation, const RunLoop& loop, double rate);
-
-  [[nodiscard]] Link& link() { return *link_; }
-  [[nodiscard]] const FleetShare& fleet() const { return *share_; }
+  /// The run's results are written to `folder`, if it is not empty.
+  SharePart(ShareFlags flags, std::string folder)
+      : flags_(std::move(flags)), folder_(std::move(folder)) {}
+  void check() const override;
+  /// True if processes keep time by their wall clocks.
+  [[nodiscard]] bool is_live(const Scenario& scenario) const override;
+  void prepare(Scenario& scenario, double rate) override;
+  /// Joins: the simulation knows from then on which vehicles it flies.
+  void connect(Simulation& simulation, RunLoop& loop) override;
   /// Who flew what, how far apart clocks were, what was lost.
-  void say() const;
+  void report(const RunLoop& loop) const override;
+  /// The run was ended for all by a fault (`FleetShare::fault`).
+  [[nodiscard]] bool has_failed() const override;
 
  private:
+  void join(Simulation& simulation, const RunLoop& loop);
+  void resume(Simulation& simulation) const;
+
+  ShareFlags flags_;
+  std::string folder_;
+  double rate_ = 0.0;  ///< Simulated seconds per second.
   std::unique_ptr<ShareTransport> transport_;
   std::unique_ptr<FleetShare> share_;
   std::unique_ptr<ShareLink> link_;

@@ -92,7 +92,7 @@ def main():
                                               stdout=subprocess.PIPE, text=True)
                 seconds, said = flight(program, [scenario, *flags], environment)
                 cost[name].append(seconds)
-                found = re.search(r"scans left ([\d.]+) ms .*, ([\d.]+) ms at p99", said)
+                found = re.search(r"scans were ready ([\d.]+) ms .*, ([\d.]+) ms at p99", said)
                 if found:
                     late[name].append((float(found.group(1)), float(found.group(2))))
                 if reader:

@@ -7,9 +7,8 @@
 
 namespace pointflight {
 
-ThreadedLink::ThreadedLink(Link& link, std::size_t capacity, WhenFull when_full)
-    : link_(link), capacity_(capacity), when_full_(when_full) {
-  if (capacity == 0) throw std::invalid_argument("a queue needs room for a sample");
+ThreadedLink::ThreadedLink(Link& link, const Options& options) : link_(link), options_(options) {
+  if (options.capacity == 0) throw std::invalid_argument("a queue needs room for a sample");
 }
 
 ThreadedLink::~ThreadedLink() {
@@ -28,28 +27,35 @@ bool ThreadedLink::is_ready() {
 }
 
 void ThreadedLink::on_sample(const Sample& sample) {
-  push(sample);
+  hold(sample);
+  if (std::holds_alternative<ScanSample>(sample)) hand_on();  // it is worth a thread's waking
 }
 
 void ThreadedLink::on_step(const StepDone& step) {
-  push(step);
+  hold(step);
+  if (std::chrono::steady_clock::now() - handed_on_ >= options_.hold) hand_on();
 }
 
 void ThreadedLink::on_wait(SimTime now, Waiting why) {
   if (why == Waiting::kForLinks) return link_.on_wait(now, why);
-  push(Waited{now, why});
+  hold(Waited{now, why});
+  hand_on();
 }
 
 void ThreadedLink::on_rejected(const VehicleOrder& order, const std::string& why) {
-  push(Rejected{order, why});
+  hold(Rejected{order, why});
 }
 
 void ThreadedLink::on_reset(SimTime reached) {
-  push(Reset{reached});
+  hold(Reset{reached});
+  hand_on();
+  std::unique_lock lock(mutex_);
+  changed_.wait(lock, [this] { return (queue_.empty() && !is_busy_) || failure_; });
 }
 
 void ThreadedLink::on_seek(SimTime to) {
-  push(Seek{to});
+  hold(Seek{to});
+  hand_on();
 }
 
 std::vector<Order> ThreadedLink::take_orders() {
@@ -76,34 +82,60 @@ bool ThreadedLink::merge(const Event& earlier, Event& later) {
   return std::holds_alternative<Waited>(later) || std::holds_alternative<Reset>(later);
 }
 
+/// What an event takes of the queue's room.
+std::size_t ThreadedLink::size_of(const Event& event) {
+  constexpr std::size_t kPoints = 1000;
+  const auto* sample = std::get_if<Sample>(&event);
+  if (sample == nullptr) return 0;
+  const auto* scanned = std::get_if<ScanSample>(sample);
+  return scanned == nullptr ? 1 : 1 + scanned->scan->points.size() / kPoints;
+}
+
 /// The oldest sample goes.
 void ThreadedLink::drop_sample() {
   const auto oldest = std::find_if(queue_.begin(), queue_.end(), [](const Event& e) {
     return std::holds_alternative<Sample>(e);
   });
+  size_ -= size_of(*oldest);
   const auto next = queue_.erase(oldest);
   // what stood around it may be one now, so that the queue stays as short as it is bounded
   if (next != queue_.begin() && next != queue_.end() && merge(*std::prev(next), *next)) {
     queue_.erase(std::prev(next));
   }
-  --samples_;
   ++dropped_;
 }
 
-void ThreadedLink::push(Event event) {
-  std::unique_lock lock(mutex_);
-  if (!thread_.joinable() || failure_) return;
-  if (std::holds_alternative<Sample>(event)) {
-    if (when_full_ == WhenFull::kWait) {
-      changed_.wait(lock, [this] { return samples_ < capacity_ || failure_; });
-    } else if (samples_ >= capacity_) {
-      drop_sample();
-    }
-    ++samples_;
-  } else if (!queue_.empty() && merge(queue_.back(), event)) {
-    queue_.pop_back();
+void ThreadedLink::make_room(std::unique_lock<std::mutex>& lock, std::size_t size) {
+  const auto has_room = [&] { return size_ == 0 || size_ + size <= options_.capacity; };
+  if (options_.when_full == WhenFull::kWait) {
+    if (!has_room()) changed_.notify_all();  // of what was put there before
+    changed_.wait(lock, [&] { return has_room() || failure_; });
+  } else {
+    while (!has_room()) drop_sample();
   }
-  queue_.push_back(std::move(event));
+}
+
+void ThreadedLink::hold(Event event) {
+  if (!held_.empty() && merge(held_.back(), event)) held_.pop_back();
+  held_.push_back(std::move(event));
+}
+
+/// Puts what was held back into the queue.
+void ThreadedLink::hand_on() {
+  handed_on_ = std::chrono::steady_clock::now();
+  std::vector<Event> events = std::exchange(held_, {});
+  std::unique_lock lock(mutex_);
+  if (!thread_.joinable()) return;
+  for (Event& event : events) {
+    if (const std::size_t size = size_of(event); size > 0) {
+      make_room(lock, size);
+      size_ += size;
+    } else if (!queue_.empty() && merge(queue_.back(), event)) {
+      queue_.pop_back();
+    }
+    if (failure_) return;
+    queue_.push_back(std::move(event));
+  }
   changed_.notify_all();
 }
 
@@ -111,12 +143,15 @@ void ThreadedLink::work() {
   try {
     std::unique_lock lock(mutex_);
     for (;;) {
+      is_busy_ = false;
+      if (queue_.empty()) changed_.notify_all();
       changed_.wait(lock, [this] { return !queue_.empty() || ends_; });
       if (queue_.empty()) return;
+      is_busy_ = true;
       const Event event = std::move(queue_.front());
       queue_.pop_front();
-      samples_ -= std::holds_alternative<Sample>(event) ? 1 : 0;
-      changed_.notify_all();
+      size_ -= size_of(event);
+      if (options_.when_full == WhenFull::kWait) changed_.notify_all();
       lock.unlock();
       hand_over(event);
       auto orders = link_.take_orders();
@@ -151,13 +186,14 @@ void ThreadedLink::stop() {
 
 void ThreadedLink::rethrow() {
   const std::lock_guard lock(mutex_);
-  if (failure_) std::rethrow_exception(std::exchange(failure_, nullptr));
+  if (failure_) std::rethrow_exception(failure_);
 }
 
 void ThreadedLink::close() {
+  hand_on();
   stop();
+  rethrow();  // what it could not take whole it does not end as if it were
   link_.close();
-  rethrow();
 }
 
 }  // namespace pointflight

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <condition_variable>
 #include <cstdint>
 #include <deque>
@@ -17,16 +18,26 @@ namespace pointflight {
 /// without holding up the run. Its orders are obeyed at the end of a step after it gave them.
 class ThreadedLink : public Link {
  public:
-  /// What happens where the queue is full.
+  /// What happens if the queue is full.
   enum class WhenFull {
     kDropOldest,  ///< The oldest sample goes and is counted; for live views.
     kWait         ///< The run waits; for records.
   };
+  struct Options {
+    /// Of the queue, in samples; a scan counts as one for each 1,000 points. A sample that is
+    /// larger than the whole queue waits until the queue is empty.
+    std::size_t capacity = 1000;
+    WhenFull when_full = WhenFull::kWait;
+    /// Steps without a scan may be held back for so long by the wall clock, to be handed over
+    /// together: waking a thread for each step would cost a fast run a tenth of its time.
+    std::chrono::microseconds hold{0};
+  };
 
-  /// `link` must outlive it; `capacity` in samples, at least 1. Between the first step and `close`
-  /// all calls of `link` come from its own thread but `is_over`, `is_in_use`, `dropped`,
-  /// `wants_answer`, `objection` and `remedy_when_behind`, which must be callable from any thread.
-  ThreadedLink(Link& link, std::size_t capacity, WhenFull when_full);
+  /// `link` must outlive it; throws std::invalid_argument for a capacity of 0. Between the first
+  /// step and `close` all calls of `link` come from its own thread but `is_over`, `is_in_use`,
+  /// `dropped`, `wants_answer`, `objection` and `remedy_when_behind`, which must be callable from
+  /// any thread.
+  ThreadedLink(Link& link, const Options& options);
   ~ThreadedLink() override;
 
   void open(const RunDescription& run) override;
@@ -71,22 +82,27 @@ class ThreadedLink : public Link {
   };
   using Event = std::variant<Sample, StepDone, Waited, Rejected, Reset, Seek>;
 
+  [[nodiscard]] static std::size_t size_of(const Event& event);
   static bool merge(const Event& earlier, Event& later);
   void drop_sample();
-  void push(Event event);
+  void hold(Event event);
+  void hand_on();
+  void make_room(std::unique_lock<std::mutex>& lock, std::size_t size);
   void work();
   void hand_over(const Event& event);
   void stop();
   void rethrow();
 
   Link& link_;
-  std::size_t capacity_;
-  WhenFull when_full_;
+  Options options_;
+  std::vector<Event> held_;  ///< Not in the queue yet; of the run's thread, as the next.
+  std::chrono::steady_clock::time_point handed_on_{};
   std::thread thread_;
   mutable std::mutex mutex_;
   std::condition_variable changed_;
   std::deque<Event> queue_;
-  std::size_t samples_ = 0;  ///< In the queue.
+  std::size_t size_ = 0;  ///< Of what is in the queue, as `capacity`.
+  bool is_busy_ = false;  ///< The link is taking what was in the queue.
   std::vector<Order> orders_;
   std::uint64_t dropped_ = 0;
   bool ends_ = false;

@@ -183,9 +183,9 @@ FlightRecorder::FlightRecorder(const std::string& folder,
                                Existing existing)
     : folder_(folder, existing),
       write_scans_(simulation.scenario().output.scans),
-      shared_(simulation.ends_by_agreement() ? &simulation : nullptr),
+      is_shared_(simulation.ends_by_agreement()),
       events_(path_for("events.csv")) {
-  if (shared_ == nullptr) folder_.forget_killed();  // nobody goes on from it
+  if (!is_shared_) folder_.forget_killed();  // nobody goes on from it
   write_scenario_copy(simulation.scenario(), simulation.map(), folder_, folder_.path());
   const OutputSetup& output = simulation.scenario().output;
   events_.write(
@@ -248,7 +248,7 @@ void FlightRecorder::write(const StateSample& sample) {
                         : std::string(",");
   for (const RotorState& rotor : sample.state.rotors) row += fmt::format(",{}", rotor.speed);
   files.trajectory.write(row + "\n");
-  if (shared_ != nullptr) keep_up(files, sample.time);
+  if (is_shared_) keep_up(files, sample);
   files.tum.write(fmt::format("{} {} {} {} {} {} {} {}\n",
                               time,
                               b.p_world.x(),
@@ -261,14 +261,14 @@ void FlightRecorder::write(const StateSample& sample) {
 }
 
 /// What a process needs that goes on where this one is killed (`ended_run`).
-void FlightRecorder::keep_up(VehicleFiles& files, SimTime time) {
-  if (time < files.flushed + kFlushPeriod) return;
+void FlightRecorder::keep_up(VehicleFiles& files, const StateSample& sample) {
+  if (sample.time < files.flushed + kFlushPeriod) return;
   files.trajectory.flush();
   // the first rows of all vehicles are there: from now on this run is what one goes on from
   if (files.flushed > SimTime{}) folder_.forget_killed();
-  files.flushed = time;
-  if (skipped_ == shared_->state().skipped) return;
-  skipped_ = shared_->state().skipped;
+  files.flushed = sample.time;
+  if (skipped_ == sample.skipped) return;
+  skipped_ = sample.skipped;
   std::ofstream(path_for(kSkippedFile)) << skipped_.count() << '\n';
 }
 

@@ -48,13 +48,13 @@ class FlightRecorder : public SampleSink {
   void write(const ObstacleSample& sample);
   void write(const StatusSample& /*sample*/) {}
   [[nodiscard]] std::string partner_name(Label label) const;
-  void keep_up(VehicleFiles& files, SimTime time);
+  void keep_up(VehicleFiles& files, const StateSample& sample);
 
   RunFolder folder_;
   bool write_scans_;
   /// Of a run that other processes share: a process that is killed goes on where its trajectories
-  /// end. Null: not shared.
-  const Simulation* shared_;
+  /// end.
+  bool is_shared_;
   Duration skipped_{-1};                                 ///< As the file beside them has it.
   std::vector<std::string> names_;                       ///< Of the vehicles.
   std::vector<std::unique_ptr<VehicleFiles>> vehicles_;  ///< Null: another process' vehicle.

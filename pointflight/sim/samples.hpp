@@ -25,6 +25,7 @@ struct StateSample {
   VehicleState state;              ///< Body and rotors, without any measurement error.
   PositionCommand command;         ///< What the autopilot asked for; parts may be the state's own.
   std::optional<Contact> nearest;  ///< Nothing within `Simulation::kClearanceReach`.
+  Duration skipped{0};             ///< Of the run's time until then, jumped over.
 };
 
 /// What an odometry source on board reports at output.odometry_rate: the truth, or what it takes

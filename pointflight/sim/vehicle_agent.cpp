@@ -305,8 +305,12 @@ void VehicleAgent::sample(VehicleStatus& status,
       samples.items.push_back(
           {next,
            kStateRank,
-           StateSample{
-               number_, next, state, status.autopilot.reference, status.proximity.nearest}});
+           StateSample{number_,
+                       next,
+                       state,
+                       status.autopilot.reference,
+                       status.proximity.nearest,
+                       status.skipped}});
       ++status.next_state;
       ++status.summary.states;
     }

@@ -117,7 +117,7 @@ TEST(Playback, ARunsFolderGivesTheMessagesOfTheRun) {
   // once more, behind a thread of its own
   Messages again;
   const auto second = keeping(run.description(), again);
-  ThreadedLink threaded(*second, 8, ThreadedLink::WhenFull::kWait);
+  ThreadedLink threaded(*second, {.capacity = 8});
   Link* const other[] = {&threaded};
   play(run, other, {});
   EXPECT_EQ(again["/two/mid360/points"], flown["/two/mid360/points"]);

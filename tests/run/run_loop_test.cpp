@@ -240,14 +240,14 @@ TEST(ThreadedLink, HandsOverEverythingInOrder) {
   testing::run(short_run(), stepped, executor);
   Simulation simulation(short_run(), hall(), executor);
   Probe slow;
-  ThreadedLink link(slow, 3, ThreadedLink::WhenFull::kWait);
+  ThreadedLink link(slow, {.capacity = 3, .hold = std::chrono::milliseconds(1)});
   RunLoop loop(simulation, {});
   loop.add(link);
   loop.run();
   EXPECT_EQ(slow.bytes.hash(), stepped.hash());
   EXPECT_EQ(slow.calls, "open close");
   EXPECT_EQ(loop.dropped(), 0u);
-  EXPECT_THROW(ThreadedLink(slow, 0, ThreadedLink::WhenFull::kWait), std::invalid_argument);
+  EXPECT_THROW(ThreadedLink(slow, {.capacity = 0}), std::invalid_argument);
 }
 
 TEST(ThreadedLink, DropsTheOldestForThoseWhoAreSlow) {
@@ -263,7 +263,7 @@ TEST(ThreadedLink, DropsTheOldestForThoseWhoAreSlow) {
     std::atomic<bool> go = false;
     int taken = 0;
   } stuck;
-  ThreadedLink link(stuck, 10, ThreadedLink::WhenFull::kDropOldest);
+  ThreadedLink link(stuck, {.capacity = 10, .when_full = ThreadedLink::WhenFull::kDropOldest});
   class Release : public Probe {
    public:
     explicit Release(Stuck& stuck) : stuck_(stuck) {}
@@ -290,7 +290,7 @@ TEST(ThreadedLink, WhatItsLinkThrowsEndsTheRun) {
   Simulation simulation(short_run(), hall(), executor);
   Probe failing;
   failing.failing = true;
-  ThreadedLink link(failing, 4, ThreadedLink::WhenFull::kWait);
+  ThreadedLink link(failing, {.capacity = 4});
   RunLoop loop(simulation, {});
   loop.add(link);
   EXPECT_THROW(loop.run(), std::runtime_error);
