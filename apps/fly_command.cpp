@@ -253,10 +253,10 @@ int fly(const FlyFlags& flags) {
     throw InputError(
         "give a folder for the results with -o, or --view, --ros1, --ros2 or --record");
   }
+  RunOptions options = run_options(flags);
   const Executor executor(flags.threads);
   const auto parts = parts_of(flags, executor.threads());
   for (const auto& part : parts) part->check();
-  RunOptions options = run_options(flags);
   Scenario scenario = load_input(flags, executor);
   const bool is_live =
       std::any_of(parts.begin(), parts.end(), [&](auto& part) { return part->is_live(scenario); });

@@ -33,7 +33,7 @@ struct Place {
 
 /// The centres of a leaf's surfels in the packet's frame, and which of them the packet may meet.
 struct InFrustum {  // NOLINT(cppcoreguidelines-pro-type-member-init): all is written
-  F8 u, v, depth;  ///< From the apex, m.
+  F8 u, v, depth;   ///< From the apex, m.
   std::uint32_t surfels = 0;
 };
 

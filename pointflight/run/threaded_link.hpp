@@ -23,11 +23,12 @@ class ThreadedLink : public Link {
     kDropOldest,  ///< The oldest sample goes and is counted; for live views.
     kWait         ///< The run waits; for records.
   };
+  /// Of the queue.
   struct Options {
-    /// Of the queue, in samples; a scan counts as one for each 1,000 points. A sample that is
+    /// In samples; a scan counts as one for each 1,000 points. A sample that is
     /// larger than the whole queue waits until the queue is empty.
     std::size_t capacity = 1000;
-    WhenFull when_full = WhenFull::kWait;
+    WhenFull when_full = WhenFull::kWait;  ///< Nothing is lost by default.
     /// Steps without a scan may be held back for so long by the wall clock, to be handed over
     /// together: waking a thread for each step would cost a fast run a tenth of its time.
     std::chrono::microseconds hold{0};
@@ -68,7 +69,7 @@ class ThreadedLink : public Link {
  private:
   struct Waited {
     SimTime now;
-    Waiting why;
+    Waiting why = Waiting::kPaused;
   };
   struct Rejected {
     VehicleOrder order;

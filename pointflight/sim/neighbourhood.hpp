@@ -9,11 +9,11 @@ namespace pointflight {
 
 /// What vehicles fly among.
 struct Neighbourhood {
-  const Fleet& fleet;
-  const SurfelMap& map;
-  const Obstacles& obstacles;
-  Duration step{0};    ///< Of the physics.
-  double reach = 0.0;  ///< Distances are known up to here, m.
+  const Fleet& fleet;          ///< Each other.
+  const SurfelMap& map;        ///< What stands still.
+  const Obstacles& obstacles;  ///< What moves by itself.
+  Duration step{0};            ///< Of the physics.
+  double reach = 0.0;          ///< Distances are known up to here, m.
 };
 
 /// Finds what is near each hull that flies here, now that everybody is where they are, and what it

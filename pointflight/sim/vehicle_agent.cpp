@@ -302,15 +302,14 @@ void VehicleAgent::sample(VehicleStatus& status,
     if (next >= end) return;
     const VehicleState state = state_after(status, to_seconds(next - now));
     if (state_schedule_.at(status.next_state) == next) {
-      samples.items.push_back(
-          {next,
-           kStateRank,
-           StateSample{number_,
-                       next,
-                       state,
-                       status.autopilot.reference,
-                       status.proximity.nearest,
-                       status.skipped}});
+      samples.items.push_back({next,
+                               kStateRank,
+                               StateSample{number_,
+                                           next,
+                                           state,
+                                           status.autopilot.reference,
+                                           status.proximity.nearest,
+                                           status.skipped}});
       ++status.next_state;
       ++status.summary.states;
     }

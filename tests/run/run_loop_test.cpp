@@ -5,6 +5,7 @@
 
 #include <atomic>
 #include <stdexcept>
+#include <thread>
 
 #include "pointflight/run/threaded_link.hpp"
 #include "tests/sim/runs.hpp"
@@ -294,6 +295,103 @@ TEST(ThreadedLink, WhatItsLinkThrowsEndsTheRun) {
   RunLoop loop(simulation, {});
   loop.add(link);
   EXPECT_THROW(loop.run(), std::runtime_error);
+}
+
+/// A state of the first vehicle.
+StateSample state_at(int ms) {
+  StateSample sample;
+  sample.time = SimTime(std::chrono::milliseconds(ms));
+  return sample;
+}
+
+TEST(ThreadedLink, DoesNotEndAsWholeWhatFailed) {
+  Probe failing;
+  failing.failing = true;
+  ThreadedLink link(failing, {.hold = std::chrono::hours(1)});
+  link.open({});
+  ASSERT_TRUE(link.is_ready());
+  link.on_sample(state_at(0));
+  EXPECT_THROW(link.close(), std::runtime_error);
+  EXPECT_EQ(failing.calls, "open ") << "its files must not appear";
+}
+
+TEST(ThreadedLink, AResetWaitsUntilAllIsTaken) {
+  class Slow : public Probe {
+   public:
+    void on_sample(const Sample& sample) override {
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      Probe::on_sample(sample);
+      ++taken;
+    }
+    std::atomic<int> taken = 0;
+  } slow;
+  ThreadedLink link(slow, {});
+  link.open({});
+  ASSERT_TRUE(link.is_ready());
+  for (int ms = 0; ms < 20; ++ms) {
+    link.on_sample(state_at(ms));
+    link.on_step({SimTime(std::chrono::milliseconds(ms + 1)), 0.0, 0});
+  }
+  const SimTime reached{std::chrono::milliseconds(20)};
+  link.on_reset(reached);
+  EXPECT_EQ(slow.taken, 20);
+  EXPECT_EQ(slow.calls, "open reset ");
+  EXPECT_EQ(slow.reset_at, reached);
+  link.close();
+}
+
+TEST(ThreadedLink, HoldsStepsBackUntilAScan) {
+  class Counting : public Probe {
+   public:
+    void on_sample(const Sample& sample) override {
+      Probe::on_sample(sample);
+      ++taken;
+    }
+    std::atomic<int> taken = 0;
+  } counting;
+  ThreadedLink link(counting, {.hold = std::chrono::hours(1)});
+  link.open({});
+  ASSERT_TRUE(link.is_ready());
+  const auto step = [&](int ms) {
+    link.on_sample(state_at(ms));
+    link.on_step({SimTime(std::chrono::milliseconds(ms + 1)), 0.0, 0});
+  };
+  step(0);  // the first is handed over: nothing was before
+  for (int ms = 1; ms < 10; ++ms) step(ms);
+  EXPECT_LE(counting.taken, 1);
+  auto scan = std::make_shared<Scan>();
+  scan->end = SimTime(std::chrono::milliseconds(10));
+  link.on_sample(ScanSample{std::move(scan), PoseTrack({{SimTime{}, Pose{}}})});
+  link.on_step({SimTime(std::chrono::milliseconds(10)), 0.0, 1});
+  while (counting.taken < 11) std::this_thread::yield();  // else the test does not end
+  step(10);
+  link.close();
+  EXPECT_EQ(counting.taken, 12) << "what was held back at the end";
+}
+
+TEST(ThreadedLink, LockstepWaitsForItsAnswers) {
+  const Executor executor(2);
+  class Planner : public Probe {
+   public:
+    [[nodiscard]] bool wants_answer(const Sample& sample) const override {
+      return std::holds_alternative<ScanSample>(sample);
+    }
+    std::vector<Order> take_orders() override {
+      if (scans == answered) return {};
+      answered = scans;
+      return {VehicleOrder{0, HoverCommand{}, true}};
+    }
+    int answered = 0;
+  } planner;
+  ThreadedLink link(planner, {.hold = std::chrono::hours(1)});
+  Simulation simulation(short_run(), hall(), executor);
+  RunOptions options;
+  options.lockstep = 60.0;
+  RunLoop loop(simulation, options);
+  loop.add(link);
+  loop.run();
+  EXPECT_EQ(loop.unanswered(), 0u);
+  EXPECT_EQ(planner.answered, 5);
 }
 
 TEST(ScanDelays, AreCountedInBins) {
