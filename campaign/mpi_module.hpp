@@ -16,7 +16,7 @@ struct MpiModule {
   ///@}
   /// Waits until all have come here, without keeping a core busy.
   void (*meet)();
-  /// Deals out 0, 1, 2, ... to whoever asks; each number once in the job. Between two `meet`.
+  /// Returns the next number of 0, 1, 2, ...: each once per job, between two calls of `meet`.
   std::size_t (*next)();
   /// Leaves the job.
   void (*end)();

@@ -23,7 +23,7 @@ struct Rate {
 /// Throws nothing; 0 of 0 is anything from 0 to 1.
 Rate wilson(std::size_t count, std::size_t of);
 
-/// What can be counted of runs.
+/// Outcomes of runs whose rates are reported.
 enum class Counted {
   kCompleted,  ///< Exit code 0.
   kCollision,  ///< With a collision at least, of runs that tell.

@@ -75,7 +75,7 @@ struct Plan {
 /// Throws InputError where there would be more than ten million flights.
 Plan plan_of(const Study& study);
 
-/// Values that a draw can give, its ends or all of its choices.
+/// The extreme values of a draw, or all of its choices.
 std::vector<std::string> ends_of(const StudyDraw& draw);
 
 /// A scenario's text with other values of some keys. Where a key's sections are missing they are

@@ -18,8 +18,8 @@ struct RecordingRequest {
 /// something is there and shall not be overwritten.
 void check_recording(const RecordingRequest& request);
 
-/// A recording that ends by itself where it cannot be written (a full disk): from then on it takes
-/// nothing, and everything else goes on. What was written until then stays as `path`.active.
+/// A recording that stops at a write error (a full disk) while the run continues. What was written
+/// until then stays as `path`.active.
 class Recording : public Outlet {
  public:
   /// `lock`: a descriptor to close with the recording, or -1.

@@ -42,7 +42,7 @@ msg::Odometry odometry_of(const RigidBodyState& state,
 /// Fills in the covariances of pose and twist: diagonal; rates are the gyroscope's, without one.
 void add_variance(msg::Odometry& odometry, const EstimateVariance& variance);
 
-/// How accelerations leave.
+/// Conventions for published accelerations.
 struct ImuCustoms {
   bool in_g = false;          ///< Units of 9.80665 m/s^2, as Livox' drivers send them.
   bool gravity_down = false;  ///< a + g instead of a - g: MARSIM.

@@ -26,7 +26,7 @@ namespace pointflight {
 class Output;
 class OutputStream;
 
-/// How the messages of a row come about: `per_sample` or `made_by`.
+/// How a row makes its messages: `per_sample` or `made_by`.
 struct OutputMaker {
   MessageType (*type)() = nullptr;  ///< In both ROSes.
   /// The stream outlives what makes its messages.

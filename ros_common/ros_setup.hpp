@@ -28,7 +28,7 @@ enum class CommandPackage { kQuadrotorMsgs, kMarsQuadrotorMsgs };
 
 /// A message that comes in.
 struct RosInput {
-  std::string kind;                 ///< What it is taken for: ros_common/profile.cpp has the list.
+  std::string kind;                 ///< Kind of command: a row of ros_common/inputs.cpp.
   std::string topic;                ///< "-": not read.
   RotorUnit unit = RotorUnit::kSi;  ///< Of rotor speeds.
   VelocityFrame frame = VelocityFrame::kWorld;  ///< Of velocities that name no frame.

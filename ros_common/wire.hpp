@@ -57,7 +57,7 @@ struct Service {
   ///@}
 };
 
-/// A message that came in, in the sender's own words.
+/// A received message, with its sender's definition.
 struct Received {
   const std::byte* data = nullptr;  ///< Valid during the callback.
   std::size_t size = 0;             ///< Bytes.

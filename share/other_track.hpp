@@ -33,7 +33,7 @@ double extrapolation_bound(const VehicleSettings& vehicle, double radius, double
 /// States of a vehicle of another process as they come in, some late, some never.
 class OtherTrack {
  public:
-  /// A newer one than all before; older ones are put into their place while it matters.
+  /// Inserts a state in order of time; states too old to matter are dropped.
   void add(SimTime time, const RigidBodyState& state);
   /// The same for what is past altogether: nothing is forgotten, times ascend or it is left out.
   void add_past(SimTime time, const RigidBodyState& state);

@@ -12,7 +12,7 @@ namespace pointflight {
 
 /// What goes between processes that share a run, by how it has to arrive.
 enum class ShareChannel : std::uint8_t {
-  kCrew,    ///< Introductions: reliably, the last one also to whoever comes later.
+  kCrew,    ///< Introductions: reliable; the last one is kept for late joiners.
   kStates,  ///< States: the newest counts; in lockstep reliably and all.
   kClock,   ///< Clocks: late is useless.
   kPast,    ///< Pasts: reliably.

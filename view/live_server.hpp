@@ -1,4 +1,4 @@
-// One port for all who look: HTTP for the page and the map, a WebSocket that speaks Foxglove's
+// One port for all viewers: HTTP for the page and the map, a WebSocket that speaks Foxglove's
 // protocol for the run.
 #pragma once
 
@@ -41,7 +41,7 @@ struct LiveServerOptions {
 /// Serves on a thread of its own. A client that is slow loses the oldest data that waits for it; no
 /// call here waits for one.
 ///
-/// Who may what: the Host of a request has to be an address or localhost (no name that a page
+/// Permissions: the Host of a request must be an address or localhost (no name that a page
 /// elsewhere could have pointed here); the Origin of a WebSocket has to be the server's own, none
 /// (native clients), or Foxglove's page, which may only watch. Commands want `control` and, from
 /// the own page, the token in its address.

@@ -34,7 +34,7 @@ class OutputFile {
   void write(std::string_view text);
   /// Replaces bytes written before: a header that counts what came after it.
   void write_at(std::size_t offset, std::span<const std::byte> bytes);
-  /// What was written so far is in the partial file then, also if the program is killed.
+  /// Flushes to the partial file: what was written survives if the program is killed.
   void flush();
   /// All was written: gives the file its name, in place of one that was there.
   void commit();

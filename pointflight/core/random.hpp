@@ -28,7 +28,7 @@ enum class StreamId : std::uint32_t {
   kLidarAngle = 18,       ///< of beams' directions; entity and index as above
   kImuGyroFlicker = 19,   ///< index: (sample * processes + process) * 3 + axis
   kImuAccelFlicker = 20,  ///< the same
-  kImuTurnOn = 21,        ///< what an IMU has for a whole run; index: what * 3 + axis
+  kImuTurnOn = 21,        ///< IMU errors that are constant over a run; index: what * 3 + axis
   kImuClock = 22,         ///< index: sample
   kVibration = 23,        ///< angles that rotors start from; index: rotor
   kPatternPhase = 24,     ///< which scan of a pattern that does not repeat a run starts with

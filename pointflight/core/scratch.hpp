@@ -103,7 +103,7 @@ class ScratchArray {
   /// All of them.
   [[nodiscard]] std::span<T> span() const { return {data(), size_}; }
 
-  /// Forgets the values from `size` on; their room is kept.
+  /// Truncates to `size` values; the capacity is kept.
   void shrink(std::size_t size) { size_ = std::min(size, size_); }
 
   /// See ScratchBlock.

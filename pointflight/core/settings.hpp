@@ -24,7 +24,7 @@ struct Named {
   std::string_view name;  ///< In files.
 };
 
-/// What files call a value; empty where the table does not have it.
+/// The name of a value in files; empty if the table does not contain the value.
 template <class Value, std::size_t N>
 constexpr std::string_view name_in(const Named<Value> (&table)[N], Value value) {
   for (const Named<Value>& row : table) {
@@ -103,8 +103,7 @@ class SettingsVisitor {
     value = name == none ? std::nullopt : std::optional<Choice<Row>>(name);
   }
 
-  /// A key that other programs read: whatever the file has there is no mistake, and is kept as
-  /// YAML.
+  /// A key that belongs to another program: any content is accepted and kept as YAML.
   virtual void leave_as_is(std::string_view /*name*/, std::string& /*yaml*/) {}
 
   /// Calls `describe_items(visitor, section)` one level down.
@@ -206,8 +205,8 @@ class SettingsReader : public SettingsVisitor {
   std::map<std::string, int> lines_;
 };
 
-/// Holds settings that were filled in by a program to what a file may say: throws InputError at the
-/// first number that is not finite or out of its range, and at unknown words.
+/// Applies the file reader's checks to settings that a program has filled in: throws InputError at
+/// the first number that is not finite or out of range, and at unknown words.
 class SettingsChecker : public SettingsVisitor {
  public:
   /// `name` stands for the path in messages.

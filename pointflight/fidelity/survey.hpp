@@ -24,8 +24,8 @@ struct SurveyShot {
 
 /// A finished survey.
 struct Survey {
-  std::vector<TimedPose> walk;   ///< T_world_sensor in truth, one more than scans.
-  std::vector<TimedPose> poses;  ///< What the surveyor believes, of the scans' starts.
+  std::vector<TimedPose> walk;                 ///< T_world_sensor in truth, one more than scans.
+  std::vector<TimedPose> poses;                ///< Estimated poses at the scans' starts.
   std::vector<std::vector<SurveyShot>> scans;  ///< Each in the order of firing.
 };
 

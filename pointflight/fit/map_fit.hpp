@@ -13,7 +13,7 @@
 
 namespace pointflight {
 
-/// How evidence changes a map.
+/// Parameters of a fit.
 struct FitOptions {
   double right = 0.1;        ///< A return is right so near, m.
   double exponent = 0.5;     ///< Pass 1: sizes times (hits / (hits + passes))^exponent.

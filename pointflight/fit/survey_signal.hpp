@@ -23,7 +23,7 @@ struct SignalOptions {
   double right = 0.1;  ///< Returns count that the map renders so near, m.
 };
 
-/// What came of it.
+/// The result of painting a map.
 struct SignalReport {
   double limit = 0.0;                      ///< As above: given, or found.
   std::uint64_t returns = 0;               ///< Of the survey that carry a signal.

@@ -35,8 +35,8 @@ struct Assembly {
   std::vector<Propeller> propellers;  ///< In any order.
 };
 
-/// First meeting of a ray (the assembly's frame, unit `direction`) with any part at an instant. A
-/// part that the ray starts in is not met.
+/// The first intersection of a ray (in the assembly's frame, unit `direction`) with any part at an
+/// instant. A part that the ray starts in is not hit.
 std::optional<SolidHit> intersect(const Assembly& assembly,
                                   const Vector3d& origin,
                                   const Vector3d& direction,

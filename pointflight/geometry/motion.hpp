@@ -28,7 +28,7 @@ class PoseTrack {
   /// Throws std::invalid_argument.
   explicit PoseTrack(std::vector<TimedPose> records, bool repeats = false);
 
-  /// The same motion, of something that sits on what moves.
+  /// The track of a frame that is rigidly mounted on this one.
   [[nodiscard]] PoseTrack with_mount(const Pose& T_body_sensor) const;
 
   /// T_world_body, or T_world_sensor with a mount. Callable from several threads.
@@ -60,7 +60,7 @@ struct StraightMotion {
   [[nodiscard]] Pose at(SimTime time) const;  ///< T_world_body
 };
 
-/// Round and round along straight legs at constant speed, each with a heading of its own.
+/// A closed loop of straight legs at constant speed, each with a heading of its own.
 struct RoundMotion {
   /// From one corner to the next.
   struct Leg {

@@ -75,7 +75,7 @@ struct MeshSampling {
   double unit = 1.0;                        ///< The metres of one unit of the mesh's coordinates.
 };
 
-/// A cloud or mesh that can be read as often as it takes.
+/// A cloud or mesh that can be opened repeatedly.
 class CloudSource {
  public:
   /// A file. `format` is an extension ("las") that counts instead of the path's own.
@@ -83,9 +83,9 @@ class CloudSource {
   /// The same, for literals.
   CloudSource(const char* path) : CloudSource(std::string(path)) {}  // NOLINT
 
-  /// What comes through a pipe or a socket until its end. It is kept in a file without a name in
-  /// `folder` (empty: that of temporary files), for an import may read it twice. Without a `format`
-  /// the first bytes tell it; meshes are not read from pipes. Throws InputError.
+  /// Reads a pipe or socket to its end into an unnamed file in `folder` (empty: the folder of
+  /// temporary files), because an import may read it twice. Without a `format` the first bytes
+  /// decide; meshes are not read from pipes. Throws InputError.
   static CloudSource from_stream(int descriptor,
                                  const std::string& format,
                                  const std::string& folder,

@@ -30,7 +30,7 @@ std::unique_ptr<CloudReader> open_xyz(MappedFile file);
 /// ASPRS LAS 1.0 to 1.4, uncompressed, point formats 0 to 10.
 std::unique_ptr<CloudReader> open_las(MappedFile file);
 
-/// What the import of a mesh may use; a damaged file can make it want without end.
+/// Resource limits for the import of a mesh: a damaged file can demand unbounded memory or time.
 struct MeshLimits {
   double cpu_seconds;        ///< Of the process that reads it.
   std::size_t memory_bytes;  ///< Of its address space, beside what it shares.

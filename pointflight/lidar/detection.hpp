@@ -1,4 +1,4 @@
-// Which beams come back: a link budget by the ranges that a sensor's sheet states.
+// Which beams are detected: a link budget calibrated to the ranges that a data sheet states.
 #pragma once
 
 #include <cstddef>

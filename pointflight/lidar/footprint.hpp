@@ -22,9 +22,9 @@ struct WideBeams {
   std::span<const Vector3f> across;
 };
 
-/// A beam's cross-section: light falls off as an elliptical Gaussian and ends where its density is
-/// 1 / e^2 of the middle's (2 sigma; sigma = full angle at half maximum / 2.3548), the beam's
-/// radius in optics.
+/// A beam's cross-section: an elliptical Gaussian, truncated where its density falls to 1 / e^2 of
+/// the centre's (2 sigma; sigma = full angle at half maximum / 2.3548), which optics calls the
+/// beam's radius.
 ///
 /// Eight sub-rays tell whether a beam meets one surface: its middle and a heptagon around its rim.
 /// Where they do, they are the beam. Where they do not (ranges off a plane by more than 0.2 m, some

@@ -129,8 +129,8 @@ struct RangeNoiseSettings {
   double range_step = 0.0;            ///< m: ranges are whole multiples; 0: they are not rounded.
 };
 
-/// Figures of the optics. The divergence says how many drops of rain a beam meets; mixed pixels are
-/// not modelled yet. The wavelength is shown by `lidar show` and not used.
+/// The optics. The divergence sets the footprint of a beam (mixed pixels, echoes) and how many
+/// raindrops it hits. The wavelength is shown by `lidar show` and not used.
 struct OpticsSettings {
   double wavelength_nm = 0.0;              ///< Not used yet.
   double divergence_horizontal_deg = 0.0;  ///< Full angle at half maximum.

@@ -1,4 +1,4 @@
-// Sensors as their makers describe them: files that users have beside ours.
+// Descriptions of sensors in vendors' own formats.
 #pragma once
 
 #include <string>

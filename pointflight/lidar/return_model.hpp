@@ -84,7 +84,8 @@ class ReturnModel {
   [[nodiscard]] double reflectivity(const Hit& hit) const;
   /// The one echo of a beam that is a line.
   [[nodiscard]] Echo echo_of(const Hit& hit) const;
-  /// False where an echo comes back as often, within 0.05, with `less` and `more` times its light.
+  /// True if scaling the echo's energy by `less` or `more` changes its probability of detection by
+  /// more than 0.05.
   [[nodiscard]] bool may_go_either_way(const Echo& echo, double less, double more) const;
   /// What the sensor reports of a beam's echoes, the nearest first, whose ranges are what it
   /// measures: at most `most_returns`, the strongest first. None where nothing comes back, or from

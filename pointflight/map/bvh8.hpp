@@ -31,7 +31,7 @@ inline constexpr std::size_t kLeafPadding = 8;
 /// Half width, in standard deviations, of the ellipsoid outside which a surfel has no weight.
 inline constexpr float kSupport = 3.7f;
 
-/// One surfel on its way into the tree.
+/// Input of the tree builder: one surfel.
 struct BuildSurfel {
   std::uint64_t morton = 0;  ///< voxel_key of its voxel; the input ascends by it, at most eight
                              ///< surfels alike.

@@ -98,7 +98,7 @@ class Surfels {
     return voxel;
   }
 
-  /// These have been used for the last time.
+  /// Releases a range that will not be read again.
   void release(const Range& range) const { input_.surfels.release(range.begin, range.end); }
 
   /// The second part begins with the first surfel whose key has the range's highest differing bit

@@ -35,7 +35,7 @@ class KnownSpace {
   /// Of sections in a map file.
   static constexpr const char* kSection = "known_space";
 
-  /// A view of a section's bytes, which must outlive it; nothing where they are none.
+  /// A view of a section's bytes, which must outlive it; nullopt if they are malformed.
   static std::optional<KnownSpace> from_section(std::span<const std::byte> section);
 
   /// True where the survey saw the point's cell; false outside the grid.

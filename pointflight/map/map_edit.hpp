@@ -13,14 +13,14 @@
 
 namespace pointflight {
 
-/// Makes maps of maps, surfel by surfel. Surfels that are not moved stay what they are, to the bit;
-/// a turn rounds their centres anew to r / 64 and their axes to 0.3 degrees.
+/// A map edited surfel by surfel. Surfels that are not moved stay identical to the bit; a rotation
+/// rounds their centres again to r / 64 and their axes to 0.3 degrees.
 struct EditedMap {
   Bvh8 tree;                         ///< For `write_map`.
   MapDescription description;        ///< For `write_map`.
   std::uint64_t surfels_before = 0;  ///< Of all maps together.
   std::uint64_t surfels = 0;         ///< That are left.
-  std::uint64_t doubles = 0;         ///< Left out by `merge_maps`: another map has that place.
+  std::uint64_t doubles = 0;         ///< Dropped by `merge_maps`: an earlier map covers the cell.
 };
 
 /// How an edit is done.

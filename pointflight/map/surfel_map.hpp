@@ -60,7 +60,7 @@ void for_each_surfel(std::span<const SurfelWord> words, const Visit& visit) {
 class SurfelMap {
  public:
   /// Opens in milliseconds: header, section table and lengths are checked, the body is not read.
-  /// Throws InputError where the file is not a map of this version.
+  /// Throws InputError if the file is not a map of a supported version (1 or 2).
   static std::shared_ptr<const SurfelMap> open(const std::string& path);
 
   /// Bytes of a whole file; `name` stands for the path in messages.
@@ -74,7 +74,7 @@ class SurfelMap {
   [[nodiscard]] const Aabb& bounds_world() const { return bounds_; }  ///< Of the surfel centres.
   /// Constants of the hit rule that it was made for.
   [[nodiscard]] const RenderModel& model() const { return model_; }
-  /// What decoding its surfels takes.
+  /// The constants that its surfels are decoded with.
   [[nodiscard]] const SurfelScale& scale() const { return scale_; }
   /// As its header says.
   [[nodiscard]] std::uint64_t surfel_count() const { return surfel_count_; }

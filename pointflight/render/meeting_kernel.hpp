@@ -15,7 +15,7 @@ struct MetSurfel {
   std::uint32_t word;   ///< Index in `SurfelMap::words()`.
 };
 
-/// A ray's whole way, by the hit rule.
+/// Everything along one ray, by the hit rule.
 struct RayMeetings {
   std::uint32_t ray;               ///< Index in `rays`.
   float first;                     ///< Where the surface begins; negative where there is none.

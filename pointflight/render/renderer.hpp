@@ -15,7 +15,7 @@
 
 namespace pointflight {
 
-/// What is always there to see: the map. Bodies that move come with each batch of rays.
+/// The static scene: the map. Moving bodies come with each batch of rays.
 struct Scene {
   std::shared_ptr<const SurfelMap> map;  ///< Never null.
 };

@@ -23,8 +23,8 @@ enum class Waiting {
   kForAnswer,  ///< In lockstep, for a command; about every 0.2 ms.
 };
 
-/// What somebody outside is to a run: a ROS, a recording, files, a page, a flight controller,
-/// another process. Samples come in, orders go out. All calls come from the thread of the run's
+/// An external party to a run: ROS, a recording, files, a web page, a flight controller, another
+/// process. Samples come in, orders go out. All calls come from the thread of the run's
 /// loop (`RunLoop`), in this order: `open`, `is_ready` until it is, then for each step samples,
 /// `on_step` and `take_orders`, at last `close`. A link with a thread of its own: `ThreadedLink`.
 class Link : public SampleSink {
@@ -60,7 +60,7 @@ class Link : public SampleSink {
   /// The run has ended: nothing comes any more.
   virtual void close() {}
 
-  /// True once the run has to end for its sake: an interrupt, a master that is gone.
+  /// True once this link requires the run to end (an interrupt, a ROS master that is gone).
   [[nodiscard]] virtual bool is_over() const { return false; }
   /// False once nothing of the run reaches anybody through it: a recording that failed. A run ends
   /// where no link is in use any more.
@@ -68,7 +68,7 @@ class Link : public SampleSink {
   /// What users can do, besides making it cheaper, about a run that falls behind the wall clock;
   /// empty: go at a lower rate.
   [[nodiscard]] virtual std::string remedy_when_behind() const { return {}; }
-  /// Samples, or messages made of them, that somebody was too slow for.
+  /// How many samples or messages were dropped because a consumer was too slow.
   [[nodiscard]] virtual std::uint64_t dropped() const { return 0; }
 };
 

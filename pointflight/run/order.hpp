@@ -34,7 +34,7 @@ struct SeekOrder {
 struct SkipOrder {
   SimTime to;  ///< Of the run; later than it is.
 };
-/// Of a shared run that lags a little behind: from here on each instant is due so much earlier.
+/// Of a shared run that lags a little: from now on every instant is due earlier by `by`.
 struct HurryOrder {
   Duration by{0};  ///< Of the wall clock.
 };

@@ -13,7 +13,7 @@ namespace pointflight {
 /// over so far, ns.
 inline constexpr const char* kSkippedFile = "skipped.txt";
 
-/// Where the trajectories stop of a run that was killed while other processes shared it.
+/// The last states logged by a process of a shared run that was killed, from which it can resume.
 struct EndedRun {
   Scenario scenario;                           ///< As it was flown.
   SimTime time;                                ///< Of the states.

@@ -1,5 +1,5 @@
-// What a run says about itself: samples that stand alone, so that they can be kept, queued, stored
-// and sent.
+// The samples that a run emits. Each is self-contained, so that it can be kept, queued, stored and
+// sent.
 #pragma once
 
 #include <cstdint>
@@ -47,7 +47,8 @@ struct ScanSample {
   PoseTrack T_world_sensor;          ///< Where the sensor was from its start to its end.
 };
 
-/// What a sensor of a kind that a program has added measured (`SensorKind`).
+/// A measurement of any other sensor: barometer, GNSS and so on, or a kind that a program has added
+/// (`SensorKind`).
 struct Measurement {
   std::uint32_t vehicle = 0;   ///< Number in the fleet, from 0.
   std::uint32_t sensor = 0;    ///< Number in `VehicleAgent::sensors`.

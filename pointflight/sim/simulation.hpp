@@ -78,10 +78,9 @@ class Simulation {
   /// What the sources of the others say of how well they know them.
   [[nodiscard]] std::vector<SourceReport> source_reports() const;
 
-  /// Goes on at a later time, as if none had passed for the vehicles: they are where they were,
-  /// what they were told lasts as long as it would have, sensors begin with their next measurement.
-  /// Obstacles are where they are then. Throws std::invalid_argument where it is no whole number of
-  /// steps, or earlier.
+  /// Jumps ahead in time without moving the vehicles: their commands last as long as they would
+  /// have, and their sensors start with the next measurement. Obstacles are where they are at that
+  /// time. Throws std::invalid_argument if `time` is not a whole number of steps or is earlier.
   void skip_to(SimTime time);
 
   /// Before the first step: as if the run had come to `time`, of which `skipped` was jumped over,

@@ -5,7 +5,7 @@
 
 namespace pointflight {
 
-/// How far a battery is.
+/// The state of charge of a battery.
 struct BatteryState {
   double used = 0.0;     ///< Ah
   double voltage = 0.0;  ///< Under the present current, V.

@@ -94,8 +94,8 @@ class Obstacle {
  public:
   virtual ~Obstacle() = default;
 
-  /// Appends what there is of it from one instant to another: usually one body; two where it is
-  /// replaced in between. Callable from several threads up to the instant of `extend`.
+  /// Appends its bodies between two instants: usually one, two if it is replaced in between.
+  /// Callable from several threads up to the instant of `extend`.
   virtual void collect(SimTime from, SimTime until, std::vector<Body>& bodies) const = 0;
 
   /// Works out its motion up to an instant.
