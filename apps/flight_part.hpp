@@ -25,8 +25,8 @@ class FlightPart {
   /// What it needs of the scenario, which is flown at `rate` simulated seconds per second (0: as
   /// fast as it goes). Throws InputError.
   virtual void prepare(Scenario& /*scenario*/, double /*rate*/) {}
-  /// Opens what it writes to or listens to and adds its links to the loop; both outlive it. Throws
-  /// InputError.
+  /// Opens what it writes to or listens to and adds its links to the loop; loop and simulation
+  /// outlive the part. Throws InputError.
   virtual void connect(Simulation& /*simulation*/, RunLoop& /*loop*/) {}
   /// Lines for the user about what has become of it, after the run.
   virtual void report(const RunLoop& /*loop*/) const {}

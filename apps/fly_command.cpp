@@ -255,7 +255,7 @@ int fly(const FlyFlags& flags) {
   }
   RunOptions options = run_options(flags);
   const Executor executor(flags.threads);
-  const auto parts = parts_of(flags, executor.threads());
+  auto parts = parts_of(flags, executor.threads());
   for (const auto& part : parts) part->check();
   Scenario scenario = load_input(flags, executor);
   const bool is_live =
@@ -267,13 +267,14 @@ int fly(const FlyFlags& flags) {
   say_warnings(simulation, executor);
 
   RunLoop loop(simulation, options);
+  const auto connected = std::move(parts);  // their threads end before loop and simulation do
   catch_interrupts();
-  for (const auto& part : parts) part->connect(simulation, loop);
+  for (const auto& part : connected) part->connect(simulation, loop);
   const RunEnd end = loop.run();
   end_progress();
-  for (const auto& part : parts) part->report(loop);
-  const bool has_failed =
-      std::any_of(parts.begin(), parts.end(), [](auto& part) { return part->has_failed(); });
+  for (const auto& part : connected) part->report(loop);
+  const bool has_failed = std::any_of(
+      connected.begin(), connected.end(), [](auto& part) { return part->has_failed(); });
   if (loop.has_started()) print_result(flags, simulation, loop.wall_time());
   if (has_failed) return kWrongInput;
   return loop.has_started() ? exit_code_of(end) : kInterrupted;

@@ -61,6 +61,15 @@ std::string text_of(const Scenario& scenario) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
+void check_twice(const std::vector<std::string>& paths) {
+  for (std::size_t i = 0; i < paths.size(); ++i) {
+    for (std::size_t k = 0; k < i; ++k) {
+      if (!is_same_file(paths[k], paths[i])) continue;
+      throw InputError(fmt::format("--record: {} is given twice", paths[i]));
+    }
+  }
+}
+
 }  // namespace
 
 void add_ros_flags(CLI::App& app, RosFlags& flags) {
@@ -104,6 +113,13 @@ void RosPart::check() const {
   if (!flags_.profile.empty() && !flags_.any()) {
     throw InputError("--profile: has no effect without --ros1, --ros2, --view or --record");
   }
+  if (!flags_.any()) return;
+  const bool digit = flags_.node.find_first_of("0123456789") == 0;
+  if (!is_ros_word(flags_.node) || digit) {
+    throw InputError(fmt::format("--node: '{}'; letters, digits and _ only, and no digit at first",
+                                 flags_.node));
+  }
+  check_twice(flags_.records);
 }
 
 bool RosPart::is_live(const Scenario& /*scenario*/) const {
@@ -150,26 +166,11 @@ std::unique_ptr<Outlet> open_recording(const RosFlags& flags,
   return std::make_unique<Recording>(path, ros1.bag_writer(path, compression), lock);
 }
 
-void check_twice(const std::vector<std::string>& paths) {
-  for (std::size_t i = 0; i < paths.size(); ++i) {
-    for (std::size_t k = 0; k < i; ++k) {
-      if (!is_same_file(paths[k], paths[i])) continue;
-      throw InputError(fmt::format("--record: {} is given twice", paths[i]));
-    }
-  }
-}
-
 /// ROS, recordings and the viewers of `view`, if any, with everything open. Throws InputError.
 std::unique_ptr<RosLink> make_ros_link(const RosFlags& flags,
                                        const Simulation& simulation,
                                        const std::shared_ptr<LiveServer>& view) {
   if (!flags.any()) return nullptr;
-  const bool digit = flags.node.find_first_of("0123456789") == 0;
-  if (!is_ros_word(flags.node) || digit) {
-    throw InputError(
-        fmt::format("--node: '{}'; letters, digits and _ only, and no digit at first", flags.node));
-  }
-  check_twice(flags.records);
   const Scenario& scenario = simulation.scenario();
   const RosProfile profile = profile_for(scenario, flags.profile);
   RosLinkOptions options;

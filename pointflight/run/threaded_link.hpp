@@ -30,7 +30,7 @@ class ThreadedLink : public Link {
     std::size_t capacity = 1000;
     WhenFull when_full = WhenFull::kWait;  ///< Nothing is lost by default.
     /// Steps without a scan may be held back for so long by the wall clock, to be handed over
-    /// together: waking a thread for each step would cost a fast run a tenth of its time.
+    /// together: a thread is not woken for each of them.
     std::chrono::microseconds hold{0};
   };
 

@@ -220,6 +220,15 @@ TEST_F(Output, AFullDiskEndsTheRecordingAndNotTheFlight) {
   }
 }
 
+TEST_F(Output, AFullDiskEndsTheFlightWhoseFilesItHolds) {
+  // the trajectory is larger; a thread of its own writes it
+  const Result result =
+      run(fmt::format("fly {} -o {} --no-picture", scenario(3, ""), in("run")), "ulimit -f 100;");
+  EXPECT_EQ(result.code, 2) << result.err;
+  expect_contains(result.err, "cannot write");
+  EXPECT_FALSE(fs::exists(in("run")));
+}
+
 TEST_F(Output, AMapThatIsCutShortWhileItIsFlownInIsSaid) {
   fs::copy_file(map(), in("m.pfmap"));
   // far from anything: the tail of the map is not in use yet

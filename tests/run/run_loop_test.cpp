@@ -126,16 +126,29 @@ TEST(RunLoop, ObeysOrdersBetweenSteps) {
   EXPECT_EQ(link.bytes.hash(), untouched.hash());
 }
 
+/// Wants to answer each scan, and never does.
+class Asked : public Probe {
+ public:
+  [[nodiscard]] bool wants_answer(const Sample& sample) const override {
+    return std::holds_alternative<ScanSample>(sample);
+  }
+};
+
+/// Answers each scan.
+class AnsweringPlanner : public Asked {
+ public:
+  std::vector<Order> take_orders() override {
+    if (scans == answered) return {};
+    answered = scans;
+    return {VehicleOrder{0, HoverCommand{}, true}};
+  }
+  int answered = 0;
+};
+
 TEST(RunLoop, LockstepWaitsForAnswers) {
   const Executor executor(2);
   RunOptions options;
   options.lockstep = 0.002;
-  class Asked : public Probe {
-   public:
-    [[nodiscard]] bool wants_answer(const Sample& sample) const override {
-      return std::holds_alternative<ScanSample>(sample);
-    }
-  };
   Simulation silent(short_run(), hall(), executor);
   Asked nobody;
   RunLoop alone(silent, options);
@@ -144,15 +157,7 @@ TEST(RunLoop, LockstepWaitsForAnswers) {
   EXPECT_EQ(alone.unanswered(), 5u);
   // one that answers each scan is waited for no longer; beside it one that answers each IMU sample
   // and commands nothing
-  class Planner : public Asked {
-   public:
-    std::vector<Order> take_orders() override {
-      if (scans == answered) return {};
-      answered = scans;
-      return {VehicleOrder{0, HoverCommand{}, true}};
-    }
-    int answered = 0;
-  } planner;
+  AnsweringPlanner planner;
   class Controller : public Probe {
    public:
     void on_sample(const Sample& sample) override {
@@ -371,18 +376,7 @@ TEST(ThreadedLink, HoldsStepsBackUntilAScan) {
 
 TEST(ThreadedLink, LockstepWaitsForItsAnswers) {
   const Executor executor(2);
-  class Planner : public Probe {
-   public:
-    [[nodiscard]] bool wants_answer(const Sample& sample) const override {
-      return std::holds_alternative<ScanSample>(sample);
-    }
-    std::vector<Order> take_orders() override {
-      if (scans == answered) return {};
-      answered = scans;
-      return {VehicleOrder{0, HoverCommand{}, true}};
-    }
-    int answered = 0;
-  } planner;
+  AnsweringPlanner planner;
   ThreadedLink link(planner, {.hold = std::chrono::hours(1)});
   Simulation simulation(short_run(), hall(), executor);
   RunOptions options;
