@@ -10,7 +10,7 @@
 #include "apps/modules.hpp"
 #include "apps/settings_json.hpp"
 #include "pointflight/core/mapped_file.hpp"
-#include "recording/mcap_reader.hpp"
+#include "pointflight/recording/mcap_reader.hpp"
 
 namespace pointflight::apps {
 namespace {

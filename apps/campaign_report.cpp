@@ -10,9 +10,9 @@
 #include <string_view>
 #include <utility>
 
-#include "apps/pictures.hpp"
-#include "apps/plot.hpp"
 #include "pointflight/io/byte_cursor.hpp"
+#include "pointflight/picture/pictures.hpp"
+#include "pointflight/picture/plot.hpp"
 
 namespace pointflight::apps {
 namespace {
@@ -71,14 +71,14 @@ std::optional<Estimate> closest_approach(const Runs& runs) {
   return Estimate{spread.median, spread.p05, spread.p95};
 }
 
-void draw_estimates(Canvas& canvas,
-                    const Plot& plot,
+void draw_estimates(picture::Canvas& canvas,
+                    const picture::Plot& plot,
                     const std::vector<Line>& lines,
                     const Estimator& estimate) {
   constexpr double kApart = 5.0;  // pixels between lines' intervals
   canvas.begin_clip(plot.left - 8.0, plot.top - 6.0, plot.width + 16.0, plot.height + 12.0);
   for (std::size_t i = 0; i < lines.size(); ++i) {
-    const Color color = vehicle_color(i);
+    const picture::Color color = picture::vehicle_color(i);
     const double aside =
         kApart * (static_cast<double>(i) - 0.5 * static_cast<double>(lines.size() - 1));
     std::vector<std::pair<double, double>> way;
@@ -97,7 +97,7 @@ void draw_estimates(Canvas& canvas,
     for (const auto& [x, y] : way) canvas.dot(x, y, 3.2, color);
   }
   canvas.end_clip();
-  draw_axes(canvas, plot);
+  picture::draw_axes(canvas, plot);
 }
 
 struct Panel {
@@ -141,10 +141,10 @@ std::pair<double, double> extent(const std::vector<Line>& lines, const Estimator
   return {all.first < 0.0 ? all.first - room : 0.0, all.second + room};
 }
 
-std::unique_ptr<Canvas> plot_of(const Plan& plan,
-                                const Results& results,
-                                std::size_t axis,
-                                std::vector<Line> lines) {
+std::unique_ptr<picture::Canvas> plot_of(const Plan& plan,
+                                         const Results& results,
+                                         std::size_t axis,
+                                         std::vector<Line> lines) {
   std::string title = plan.keys[axis];
   if (lines.size() > kMostPlotLines) {
     title += fmt::format(
@@ -152,23 +152,23 @@ std::unique_ptr<Canvas> plot_of(const Plan& plan,
     lines.resize(kMostPlotLines);
   }
   const std::vector<Panel> panels = panels_for(results);
-  std::vector<LegendEntry> legend;
+  std::vector<picture::LegendEntry> legend;
   for (std::size_t i = 0; i < lines.size() && lines.size() > 1; ++i) {
-    legend.push_back({lines[i].name, 14.0, [i](Canvas& c, double x, double y) {
-                        c.line({{x, y}, {x + 14.0, y}}, 2.0, vehicle_color(i));
+    legend.push_back({lines[i].name, 14.0, [i](picture::Canvas& c, double x, double y) {
+                        c.line({{x, y}, {x + 14.0, y}}, 2.0, picture::vehicle_color(i));
                       }});
   }
-  const double left = kLeftRoom + 6.0;
+  const double left = picture::kLeftRoom + 6.0;
   const double legend_height =
-      legend.empty() ? 0.0 : kLegendRow * legend_rows(legend, kRatesWidth) + 8.0;
+      legend.empty() ? 0.0 : picture::kLegendRow * picture::legend_rows(legend, kRatesWidth) + 8.0;
   const double top = kRatesTop + legend_height;
-  auto canvas = std::make_unique<Canvas>(
+  auto canvas = std::make_unique<picture::Canvas>(
       static_cast<int>(left + kRatesWidth + kRatesMargin),
       static_cast<int>(top + static_cast<double>(panels.size()) * (kRatesHeight + kRatesGap)),
-      kPaper,
+      picture::kPaper,
       true);
-  canvas->text_within(left, 30.0, title, kTitleText, kRatesWidth, kInk);
-  if (!legend.empty()) draw_legend(*canvas, legend, left, 52.0, kRatesWidth);
+  canvas->text_within(left, 30.0, title, picture::kTitleText, kRatesWidth, picture::kInk);
+  if (!legend.empty()) picture::draw_legend(*canvas, legend, left, 52.0, kRatesWidth);
   double low_x = lines[0].by_value.begin()->first;
   double high_x = low_x;
   for (const Line& line : lines) {
@@ -179,13 +179,14 @@ std::unique_ptr<Canvas> plot_of(const Plan& plan,
   for (std::size_t i = 0; i < panels.size(); ++i) {
     const Panel& panel = panels[i];
     const auto [low, high] = panel.is_rate ? std::pair(0.0, 100.0) : extent(lines, panel.estimate);
-    const Plot plot{left,
-                    top + static_cast<double>(i) * (kRatesHeight + kRatesGap),
-                    kRatesWidth,
-                    kRatesHeight,
-                    {low_x - room, high_x + room, plan.keys[axis], Steps::kDecimal},
-                    {low, high, panel.label, Steps::kDecimal}};
-    canvas->text(left, plot.top - 9.0, panel.caption, kTickText, kDim);
+    const picture::Plot plot{
+        left,
+        top + static_cast<double>(i) * (kRatesHeight + kRatesGap),
+        kRatesWidth,
+        kRatesHeight,
+        {low_x - room, high_x + room, plan.keys[axis], picture::Steps::kDecimal},
+        {low, high, panel.label, picture::Steps::kDecimal}};
+    canvas->text(left, plot.top - 9.0, panel.caption, picture::kTickText, picture::kDim);
     draw_estimates(*canvas, plot, lines, panel.estimate);
   }
   return canvas;

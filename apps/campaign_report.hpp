@@ -5,17 +5,17 @@
 #include <string>
 #include <vector>
 
-#include "apps/canvas.hpp"
-#include "campaign/campaign.hpp"
-#include "campaign/statistics.hpp"
+#include "pointflight/campaign/campaign.hpp"
+#include "pointflight/campaign/statistics.hpp"
+#include "pointflight/picture/canvas.hpp"
 
 namespace pointflight::apps {
 
 /// Rates with their intervals and the closest approach over an axis of the grid whose values are
 /// numbers, a line for each combination of the other axes (eight at most).
 struct CampaignPlot {
-  std::string key;                 ///< Of the axis.
-  std::unique_ptr<Canvas> canvas;  ///< Keeps strokes.
+  std::string key;                          ///< Of the axis.
+  std::unique_ptr<picture::Canvas> canvas;  ///< Keeps strokes.
 };
 std::vector<CampaignPlot> campaign_plots(const Plan& plan, const Results& results);
 

@@ -11,25 +11,25 @@
 #include <optional>
 
 #include "apps/commands.hpp"
-#include "apps/error_picture.hpp"
 #include "apps/error_table.hpp"
 #include "apps/flags.hpp"
-#include "apps/sensor_picture.hpp"
 #include "apps/settings_json.hpp"
 #include "apps/surroundings_flags.hpp"
+#include "apps/survey_flags.hpp"
 #include "apps/terminal.hpp"
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/fidelity/scan_comparison.hpp"
 #include "pointflight/fidelity/sensor_comparison.hpp"
 #include "pointflight/lidar/lidar.hpp"
+#include "pointflight/picture/error_picture.hpp"
+#include "pointflight/picture/sensor_picture.hpp"
 
 namespace pointflight::apps {
 namespace {
 
 struct CompareFlags {
   std::string map;
-  std::string scans;
-  std::string poses;
+  ScansFlags scans;
   std::string cloud;
   std::string renderer = "beam";
   bool floor = false;
@@ -46,17 +46,17 @@ void draw_scan_errors(const RealScan& scan,
                       const std::vector<ComparedRay>& rays,
                       bool supported_only,
                       const std::string& folder) {
-  ErrorPanel panel{supported_only ? "rays that the cloud supports" : "all rays", {}};
+  picture::ErrorPanel panel{supported_only ? "rays that the cloud supports" : "all rays", {}};
   for (std::size_t i = 0; i < rays.size(); ++i) {
     if (supported_only && !rays[i].supported) continue;
-    const Vector3f& p = scan.points_sensor[i];
+    const Vector3f p = scan.point_sensor(i);
     panel.marks.push_back({std::atan2(p.y(), p.x()),
                            std::atan2(p.z(), std::hypot(p.x(), p.y())),
                            rays[i].range,
                            rays[i].rendered});
   }
-  const std::string stem = std::filesystem::path(scan.file).stem().string();
-  draw_errors({&panel, 1}, scan.file, folder + "/" + stem + ".png");
+  const std::string stem = std::filesystem::path(scan.name).stem().string();
+  picture::draw_errors({&panel, 1}, scan.name, folder + "/" + stem + ".png");
 }
 
 /// The real scans among themselves: what no renderer can better.
@@ -169,11 +169,12 @@ void compare(const CompareFlags& flags) {
   const auto map = SurfelMap::open(flags.map);
   std::optional<LidarSettings> lidar;
   if (!flags.lidar.empty()) lidar = load_lidar(flags.lidar);
-  const auto scans = read_real_scans(flags.scans, flags.poses);
+  const Progress progress = interruptible_progress();
+  const auto scans = read_real_scans(*open_survey(flags.scans, progress), progress);
+  end_progress();
   std::optional<SupportCloud> cloud;
   if (!flags.cloud.empty()) cloud.emplace(flags.cloud);
   const auto renderer = make_renderer(flags.renderer, Scene{map});
-  const Progress progress = interruptible_progress();
   ErrorCollector all;
   ErrorCollector supported;
   nlohmann::ordered_json rows = nlohmann::ordered_json::array();
@@ -186,10 +187,10 @@ void compare(const CompareFlags& flags) {
     const ErrorCollector scan_supported = collect(rays, true);
     all.add(scan_all);
     supported.add(scan_supported);
-    rows.push_back({{"file", scans[i].file},
+    rows.push_back({{"file", scans[i].name},
                     {"all", table.json(scan_all.statistics())},
                     {"supported", table.json(scan_supported.statistics())}});
-    if (!flags.json) table.print_row(scans[i].file, scan_all.statistics());
+    if (!flags.json) table.print_row(scans[i].name, scan_all.statistics());
     if (!flags.png.empty()) draw_scan_errors(scans[i], rays, cloud.has_value(), flags.png);
   }
   std::optional<ErrorCollector> floor;
@@ -199,7 +200,7 @@ void compare(const CompareFlags& flags) {
     sensor = compare_sensor(
         scans, *lidar, surroundings_in(*map, flags.surroundings), *renderer, executor, progress);
     if (!flags.png.empty()) {
-      draw_sensor_comparison(
+      picture::draw_sensor_comparison(
           *sensor, flags.lidar + " beside real scans", flags.png + "/sensor.png");
     }
   }
@@ -227,10 +228,7 @@ void add_compare_command(CLI::App& parent, int& /*exit_code*/) {
                                     "Render real scans' rays from a map and say how they differ");
   auto flags = std::make_shared<CompareFlags>();
   app->add_option("map", flags->map, "A .pfmap")->required();
-  app->add_option("--scans", flags->scans, "Folder of real scans, points in the sensor frame")
-      ->required();
-  app->add_option("--poses", flags->poses, "TUM file: map <- sensor; a ninth column names the scan")
-      ->required();
+  add_scans_flags(*app, flags->scans, true);
   app->add_option(
       "--cloud", flags->cloud, "What the map was made from: tells which rays it supports");
   app->add_option("--renderer", flags->renderer, "How ranges are made")

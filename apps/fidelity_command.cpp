@@ -10,7 +10,6 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/commands.hpp"
-#include "apps/error_picture.hpp"
 #include "apps/error_table.hpp"
 #include "apps/flags.hpp"
 #include "apps/survey_fidelity.hpp"
@@ -18,7 +17,8 @@
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/fidelity/scene_beams.hpp"
 #include "pointflight/lidar/lidar.hpp"
-#include "pointflight/map/map_builder.hpp"
+#include "pointflight/map/build/map_builder.hpp"
+#include "pointflight/picture/error_picture.hpp"
 
 namespace pointflight::apps {
 namespace {
@@ -107,12 +107,12 @@ void draw_case(const SceneBeams& beams,
                const FidelityReport& report,
                const std::string& title,
                const std::string& path) {
-  std::vector<ErrorPanel> panels;
+  std::vector<picture::ErrorPanel> panels;
   const std::size_t count = beams.per_pose();
   for (std::size_t pose = 0; pose < std::min<std::size_t>(4, beams.poses.size()); ++pose) {
     const Pose& T_world_sensor = beams.poses[pose];
     const Vector3d& p = T_world_sensor.translation;
-    ErrorPanel panel{fmt::format("from {:.2f}, {:.2f}, {:.2f}", p.x(), p.y(), p.z()), {}};
+    picture::ErrorPanel panel{fmt::format("from {:.2f}, {:.2f}, {:.2f}", p.x(), p.y(), p.z()), {}};
     for (std::size_t i = pose * count; i < (pose + 1) * count; ++i) {
       const TrueBeam& beam = beams.beams[i];
       const Vector3d d =
@@ -124,7 +124,7 @@ void draw_case(const SceneBeams& beams,
     }
     panels.push_back(std::move(panel));
   }
-  draw_errors(panels, title, path);
+  picture::draw_errors(panels, title, path);
 }
 
 void run_scene(const ExactScene& scene,

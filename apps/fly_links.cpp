@@ -5,12 +5,12 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "apps/pictures.hpp"
 #include "apps/terminal.hpp"
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/core/number_text.hpp"
 #include "pointflight/core/output_file.hpp"
 #include "pointflight/core/resources.hpp"
+#include "pointflight/picture/pictures.hpp"
 
 namespace pointflight::apps {
 namespace {
@@ -81,8 +81,8 @@ void FolderLink::close() {
   if (ended_) return;
   ended_ = true;
   if (draws_) {
-    describe_run(simulation_, picture_);
-    draw_overview(simulation_.map(), picture_, picture_path_);
+    picture::describe_run(simulation_, picture_);
+    picture::draw_overview(simulation_.map(), picture_, picture_path_);
   }
   write_timing();
   recorder_.finish(simulation_);

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "apps/flight_part.hpp"
-#include "apps/run_picture.hpp"
+#include "pointflight/picture/run_picture.hpp"
 #include "pointflight/run/run_loop.hpp"
 #include "pointflight/run/threaded_link.hpp"
 #include "pointflight/sim/flight_recorder.hpp"
@@ -69,7 +69,7 @@ class FolderLink : public Link {
   bool draws_;
   FlightRecorder recorder_;
   std::string picture_path_, timing_path_;  ///< In the run's folder.
-  RunPicture picture_;
+  picture::RunPicture picture_;
   bool ended_ = false;
 };
 

@@ -8,12 +8,12 @@
 
 #include "apps/commands.hpp"
 #include "apps/flags.hpp"
-#include "apps/lidar_picture.hpp"
-#include "apps/scan_statistics.hpp"
 #include "apps/settings_json.hpp"
 #include "apps/terminal.hpp"
 #include "pointflight/core/number_text.hpp"
 #include "pointflight/core/resources.hpp"
+#include "pointflight/picture/pictures.hpp"
+#include "pointflight/picture/scan_statistics.hpp"
 
 namespace pointflight::apps {
 namespace {
@@ -49,7 +49,7 @@ void list_lidars(const LidarFlags& flags) {
   if (flags.json) print_json(json);
 }
 
-nlohmann::ordered_json json_of(const ScanStatistics& scan) {
+nlohmann::ordered_json json_of(const picture::ScanStatistics& scan) {
   nlohmann::ordered_json json;
   json["beams"] = scan.beams;
   json["beams_per_second"] = scan.beams_a_second;
@@ -65,7 +65,7 @@ nlohmann::ordered_json json_of(const ScanStatistics& scan) {
   return json;
 }
 
-void print_statistics(const LidarSettings& s, const ScanStatistics& scan) {
+void print_statistics(const LidarSettings& s, const picture::ScanStatistics& scan) {
   const char* lines = s.pattern == ScanPattern::kRings  ? "rings"
                       : s.pattern == ScanPattern::kGrid ? "rows"
                                                         : "lines";
@@ -95,7 +95,7 @@ void print_statistics(const LidarSettings& s, const ScanStatistics& scan) {
 void show_lidar(const LidarFlags& flags) {
   LidarSettings s = load_lidar(flags.name);
   check_outputs({flags.picture}, {s.path}, flags.force);
-  const ScanStatistics scan = scan_statistics(s);
+  const picture::ScanStatistics scan = picture::scan_statistics(s);
   if (flags.path) {
     fmt::print("{}\n", s.path);
     return;
@@ -114,7 +114,7 @@ void show_lidar(const LidarFlags& flags) {
     fmt::print("{}", writer.text());
   }
   if (flags.picture.empty()) return;
-  draw_lidar(s, flags.picture);
+  picture::draw_lidar(s, flags.picture);
   log("picture: " + flags.picture);
 }
 

@@ -11,14 +11,14 @@
 
 #include "apps/commands.hpp"
 #include "apps/flags.hpp"
-#include "apps/sensor_picture.hpp"
 #include "apps/settings_json.hpp"
 #include "apps/survey_flags.hpp"
 #include "apps/terminal.hpp"
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/core/number_text.hpp"
-#include "pointflight/fit/sensor_fit.hpp"
+#include "pointflight/picture/sensor_picture.hpp"
+#include "pointflight/survey/sensor_fit.hpp"
 
 namespace pointflight::apps {
 namespace {
@@ -38,15 +38,6 @@ struct SensorFitFlags {
   bool force = false;
   int threads = 0;
 };
-
-std::vector<RecordedScan> read_scans(const SensorFitFlags& flags, const Progress& progress) {
-  const auto most = static_cast<std::size_t>(flags.scans);
-  if (const auto opener = recording_of(flags.input)) {
-    return read_recorded_scans(*opener, flags.input, flags.topic, most, progress);
-  }
-  if (!flags.topic.empty()) throw InputError("--scan-topic is for bags and MCAP files");
-  return read_scans_of_folder(flags.input, most, progress);
-}
 
 void print_fit_of(const SensorFit& fit) {
   fmt::print("{} scans, {} returns; noise on {} flat patches of {:g} degrees with {} of them\n",
@@ -186,7 +177,9 @@ void fit_lidar(const SensorFitFlags& flags) {
   }
   if (!flags.like.empty()) static_cast<void>(load_lidar(flags.like));
   const Progress progress = interruptible_progress();
-  const std::vector<RecordedScan> scans = read_scans(flags, progress);
+  const auto source = open_scans(flags.input, flags.topic, progress);
+  const std::vector<RecordedScan> scans =
+      read_scans(*source, static_cast<std::size_t>(flags.scans), progress);
   end_progress();
   const SensorFit fit = [&] {
     try {
@@ -208,7 +201,8 @@ void fit_lidar(const SensorFitFlags& flags) {
   }
   if (!flags.output.empty()) write_sensor(flags, fit);
   if (!flags.png.empty()) {
-    draw_sensor_fit(fit, "Noise of " + fs::path(flags.input).filename().string(), flags.png);
+    picture::draw_sensor_fit(
+        fit, "Noise of " + fs::path(flags.input).filename().string(), flags.png);
     log("picture: " + flags.png);
   }
   if (flags.json) {

@@ -11,14 +11,14 @@
 #include "apps/flags.hpp"
 #include "apps/import_report.hpp"
 #include "apps/map_edit.hpp"
-#include "apps/pictures.hpp"
 #include "apps/settings_json.hpp"
 #include "apps/terminal.hpp"
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/core/number_text.hpp"
 #include "pointflight/geometry/shape_scene.hpp"
 #include "pointflight/io/pcd_writer.hpp"
-#include "pointflight/map/map_builder.hpp"
+#include "pointflight/map/build/map_builder.hpp"
+#include "pointflight/picture/pictures.hpp"
 
 namespace pointflight::apps {
 namespace {
@@ -195,7 +195,7 @@ void show_info(const InfoFlags& flags) {
   if (flags.verify) map->verify();
   print_info(*map, flags);
   if (!flags.png.empty()) {
-    draw_map(*map, flags.map, flags.png);
+    picture::draw_map(*map, flags.map, flags.png);
     log("picture: " + flags.png);
   }
 }

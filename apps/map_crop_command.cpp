@@ -8,7 +8,7 @@
 #include "apps/map_edit.hpp"
 #include "apps/terminal.hpp"
 #include "pointflight/core/input_error.hpp"
-#include "pointflight/map/crop_region.hpp"
+#include "pointflight/map/edit/crop_region.hpp"
 
 namespace pointflight::apps {
 namespace {

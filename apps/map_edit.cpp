@@ -15,7 +15,7 @@
 namespace pointflight::apps {
 namespace {
 
-void sample_map(const Bvh8& tree, const MapDescription& description, PointSample& sample) {
+void sample_map(const Bvh8& tree, const MapDescription& description, picture::PointSample& sample) {
   const auto words = tree.words.span();
   for_each_surfel(
       std::span<const SurfelWord>(words), [&](const LeafHeader& leaf, std::size_t word) {
@@ -110,15 +110,15 @@ void finish_map(const EditFlags& flags, OutputFile output, const EditedMap& edit
   const Aabb& b = edited.description.bounds_world;
   log(fmt::format("extent        {}, from {}", extent_of(b), point_text(b.min)));
   if (!flags.png.empty()) {
-    PointSample sample;
+    picture::PointSample sample;
     sample_map(edited.tree, edited.description, sample);
-    draw_points(flags.output,
-                fmt::format("{} surfels at {:.4g} m, {}",
-                            edited.surfels,
-                            edited.description.resolution,
-                            extent_of(b)),
-                {{"", kInk, true, &sample}},
-                flags.png);
+    picture::draw_points(flags.output,
+                         fmt::format("{} surfels at {:.4g} m, {}",
+                                     edited.surfels,
+                                     edited.description.resolution,
+                                     extent_of(b)),
+                         {{"", picture::kInk, true, &sample}},
+                         flags.png);
     log("picture: " + flags.png);
   }
   fmt::print("{}\n", flags.output);
@@ -154,10 +154,10 @@ void CloudOutput::finish(std::uint64_t points_read,
     log(fmt::format("warning: {}: {}", flags_.output, loss));
   }
   if (!flags_.png.empty()) {
-    draw_points(flags_.output,
-                fmt::format("{} points", writer_->count()),
-                {{"", kInk, true, &sample_}},
-                flags_.png);
+    picture::draw_points(flags_.output,
+                         fmt::format("{} points", writer_->count()),
+                         {{"", picture::kInk, true, &sample_}},
+                         flags_.png);
     log("picture: " + flags_.png);
   }
   fmt::print("{}\n", flags_.output);

@@ -6,10 +6,10 @@
 #include <string>
 #include <vector>
 
-#include "apps/point_picture.hpp"
 #include "pointflight/io/cloud_writer.hpp"
-#include "pointflight/map/map_edit.hpp"
-#include "pointflight/map/map_points.hpp"
+#include "pointflight/map/build/map_points.hpp"
+#include "pointflight/map/edit/map_edit.hpp"
+#include "pointflight/picture/point_picture.hpp"
 
 /// What `map crop`, `thin`, `transform`, `merge`, `export` and `diff` share.
 namespace pointflight::apps {
@@ -71,7 +71,7 @@ class CloudOutput {
  private:
   const EditFlags& flags_;
   std::unique_ptr<CloudWriter> writer_;
-  PointSample sample_;
+  picture::PointSample sample_;
 };
 
 /// Columns of what a reader gives.

@@ -101,16 +101,16 @@ struct OneWay {
   std::uint64_t missing = 0;
   std::uint64_t surfels = 0;
   Aabb where;
-  PointSample sample;
+  picture::PointSample sample;
   [[nodiscard]] double share() const {
     return surfels == 0 ? 0.0 : static_cast<double>(missing) / static_cast<double>(surfels);
   }
 };
 
-constexpr Color kOnlyFirst{0.82, 0.12, 0.12};
-constexpr Color kOnlySecond{0.1, 0.35, 0.85};
+constexpr picture::Color kOnlyFirst{0.82, 0.12, 0.12};
+constexpr picture::Color kOnlySecond{0.1, 0.35, 0.85};
 
-std::array<std::uint8_t, 3> bytes_of(const Color& color) {
+std::array<std::uint8_t, 3> bytes_of(const picture::Color& color) {
   const auto part = [](double share) {
     return static_cast<std::uint8_t>(std::lround(255.0 * share));
   };
@@ -153,19 +153,19 @@ nlohmann::ordered_json json_of(const std::vector<OneWay>& ways, double distance)
 void draw_diff(const DiffFlags& flags,
                const std::vector<OneWay>& ways,
                double distance,
-               const PointSample& all) {
-  draw_points(fmt::format("{} and {}", flags.inputs[0], flags.inputs[1]),
-              fmt::format("what lies farther than {:.3g} m from the other", distance),
-              {{"the first", {0.75, 0.75, 0.75}, false, &all},
-               {fmt::format("only in the first: {:.2f} %", 100.0 * ways[0].share()),
-                kOnlyFirst,
-                false,
-                &ways[0].sample},
-               {fmt::format("only in the second: {:.2f} %", 100.0 * ways[1].share()),
-                kOnlySecond,
-                false,
-                &ways[1].sample}},
-              flags.png);
+               const picture::PointSample& all) {
+  picture::draw_points(fmt::format("{} and {}", flags.inputs[0], flags.inputs[1]),
+                       fmt::format("what lies farther than {:.3g} m from the other", distance),
+                       {{"the first", {0.75, 0.75, 0.75}, false, &all},
+                        {fmt::format("only in the first: {:.2f} %", 100.0 * ways[0].share()),
+                         kOnlyFirst,
+                         false,
+                         &ways[0].sample},
+                        {fmt::format("only in the second: {:.2f} %", 100.0 * ways[1].share()),
+                         kOnlySecond,
+                         false,
+                         &ways[1].sample}},
+                       flags.png);
   log("picture: " + flags.png);
 }
 
@@ -185,7 +185,7 @@ void diff(const DiffFlags& flags) {
     writer = write_cloud(OutputFile(flags.output), {.intensity = true, .color = true});
   }
   std::vector<OneWay> ways(2);
-  PointSample all;
+  picture::PointSample all;
   maps[0]->for_each_surfel(
       [&](const Vector3d& p, const Vector3d&, double, std::uint32_t) { all.add(p); });
   for (std::size_t i = 0; i < 2; ++i) {

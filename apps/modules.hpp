@@ -2,9 +2,9 @@
 
 #include <string>
 
-#include "campaign/mpi_module.hpp"
-#include "ros_common/wire.hpp"
-#include "share/share_transport.hpp"
+#include "pointflight/campaign/mpi_module.hpp"
+#include "pointflight/ros/common/wire.hpp"
+#include "pointflight/share/share_transport.hpp"
 
 namespace pointflight::apps {
 

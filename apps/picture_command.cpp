@@ -16,15 +16,15 @@
 #include <system_error>
 
 #include "apps/commands.hpp"
-#include "apps/film.hpp"
 #include "apps/flags.hpp"
-#include "apps/pictures.hpp"
 #include "apps/terminal.hpp"
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/core/mapped_file.hpp"
 #include "pointflight/core/owned_files.hpp"
 #include "pointflight/io/cloud_reader.hpp"
 #include "pointflight/io/csv_table.hpp"
+#include "pointflight/picture/film.hpp"
+#include "pointflight/picture/pictures.hpp"
 #include "pointflight/sim/run_folder.hpp"
 
 namespace pointflight::apps {
@@ -71,7 +71,7 @@ double number_of(const std::string& text, const fs::path& path) {
   return value;
 }
 
-void read_vehicle(const fs::path& folder, std::size_t number, RunPicture& picture) {
+void read_vehicle(const fs::path& folder, std::size_t number, picture::RunPicture& picture) {
   const CsvTable table((folder / "trajectory.csv").string());
   const int x = table.require("px");
   const int y = table.require("py");
@@ -94,7 +94,7 @@ void read_vehicle(const fs::path& folder, std::size_t number, RunPicture& pictur
     std::vector<CloudPoint> points;
     while (reader->read(points)) {
       for (const CloudPoint& point : points) {
-        if (offered++ % RunPicture::kSeenStride == 0) {
+        if (offered++ % picture::RunPicture::kSeenStride == 0) {
           picture.seen.add(T_world_sensor * point.position);
         }
       }
@@ -102,14 +102,14 @@ void read_vehicle(const fs::path& folder, std::size_t number, RunPicture& pictur
   }
 }
 
-RunPicture read_run(const fs::path& folder) {
-  RunPicture picture;
+picture::RunPicture read_run(const fs::path& folder) {
+  picture::RunPicture picture;
   nlohmann::json summary;
   try {
     require_regular_file((folder / "summary.json").string());
     summary = nlohmann::json::parse(std::ifstream(folder / "summary.json"));
     const auto& vehicles = summary.at("vehicles");
-    RunFigures figures;
+    picture::RunFigures figures;
     figures.vehicles = vehicles.size();
     if (summary.contains("others")) figures.others = summary.at("others").size();
     figures.time = summary.at("simulated_time").get<double>();
@@ -128,7 +128,7 @@ RunPicture read_run(const fs::path& folder) {
         figures.add_closest(vehicle.at("closest_approach").get<double>());
       }
     }
-    write_titles(figures, picture);
+    picture::write_titles(figures, picture);
   } catch (const nlohmann::json::exception&) {
     throw InputError(fmt::format("{}: not the summary of a run; give the folder of `fly -o`",
                                  (folder / "summary.json").string()));
@@ -220,15 +220,15 @@ void film(const PictureFlags& flags) {
   const Executor executor(0);
   RecordedRun run(flags.run, executor);
   const FrameFolder own;
-  FilmOptions options;
+  picture::FilmOptions options;
   options.frames = flags.frames.empty() ? own.path() : flags.frames;
   options.vehicle = flags.follow;
   options.rate = flags.rate;
-  const std::size_t pictures = film_run(run, options, interruptible_progress());
+  const std::size_t pictures = picture::film_run(run, options, interruptible_progress());
   end_progress();
   if (!flags.frames.empty()) fmt::print("{} pictures in {}\n", pictures, flags.frames);
   if (flags.video.empty()) return;
-  make_video(options, flags.video);
+  picture::make_video(options, flags.video);
   fmt::print("{}\n", flags.video);
 }
 
@@ -258,13 +258,13 @@ void add_picture_command(CLI::App& parent, int& /*exit_code*/) {
     check_outputs({path}, {flags->run, flags->map}, flags->force || is_own);
     const auto scenario = scenario_of(*flags);
     const auto map = map_of(*flags, scenario);
-    RunPicture picture = read_run(flags->run);
+    picture::RunPicture picture = read_run(flags->run);
     if (scenario) {
       for (const VehicleSetup& vehicle : scenario->fleet()) {
         picture.waypoints.push_back(vehicle.mission.waypoints);
       }
     }
-    draw_overview(*map, picture, path);
+    picture::draw_overview(*map, picture, path);
     if (flags->output.empty()) list_picture(flags->run);
     fmt::print("{}\n", path);
   });

@@ -15,10 +15,10 @@
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/core/locked_file.hpp"
 #include "pointflight/core/mapped_file.hpp"
-#include "recording/mcap_writer.hpp"
-#include "recording/recording.hpp"
-#include "ros_common/ros_names.hpp"
-#include "view/foxglove_transport.hpp"
+#include "pointflight/recording/mcap_writer.hpp"
+#include "pointflight/recording/recording.hpp"
+#include "pointflight/ros/common/ros_names.hpp"
+#include "pointflight/view/foxglove_transport.hpp"
 
 namespace pointflight::apps {
 namespace {

@@ -9,10 +9,10 @@
 
 #include "apps/flight_part.hpp"
 #include "apps/view_flags.hpp"
+#include "pointflight/ros/common/ros_link.hpp"
 #include "pointflight/run/threaded_link.hpp"
-#include "ros_common/ros_link.hpp"
-#include "view/live_server.hpp"
-#include "view/view_link.hpp"
+#include "pointflight/view/live_server.hpp"
+#include "pointflight/view/view_link.hpp"
 
 namespace pointflight::apps {
 

@@ -9,12 +9,12 @@
 
 #include "apps/commands.hpp"
 #include "apps/flags.hpp"
-#include "apps/pictures.hpp"
 #include "apps/settings_json.hpp"
 #include "apps/surroundings_flags.hpp"
 #include "apps/terminal.hpp"
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/lidar/lidar.hpp"
+#include "pointflight/picture/pictures.hpp"
 
 namespace pointflight::apps {
 namespace {
@@ -108,7 +108,7 @@ void take_scan(const ScanFlags& flags) {
   if (!flags.output.empty()) write_scan_pcd(flags.output, scan);
   if (!flags.png.empty()) {
     const std::uint64_t index = lidar.pattern_scan(flags.index, flags.seed);
-    draw_scan(lidar.beams(index, executor), scan, settings, {*map, pose}, flags.png);
+    picture::draw_scan(lidar.beams(index, executor), scan, settings, {*map, pose}, flags.png);
   }
   print_scan(scan, flags);
 }

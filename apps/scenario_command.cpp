@@ -18,12 +18,12 @@
 #include "pointflight/core/number_text.hpp"
 #include "pointflight/core/output_file.hpp"
 #include "pointflight/core/resources.hpp"
+#include "pointflight/ros/common/output.hpp"
+#include "pointflight/ros/common/profile.hpp"
 #include "pointflight/sim/scenario_maker.hpp"
 #include "pointflight/sim/simulation.hpp"
 #include "pointflight/sim/start_check.hpp"
 #include "pointflight/world/clearance.hpp"
-#include "ros_common/output.hpp"
-#include "ros_common/profile.hpp"
 
 namespace pointflight::apps {
 namespace {

@@ -13,10 +13,10 @@
 #include "apps/modules.hpp"
 #include "apps/terminal.hpp"
 #include "pointflight/core/input_error.hpp"
+#include "pointflight/ros/common/ros_names.hpp"
+#include "pointflight/share/common_ground.hpp"
+#include "pointflight/share/vehicle_list.hpp"
 #include "pointflight/sim/ended_run.hpp"
-#include "ros_common/ros_names.hpp"
-#include "share/common_ground.hpp"
-#include "share/vehicle_list.hpp"
 
 namespace pointflight::apps {
 namespace {

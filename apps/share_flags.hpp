@@ -8,7 +8,7 @@
 
 #include "apps/flight_part.hpp"
 #include "pointflight/run/run_loop.hpp"
-#include "share/share_link.hpp"
+#include "pointflight/share/share_link.hpp"
 
 namespace pointflight::apps {
 

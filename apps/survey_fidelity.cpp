@@ -11,10 +11,10 @@
 #include "pointflight/fidelity/scene_beams.hpp"
 #include "pointflight/fidelity/survey.hpp"
 #include "pointflight/fidelity/survey_report.hpp"
-#include "pointflight/fit/map_fit.hpp"
 #include "pointflight/io/pcd_writer.hpp"
 #include "pointflight/lidar/lidar.hpp"
-#include "pointflight/map/map_builder.hpp"
+#include "pointflight/map/build/map_builder.hpp"
+#include "pointflight/survey/map_fit.hpp"
 
 namespace pointflight::apps {
 namespace {

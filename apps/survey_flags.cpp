@@ -14,11 +14,11 @@
 #include "apps/terminal.hpp"
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/core/mapped_file.hpp"
-#include "pointflight/fit/survey_signal.hpp"
 #include "pointflight/io/pcd_writer.hpp"
 #include "pointflight/lidar/lidar_settings.hpp"
-#include "recording/mcap_reader.hpp"
-#include "recording/recorded_survey.hpp"
+#include "pointflight/recording/mcap_reader.hpp"
+#include "pointflight/recording/recorded_survey.hpp"
+#include "pointflight/survey/survey_signal.hpp"
 
 namespace pointflight::apps {
 
@@ -59,7 +59,20 @@ std::optional<RecordingOpener> recording_of(const std::string& path) {
   return [paths](const std::vector<std::string>&) { return open_mcap(paths); };
 }
 
-std::unique_ptr<SurveySource> open_survey(const FitFlags& flags, const Progress& progress) {
+std::unique_ptr<ScanSource> open_scans(const std::string& path,
+                                       const std::string& topic,
+                                       const Progress& progress) {
+  if (const auto recording = recording_of(path)) {
+    RecordedSurveyOptions options;
+    options.name = path;
+    options.cloud_topic = topic;
+    return std::make_unique<RecordedScans>(*recording, options, progress);
+  }
+  if (!topic.empty()) throw InputError("--scan-topic is for bags and MCAP files");
+  return std::make_unique<ScanFolder>(path, scan_files_in(path));
+}
+
+std::unique_ptr<SurveySource> open_survey(const ScansFlags& flags, const Progress& progress) {
   SurveyFiles files = flags.files;
   std::optional<Pose> T_pose_sensor;
   if (!flags.sensor_pose.empty()) T_pose_sensor = parse_pose(flags.sensor_pose, "--sensor-pose");
@@ -70,7 +83,7 @@ std::unique_ptr<SurveySource> open_survey(const FitFlags& flags, const Progress&
       throw InputError("--scan-topic and --pose-topic are for bags and MCAP files");
     }
     files.T_pose_sensor = T_pose_sensor.value_or(Pose{});
-    return std::make_unique<SurveyFolder>(std::move(files));
+    return std::make_unique<SurveyFolder>(files);
   }
   if (!files.free.empty()) throw InputError("--free: is for folders of scans");
   auto survey = std::make_unique<RecordedSurvey>(*recording,
@@ -86,7 +99,7 @@ std::unique_ptr<SurveySource> open_survey(const FitFlags& flags, const Progress&
   return survey;
 }
 
-void add_fit_flags(CLI::App& app, FitFlags& flags, bool required) {
+CLI::Option* add_scans_flags(CLI::App& app, ScansFlags& flags, bool required) {
   auto* scans = app.add_option("--scans",
                                flags.files.scans,
                                "Folder of the scans, points in the sensor frame; with times of "
@@ -113,15 +126,20 @@ void add_fit_flags(CLI::App& app, FitFlags& flags, bool required) {
                  "x,y,z,roll,pitch,yaw of the sensor in the frame that the poses are of: metres, "
                  "degrees; without it a recording's /tf_static is asked")
       ->needs(scans);
+  app.add_flag("--deskewed",
+               flags.files.is_deskewed,
+               "Motion within the scans was taken out: times of points are left aside")
+      ->needs(scans);
+  return scans;
+}
+
+void add_fit_flags(CLI::App& app, FitFlags& flags, bool required) {
+  auto* scans = add_scans_flags(app, flags, required);
   app.add_option("--free",
                  flags.files.free,
                  "Folder of clouds under the scans' names: shots without a return, up to where "
                  "all was free")
       ->check(CLI::ExistingDirectory)
-      ->needs(scans);
-  app.add_flag("--deskewed",
-               flags.files.is_deskewed,
-               "Motion within the scans was taken out: times of points are left aside")
       ->needs(scans);
   app.add_option("--leak-weight",
                  flags.leak_weight,
@@ -233,7 +251,7 @@ void paint_by_signal(EditedMap& map,
                         : ""));
 }
 
-std::vector<std::string> survey_inputs(const FitFlags& flags) {
+std::vector<std::string> survey_inputs(const ScansFlags& flags) {
   return {flags.files.scans, flags.files.poses, flags.files.free};
 }
 

@@ -7,43 +7,54 @@
 #include <vector>
 
 #include "pointflight/core/output_file.hpp"
-#include "pointflight/fit/map_fit.hpp"
-#include "pointflight/fit/survey_files.hpp"
-#include "pointflight/fit/survey_map.hpp"
-#include "recording/recorded_survey.hpp"
+#include "pointflight/recording/recorded_survey.hpp"
+#include "pointflight/survey/map_fit.hpp"
+#include "pointflight/survey/posed_scans.hpp"
+#include "pointflight/survey/survey_map.hpp"
 
 namespace pointflight::apps {
 
-/// Flags of commands that fit a map to the scans that it was made of.
-struct FitFlags {
+/// Flags of commands that read scans with poses.
+struct ScansFlags {
   SurveyFiles files;
   std::string scan_topic;
   std::string pose_topic;
   std::string sensor_pose;
+};
+
+/// --scans, --poses, --scan-topic, --pose-topic, --sensor-pose, --deskewed. Returns --scans.
+CLI::Option* add_scans_flags(CLI::App& app, ScansFlags& flags, bool required);
+
+/// Flags of commands that fit a map to the scans that it was made of.
+struct FitFlags : ScansFlags {
   std::string ghosts_out;
   double leak_weight = FitOptions{}.leak_weight;
   std::string signal_of;
   double signal_limit = 0.0;  ///< 0: found.
 };
 
-/// --scans, --poses, --scan-topic, --pose-topic, --sensor-pose, --free, --deskewed, --leak-weight,
-/// --export-ghosts, --signal-of, --signal-limit.
+/// Those of a survey, --free, --leak-weight, --export-ghosts, --signal-of, --signal-limit.
 void add_fit_flags(CLI::App& app, FitFlags& flags, bool required);
 
 /// The MCAP files of a folder, in the order of their names. Throws InputError where it holds a
 /// recording in SQLite.
 std::vector<std::string> recordings_in(const std::string& folder);
 
-/// How to open a recording: a .bag, a .mcap, a folder of .mcap; nothing where `path` is a folder
-/// without any. Throws InputError where it is neither a folder nor a recording.
+/// How to open a recording: a .bag, a .mcap, a folder of .mcap; nothing if `path` is a folder
+/// without any. Throws InputError if it is neither a folder nor a recording.
 std::optional<RecordingOpener> recording_of(const std::string& path);
 
+/// The scans of a folder of clouds or a recording, without poses. Throws InputError.
+std::unique_ptr<ScanSource> open_scans(const std::string& path,
+                                       const std::string& topic,
+                                       const Progress& progress);
+
 /// Files and folders that these flags read.
-std::vector<std::string> survey_inputs(const FitFlags& flags);
+std::vector<std::string> survey_inputs(const ScansFlags& flags);
 
 /// The survey of --scans: a folder of clouds, a recording or a folder of MCAP files. Throws
 /// InputError.
-std::unique_ptr<SurveySource> open_survey(const FitFlags& flags, const Progress& progress);
+std::unique_ptr<SurveySource> open_survey(const ScansFlags& flags, const Progress& progress);
 
 FitOptions fit_options(const FitFlags& flags);
 

@@ -9,11 +9,11 @@
 
 #include "apps/commands.hpp"
 #include "apps/flags.hpp"
-#include "apps/pictures.hpp"
 #include "apps/settings_json.hpp"
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/number_text.hpp"
 #include "pointflight/core/resources.hpp"
+#include "pointflight/picture/pictures.hpp"
 #include "pointflight/vehicle/step_response.hpp"
 
 namespace pointflight::apps {
@@ -140,7 +140,7 @@ void show_vehicle(const ShowFlags& flags) {
   } else {
     print_vehicle(s, responses);
   }
-  if (!flags.picture.empty()) draw_step_responses(s, responses, flags.picture);
+  if (!flags.picture.empty()) picture::draw_step_responses(s, responses, flags.picture);
 }
 
 }  // namespace

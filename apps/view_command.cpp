@@ -17,13 +17,13 @@
 #include "apps/terminal.hpp"
 #include "apps/view_flags.hpp"
 #include "pointflight/core/input_error.hpp"
+#include "pointflight/recording/mcap_timeline.hpp"
+#include "pointflight/ros/common/profile.hpp"
+#include "pointflight/ros/common/ros_link.hpp"
 #include "pointflight/run/playback.hpp"
-#include "recording/mcap_timeline.hpp"
-#include "ros_common/profile.hpp"
-#include "ros_common/ros_link.hpp"
-#include "view/foxglove_transport.hpp"
-#include "view/recording_player.hpp"
-#include "view/view_link.hpp"
+#include "pointflight/view/foxglove_transport.hpp"
+#include "pointflight/view/recording_player.hpp"
+#include "pointflight/view/view_link.hpp"
 
 namespace pointflight::apps {
 namespace {

@@ -6,8 +6,8 @@
 
 #include "apps/terminal.hpp"
 #include "pointflight/core/input_error.hpp"
-#include "view/map_blocks.hpp"
-#include "view/page_content.hpp"
+#include "pointflight/view/map_blocks.hpp"
+#include "pointflight/view/page_content.hpp"
 
 namespace pointflight::apps {
 namespace {

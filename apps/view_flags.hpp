@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "pointflight/map/surfel_map.hpp"
-#include "view/live_server.hpp"
+#include "pointflight/view/live_server.hpp"
 
 namespace pointflight::apps {
 

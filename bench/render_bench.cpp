@@ -19,10 +19,10 @@
 
 #include "pointflight/fidelity/scene_beams.hpp"
 #include "pointflight/lidar/lidar.hpp"
-#include "pointflight/map/map_builder.hpp"
-#include "pointflight/render/beam_renderer.hpp"
-#include "pointflight/render/direction_order.hpp"
-#include "pointflight/render/paper_renderer.hpp"
+#include "pointflight/map/build/map_builder.hpp"
+#include "pointflight/render/internal/beam_renderer.hpp"
+#include "pointflight/render/internal/direction_order.hpp"
+#include "pointflight/render/internal/paper_renderer.hpp"
 
 namespace pointflight {
 namespace {

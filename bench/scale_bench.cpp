@@ -16,7 +16,7 @@
 
 #include "pointflight/core/random.hpp"
 #include "pointflight/fidelity/scene_beams.hpp"
-#include "pointflight/render/beam_renderer.hpp"
+#include "pointflight/render/internal/beam_renderer.hpp"
 
 namespace pointflight {
 namespace {

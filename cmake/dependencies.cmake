@@ -6,6 +6,9 @@ find_package(fmt REQUIRED)
 find_package(yaml-cpp REQUIRED)
 find_package(nlohmann_json REQUIRED)
 find_package(nanoflann REQUIRED)
+find_package(Python3 REQUIRED COMPONENTS Interpreter)  # tools/messages.py
+find_package(PkgConfig REQUIRED)
+pkg_check_modules(CAIRO REQUIRED IMPORTED_TARGET GLOBAL cairo)
 find_package(boost_headers 1.74 REQUIRED)  # Beast and Asio
 if(POINTFLIGHT_TBB)
   find_package(TBB REQUIRED)

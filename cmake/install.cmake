@@ -4,10 +4,10 @@ include(CMakePackageConfigHelpers)
 get_property(modules GLOBAL PROPERTY POINTFLIGHT_MODULES)
 install(TARGETS ${modules} EXPORT pointflight ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
 install(TARGETS pointflight RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
-install(DIRECTORY pointflight ros_common recording campaign share view DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}
+install(DIRECTORY pointflight DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}
         FILES_MATCHING PATTERN "*.hpp" PATTERN "*-inl.hpp" EXCLUDE)
-install(FILES ${PROJECT_BINARY_DIR}/generated/pointflight/core/version.hpp
-        DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/pointflight/core)
+install(DIRECTORY ${PROJECT_BINARY_DIR}/generated/pointflight DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}
+        FILES_MATCHING PATTERN "*.hpp")
 install(DIRECTORY data/ DESTINATION ${CMAKE_INSTALL_DATADIR}/pointflight)
 install(EXPORT pointflight NAMESPACE pointflight:: FILE pointflight-targets.cmake
         DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/pointflight)

@@ -59,14 +59,20 @@ function(pointflight_batched result name)
   set(${result} ${all} PARENT_SCOPE)
 endfunction()
 
-# pointflight_module(name [FOLDER folder] PUBLIC libs... PRIVATE libs...): the library target
-# pointflight::<name> from all sources in pointflight/<name>, or in the folder.
+# pointflight_module(name [FOLDER folder] PUBLIC libs... PRIVATE libs...): the library target pointflight::<name> from
+# all sources in pointflight/<folder>, which is the name if none is given, but for folders that are targets of their own.
+set(POINTFLIGHT_OWN_TARGETS map/build map/edit campaign/mpi share/dds)
 function(pointflight_module name)
   cmake_parse_arguments(ARG "" "FOLDER" "PUBLIC;PRIVATE" ${ARGN})
   if(NOT ARG_FOLDER)
-    set(ARG_FOLDER pointflight/${name})
+    set(ARG_FOLDER ${name})
   endif()
-  file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/${ARG_FOLDER}/*.cpp)
+  file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/pointflight/${ARG_FOLDER}/*.cpp)
+  foreach(folder IN LISTS POINTFLIGHT_OWN_TARGETS)
+    if(NOT folder STREQUAL ARG_FOLDER)
+      list(FILTER sources EXCLUDE REGEX "/pointflight/${folder}/")
+    endif()
+  endforeach()
   pointflight_batched(batches ${name} ${sources})
   add_library(pointflight_${name} STATIC ${batches})
   add_library(pointflight::${name} ALIAS pointflight_${name})
@@ -84,6 +90,19 @@ function(pointflight_module name)
   set_property(GLOBAL APPEND PROPERTY POINTFLIGHT_MODULES pointflight_${name})
 endfunction()
 
+# pointflight_messages(cpp|idl folder output options...): what tools/messages.py makes of the .msg files in a folder. It is
+# made when the build is configured, and again whenever one of them changes.
+function(pointflight_messages language folder output)
+  set(tool ${PROJECT_SOURCE_DIR}/tools/messages.py)
+  file(GLOB messages CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/${folder}/*/*.msg)
+  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${tool} ${messages})
+  execute_process(COMMAND ${Python3_EXECUTABLE} ${tool} ${language} ${PROJECT_SOURCE_DIR}/${folder} ${output} ${ARGN}
+                  RESULT_VARIABLE failed)
+  if(failed)
+    message(FATAL_ERROR "tools/messages.py failed (above)")
+  endif()
+endfunction()
+
 # pointflight_loaded(name SOURCES files... LIBRARIES libs...): pointflight_<name>, a library that the program loads when
 # it is asked for (apps/modules.cpp), so that it needs none of these libraries itself.
 function(pointflight_loaded name)
@@ -92,7 +111,7 @@ function(pointflight_loaded name)
   set_target_properties(pointflight_${name} PROPERTIES CXX_VISIBILITY_PRESET hidden
     LIBRARY_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/lib/pointflight)
   target_compile_options(pointflight_${name} PRIVATE -Wall -Wextra $<$<BOOL:${POINTFLIGHT_WERROR}>:-Werror>)
-  target_include_directories(pointflight_${name} PRIVATE ${PROJECT_SOURCE_DIR})
+  target_include_directories(pointflight_${name} PRIVATE ${PROJECT_SOURCE_DIR} ${PROJECT_BINARY_DIR}/generated)
   target_link_libraries(pointflight_${name} PRIVATE ${ARG_LIBRARIES})
   install(TARGETS pointflight_${name} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/pointflight)
 endfunction()

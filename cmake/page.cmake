@@ -9,14 +9,14 @@ if(NOT EXISTS ${esbuild} OR NOT EXISTS ${modules}/three/package.json OR
   message(STATUS "esbuild, three.js or readers of messages not found: the page of --view is left out (./dev build fetches them by npm)")
   return()
 endif()
-file(GLOB page_sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/view/page/*)
+file(GLOB page_sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/pointflight/view/page/*)
 add_custom_command(
   OUTPUT ${page}/page.js ${page}/index.html
   COMMAND ${CMAKE_COMMAND} -E make_directory ${page}
-  COMMAND ${CMAKE_COMMAND} -E env NODE_PATH=${modules} ${esbuild} ${PROJECT_SOURCE_DIR}/view/page/main.js
+  COMMAND ${CMAKE_COMMAND} -E env NODE_PATH=${modules} ${esbuild} ${PROJECT_SOURCE_DIR}/pointflight/view/page/main.js
           --bundle --minify --format=esm --target=es2022 --log-level=warning
           --legal-comments=inline --outfile=${page}/page.js
-  COMMAND ${CMAKE_COMMAND} -E copy ${PROJECT_SOURCE_DIR}/view/page/index.html ${page}/index.html
+  COMMAND ${CMAKE_COMMAND} -E copy ${PROJECT_SOURCE_DIR}/pointflight/view/page/index.html ${page}/index.html
   DEPENDS ${page_sources}
   VERBATIM)
 add_custom_target(pointflight_page ALL DEPENDS ${page}/page.js ${page}/index.html)

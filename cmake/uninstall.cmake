@@ -45,7 +45,7 @@ endforeach()
 # rmdir refuses where anything is left, whatever its name
 list(REMOVE_DUPLICATES folders)
 foreach(folder IN LISTS folders)
-  while(folder MATCHES "/(pointflight|include/(ros_common|recording|campaign|share|view))(/|$)")
+  while(folder MATCHES "/pointflight(/|$)")
     string(FIND "${prefix}/" "${folder}/" at)
     if(at EQUAL 0)
       break()  # the prefix itself, or above it

@@ -8,12 +8,12 @@
 
 #include "pointflight/core/math.hpp"
 #include "pointflight/core/random.hpp"
+#include "pointflight/recording/mcap_writer.hpp"
+#include "pointflight/recording/recording.hpp"
 #include "pointflight/render/renderer.hpp"
+#include "pointflight/ros/common/ros_link.hpp"
 #include "pointflight/run/run_loop.hpp"
 #include "pointflight/vehicle/controller.hpp"
-#include "recording/mcap_writer.hpp"
-#include "recording/recording.hpp"
-#include "ros_common/ros_link.hpp"
 
 using namespace pointflight;
 

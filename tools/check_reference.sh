@@ -11,7 +11,9 @@ scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
 folder=${1:-$scratch}
 mkdir -p "$folder"
-{ cat tools/Doxyfile; echo "OUTPUT_DIRECTORY = \"$folder\""; } | doxygen - >/dev/null 2>"$scratch/log" ||
+python3 tools/messages.py cpp pointflight/ros/messages "$scratch/pointflight/ros/common/messages.hpp"
+python3 tools/messages.py cpp pointflight/share/messages "$scratch/pointflight/share/message_structs.hpp" --namespace share_msg
+{ cat tools/Doxyfile; echo "INPUT += $scratch/pointflight"; echo "OUTPUT_DIRECTORY = \"$folder\""; } | doxygen - >/dev/null 2>"$scratch/log" ||
   echo "check_reference: doxygen failed" >>"$scratch/log"
 # a class passes its warnings on to those derived from it
 warnings=$(sort -u "$scratch/log" | sed "s|^$PWD/||")

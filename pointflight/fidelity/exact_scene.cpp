@@ -15,7 +15,7 @@
 #include "pointflight/core/mapped_file.hpp"
 #include "pointflight/core/math.hpp"
 #include "pointflight/core/resources.hpp"
-#include "pointflight/geometry/morton.hpp"
+#include "pointflight/geometry/internal/morton.hpp"
 #include "pointflight/geometry/rotation.hpp"
 #include "pointflight/io/byte_cursor.hpp"
 

@@ -5,49 +5,18 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <limits>
 #include <nanoflann.hpp>
 
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/io/cloud_reader.hpp"
-#include "pointflight/io/pose_files.hpp"
 
 namespace pointflight {
 namespace {
 
-namespace fs = std::filesystem;
-
 constexpr double kSupportRadius = 0.25;  // m
 constexpr std::size_t kSupportPoints = 16;
 constexpr float kRangeMax = 1000.0f;  // a late hit must be seen as late
-constexpr double kRangeMin = 0.01;
-
-std::vector<std::string> clouds_in(const std::string& folder) {
-  std::vector<std::string> names;
-  std::error_code error;
-  for (const auto& entry : fs::directory_iterator(folder, error)) {
-    if (entry.is_regular_file() && entry.path().extension() == ".pcd") {
-      names.push_back(entry.path().filename().string());
-    }
-  }
-  if (error) throw InputError(fmt::format("{}: not a folder that can be read", folder));
-  std::sort(names.begin(), names.end());
-  return names;
-}
-
-RealScan read_scan(const std::string& folder, const std::string& name, const Pose& pose) {
-  RealScan scan{name, pose, {}};
-  const auto reader = open_cloud((fs::path(folder) / name).string());
-  std::vector<CloudPoint> batch;
-  while (reader->read(batch)) {
-    for (const CloudPoint& point : batch) {
-      if (!point.position.allFinite() || point.position.norm() < kRangeMin) continue;
-      scan.points_sensor.push_back(point.position.cast<float>());
-    }
-  }
-  return scan;
-}
 
 /// Points in nanoflann's tree, as it asks for them.
 struct PointTree {
@@ -124,24 +93,19 @@ class PointsWithin {
 
 }  // namespace
 
-std::vector<RealScan> read_real_scans(const std::string& folder, const std::string& poses) {
-  const std::vector<TumPose> trajectory = read_tum(poses);
-  std::vector<std::string> names;
-  for (const TumPose& pose : trajectory) {
-    if (!pose.file.empty()) names.push_back(pose.file);
-  }
-  if (names.empty()) names = clouds_in(folder);
-  if (names.size() != trajectory.size()) {
-    throw InputError(fmt::format(
-        "{}: {} poses for {} scans in {}; a ninth column can name the scan of each pose",
-        poses,
-        trajectory.size(),
-        names.size(),
-        folder));
-  }
+std::vector<RealScan> read_real_scans(const SurveySource& survey, const Progress& progress) {
   std::vector<RealScan> scans;
-  for (std::size_t i = 0; i < names.size(); ++i) {
-    scans.push_back(read_scan(folder, names[i], trajectory[i].T_world_sensor));
+  for (std::size_t i = 0; i < survey.scan_count(); ++i) {
+    scans.push_back({survey.name(i), survey.pose(i), {}});
+  }
+  std::vector<SurveyRay> batch;
+  const auto reader = survey.open();
+  while (reader->read(batch)) {
+    report(progress, "reading scans", reader->share_read());
+    std::vector<SurveyRay>& rays = scans[reader->scan()].rays;
+    for (const SurveyRay& ray : batch) {
+      if (ray.is_return) rays.push_back(ray);
+    }
   }
   return scans;
 }
@@ -176,13 +140,11 @@ std::vector<ComparedRay> compare_scan(const RealScan& scan,
                                       const SupportCloud* cloud,
                                       const Executor& executor) {
   std::vector<Ray> rays;
-  std::vector<ComparedRay> compared(scan.points_sensor.size());
-  rays.reserve(scan.points_sensor.size());
-  for (std::size_t i = 0; i < scan.points_sensor.size(); ++i) {
-    const Vector3d p = scan.points_sensor[i].cast<double>();
-    compared[i].range = static_cast<float>(p.norm());
-    const Vector3d direction = scan.T_world_sensor.rotation * p.normalized();
-    rays.push_back({scan.T_world_sensor.translation, direction.cast<float>(), kRangeMax});
+  std::vector<ComparedRay> compared(scan.rays.size());
+  rays.reserve(scan.rays.size());
+  for (std::size_t i = 0; i < scan.rays.size(); ++i) {
+    compared[i].range = scan.rays[i].range;
+    rays.push_back({scan.rays[i].origin_world, scan.rays[i].direction_world, kRangeMax});
   }
   std::vector<Hit> hits(rays.size());
   RayBatch batch;
@@ -194,8 +156,7 @@ std::vector<ComparedRay> compare_scan(const RealScan& scan,
     for (std::size_t i = begin; i < end; ++i) {
       if (hits[i].is_return()) compared[i].rendered = hits[i].range;
       if (cloud == nullptr) continue;
-      compared[i].supported =
-          cloud->supports(scan.T_world_sensor * scan.points_sensor[i].cast<double>());
+      compared[i].supported = cloud->supports(scan.rays[i].point_world());
     }
   });
   return compared;
@@ -209,9 +170,8 @@ ScanPlanes::ScanPlanes(const std::vector<RealScan>& scans)
     : scans_(scans), tree_(std::make_unique<Tree>()) {
   if (!scans.empty()) tree_->origin = scans.front().T_world_sensor.translation;
   for (std::uint32_t i = 0; i < scans.size(); ++i) {
-    for (const Vector3f& p : scans[i].points_sensor) {
-      const Vector3d world = scans[i].T_world_sensor * p.cast<double>();
-      tree_->points.emplace_back((world - tree_->origin).cast<float>());
+    for (const SurveyRay& ray : scans[i].rays) {
+      tree_->points.emplace_back((ray.point_world() - tree_->origin).cast<float>());
       tree_->scan.push_back(i);
     }
   }
@@ -224,14 +184,14 @@ ErrorCollector ScanPlanes::compare(std::size_t scan, const Executor& executor) c
   constexpr std::size_t kStride = 5;  // a fifth of the rays tells as much
   constexpr double kFlat = 0.01;      // least over middle variance
   const RealScan& own = scans_[scan];
-  const std::size_t count = (own.points_sensor.size() + kStride - 1) / kStride;
+  const std::size_t count = (own.rays.size() + kStride - 1) / kStride;
   // NaN where there is no plane
   std::vector<double> ranges(count, std::numeric_limits<double>::quiet_NaN());
   executor.parallel_for(count, 256, [&](std::size_t begin, std::size_t end) {
     PointsWithin near(kSupportRadius);
     for (std::size_t i = begin; i < end; ++i) {
-      const Vector3d p = own.points_sensor[i * kStride].cast<double>();
-      const Vector3d place = own.T_world_sensor * p - tree_->origin;
+      const SurveyRay& ray = own.rays[i * kStride];
+      const Vector3d place = ray.point_world() - tree_->origin;
       near.clear();
       tree_->index->findNeighbors(near, place.data(), {});
       near.sort();
@@ -250,16 +210,15 @@ ErrorCollector ScanPlanes::compare(std::size_t scan, const Executor& executor) c
       const Eigen::SelfAdjointEigenSolver<Matrix3d> axes(products / n - mean * mean.transpose());
       if (axes.eigenvalues()[0] > kFlat * axes.eigenvalues()[1]) continue;
       const Vector3d normal = axes.eigenvectors().col(0);
-      const Vector3d direction = own.T_world_sensor.rotation * p.normalized();
-      const double slope = normal.dot(direction);
+      const double slope = normal.dot(ray.direction_world.cast<double>());
       if (std::abs(slope) < 0.02) continue;
-      ranges[i] = p.norm() + normal.dot(mean) / slope;
+      ranges[i] = static_cast<double>(ray.range) + normal.dot(mean) / slope;
     }
   });
   ErrorCollector collector;
   for (std::size_t i = 0; i < count; ++i) {
     if (std::isnan(ranges[i])) continue;
-    collector.add(static_cast<double>(own.points_sensor[i * kStride].norm()), ranges[i]);
+    collector.add(static_cast<double>(own.rays[i * kStride].range), ranges[i]);
   }
   return collector;
 }

@@ -6,23 +6,28 @@
 #include <vector>
 
 #include "pointflight/core/parallel.hpp"
+#include "pointflight/core/progress.hpp"
 #include "pointflight/fidelity/error_statistics.hpp"
 #include "pointflight/geometry/types.hpp"
 #include "pointflight/render/renderer.hpp"
+#include "pointflight/survey/survey_rays.hpp"
 
 namespace pointflight {
 
-/// A real scan: returns in the sensor frame and the sensor's pose.
+/// A real scan.
 struct RealScan {
-  std::string file;                     ///< Name without folder.
-  Pose T_world_sensor;                  ///< At the scan's stamp: one pose for all of its points.
-  std::vector<Vector3f> points_sensor;  ///< m
+  std::string name;             ///< Its file's, or its number.
+  Pose T_world_sensor;          ///< At the scan's stamp.
+  std::vector<SurveyRay> rays;  ///< Its returns, each with the sensor's position at its own time.
+
+  /// A return as seen from the scan's pose, m.
+  [[nodiscard]] Vector3f point_sensor(std::size_t i) const {
+    return (T_world_sensor.inverse() * rays[i].point_world()).cast<float>();
+  }
 };
 
-/// Reads the scans that a TUM file of poses (map <- sensor) names in its ninth column; without one,
-/// the clouds of the folder in sorted order. Points that are not finite or nearer than 1 cm are
-/// left out. Throws InputError.
-std::vector<RealScan> read_real_scans(const std::string& folder, const std::string& poses);
+/// All scans of a survey. Throws InputError.
+std::vector<RealScan> read_real_scans(const SurveySource& survey, const Progress& progress = {});
 
 /// Which places a cloud supports: those with 16 or more of its points within 25 cm.
 class SupportCloud {
@@ -41,11 +46,11 @@ class SupportCloud {
 /// One real return and what was rendered along its ray.
 struct ComparedRay {
   float range = 0.0f;      ///< Measured, m.
-  float rendered = -1.0f;  ///< m; negative where nothing was met.
+  float rendered = -1.0f;  ///< m; negative if nothing was hit.
   bool supported = false;  ///< By the cloud that was given: `SupportCloud`.
 };
 
-/// Renders the ray of each real return from the scan's pose; one result a point, in their order.
+/// Renders the ray of each real return; one result a return, in their order.
 /// Without a cloud no ray is supported.
 std::vector<ComparedRay> compare_scan(const RealScan& scan,
                                       const Renderer& renderer,

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "pointflight/fidelity/exact_scene.hpp"
-#include "pointflight/geometry/shape_tree.hpp"
+#include "pointflight/geometry/internal/shape_tree.hpp"
 
 namespace pointflight {
 

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "pointflight/fit/place_cells.hpp"
+#include "pointflight/survey/place_cells.hpp"
 
 namespace pointflight {
 namespace {

@@ -4,7 +4,7 @@
 #include <unordered_map>
 #include <vector>
 
-#include "pointflight/fit/survey_rays.hpp"
+#include "pointflight/survey/survey_rays.hpp"
 
 namespace pointflight {
 

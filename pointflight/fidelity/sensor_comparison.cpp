@@ -69,7 +69,7 @@ ReturnShare* share_of(SensorComparison& made, const Hit& hit) {
 double least_range_of(const std::vector<RealScan>& scans) {
   std::vector<float> ranges;
   for (const RealScan& scan : scans) {
-    for (const Vector3f& point : scan.points_sensor) ranges.push_back(point.norm());
+    for (const SurveyRay& ray : scan.rays) ranges.push_back(ray.range);
   }
   if (ranges.empty()) return 0.0;
   const auto at = ranges.begin() +
@@ -138,7 +138,7 @@ class Counter {
       for (const Vector3f& direction : beams_of(scan).directions_sensor) {
         real[cell_of(direction)] += 1.0;
       }
-      made_.returns += scan.points_sensor.size();
+      made_.returns += scan.rays.size();
     }
     blocked_.resize(fired.size());
     for (std::size_t i = 0; i < fired.size(); ++i) {
@@ -150,7 +150,8 @@ class Counter {
   /// Where beams leave the sensor changes little within a cell.
   [[nodiscard]] RealBeams beams_of(const RealScan& scan) const {
     RealBeams real;
-    for (const Vector3f& point : scan.points_sensor) {
+    for (std::size_t i = 0; i < scan.rays.size(); ++i) {
+      const Vector3f point = scan.point_sensor(i);
       const Vector3f& origin = origins_[cell_of(point.normalized())];
       const Vector3f way = point - origin;
       real.origins_sensor.push_back(origin);

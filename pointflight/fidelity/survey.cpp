@@ -11,11 +11,11 @@
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/core/random.hpp"
-#include "pointflight/fit/place_cells.hpp"
 #include "pointflight/geometry/rotation.hpp"
 #include "pointflight/io/pcd_writer.hpp"
 #include "pointflight/io/pose_files.hpp"
 #include "pointflight/lidar/lidar.hpp"
+#include "pointflight/survey/place_cells.hpp"
 
 namespace pointflight {
 namespace {

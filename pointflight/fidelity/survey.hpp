@@ -8,8 +8,8 @@
 #include "pointflight/core/parallel.hpp"
 #include "pointflight/core/progress.hpp"
 #include "pointflight/fidelity/survey_walk.hpp"
-#include "pointflight/fit/survey_rays.hpp"
 #include "pointflight/lidar/lidar_settings.hpp"
+#include "pointflight/survey/survey_rays.hpp"
 
 namespace pointflight {
 

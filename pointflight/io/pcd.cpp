@@ -10,7 +10,7 @@
 #include "pointflight/io/byte_cursor.hpp"
 #include "pointflight/io/file_unit.hpp"
 #include "pointflight/io/formats.hpp"
-#include "pointflight/io/pcd_header.hpp"
+#include "pointflight/io/internal/pcd_header.hpp"
 
 // PCD 0.7 as documented by the Point Cloud Library, "The PCD (Point Cloud Data) file format".
 namespace pointflight {

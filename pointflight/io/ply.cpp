@@ -8,7 +8,7 @@
 #include "pointflight/io/byte_cursor.hpp"
 #include "pointflight/io/file_unit.hpp"
 #include "pointflight/io/formats.hpp"
-#include "pointflight/io/ply_header.hpp"
+#include "pointflight/io/internal/ply_header.hpp"
 
 // PLY as described by Greg Turk, "The PLY Polygon File Format" (1994).
 namespace pointflight {

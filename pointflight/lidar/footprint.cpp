@@ -7,7 +7,7 @@
 
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/math.hpp"
-#include "pointflight/render/direction_order.hpp"
+#include "pointflight/render/internal/direction_order.hpp"
 
 namespace pointflight {
 namespace {

@@ -7,7 +7,7 @@
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/math.hpp"
 #include "pointflight/core/random.hpp"
-#include "pointflight/lidar/aimed.hpp"
+#include "pointflight/lidar/internal/aimed.hpp"
 
 namespace pointflight {
 namespace {

@@ -1,6 +1,6 @@
 #include "pointflight/lidar/scan_beams.hpp"
 
-#include "pointflight/render/direction_order.hpp"
+#include "pointflight/render/internal/direction_order.hpp"
 
 namespace pointflight {
 

@@ -4,8 +4,8 @@
 #include <span>
 #include <vector>
 
-#include "pointflight/map/bvh8_part.hpp"
-#include "pointflight/map/voxel_moments.hpp"
+#include "pointflight/map/internal/bvh8_part.hpp"
+#include "pointflight/map/internal/voxel_moments.hpp"
 
 namespace pointflight {
 namespace {

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "pointflight/core/math.hpp"
-#include "pointflight/map/covariance_axes.hpp"
+#include "pointflight/map/internal/covariance_axes.hpp"
 
 namespace pointflight {
 namespace {

@@ -1,6 +1,6 @@
 #include <cmath>
 
-#include "pointflight/map/nearest_kernel.hpp"
+#include "pointflight/map/internal/nearest_kernel.hpp"
 #include "pointflight/map/surfel_map.hpp"
 
 namespace pointflight {

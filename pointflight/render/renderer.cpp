@@ -7,8 +7,8 @@
 #include <variant>
 
 #include "pointflight/core/argument.hpp"
-#include "pointflight/render/beam_renderer.hpp"
-#include "pointflight/render/paper_renderer.hpp"
+#include "pointflight/render/internal/beam_renderer.hpp"
+#include "pointflight/render/internal/paper_renderer.hpp"
 
 namespace pointflight {
 namespace {

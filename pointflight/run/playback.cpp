@@ -17,7 +17,7 @@
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/geometry/rotation.hpp"
 #include "pointflight/io/csv_table.hpp"
-#include "pointflight/run/run_files.hpp"
+#include "pointflight/run/internal/run_files.hpp"
 #include "pointflight/run/run_loop.hpp"
 #include "pointflight/sim/flight_recorder.hpp"
 

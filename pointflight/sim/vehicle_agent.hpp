@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "pointflight/sim/internal/proximity.hpp"
 #include "pointflight/sim/onboard_sensors.hpp"
-#include "pointflight/sim/proximity.hpp"
 #include "pointflight/sim/samples.hpp"
 #include "pointflight/sim/scenario.hpp"
 #include "pointflight/sim/shared_parts.hpp"

@@ -1,7 +1,7 @@
 #include "pointflight/world/contact.hpp"
 
 #include "pointflight/core/constants.hpp"
-#include "pointflight/map/near_surfels.hpp"
+#include "pointflight/map/internal/near_surfels.hpp"
 
 namespace pointflight {
 namespace {

@@ -15,8 +15,8 @@ struct Contact {
 };
 
 /// Distance of a hull to the map within `reach`; nothing where all is farther. To the surfels'
-/// boxes (map/near_surfels.hpp), so that collisions and rays see the same surface. Where a ball's
-/// centre lies inside a box the distance is minus its radius.
+/// boxes (map/internal/near_surfels.hpp), so that collisions and rays see the same surface. Where a
+/// ball's centre lies inside a box the distance is minus its radius.
 std::optional<Contact> contact_with_map(const SurfelMap& map,
                                         const Solid& hull,
                                         const Pose& T_world_hull,

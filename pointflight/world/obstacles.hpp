@@ -11,7 +11,7 @@
 
 #include "pointflight/core/parallel.hpp"
 #include "pointflight/core/settings.hpp"
-#include "pointflight/geometry/ball_tree.hpp"
+#include "pointflight/geometry/internal/ball_tree.hpp"
 #include "pointflight/map/body.hpp"
 
 namespace pointflight {

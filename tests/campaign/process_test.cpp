@@ -1,12 +1,12 @@
 // Programs under limits: how they end, and that nothing of them is left.
-#include "campaign/process.hpp"
+#include "pointflight/campaign/process.hpp"
 
 #include <gtest/gtest.h>
 
 #include <csignal>
 #include <thread>
 
-#include "campaign/engines.hpp"
+#include "pointflight/campaign/engines.hpp"
 #include "tests/support.hpp"
 
 namespace pointflight {

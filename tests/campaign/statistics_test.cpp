@@ -1,5 +1,5 @@
 // Intervals against published values, tables, conditions.
-#include "campaign/statistics.hpp"
+#include "pointflight/campaign/statistics.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // Studies as files, the flights that they mean, and scenarios with other values.
-#include "campaign/study.hpp"
+#include "pointflight/campaign/study.hpp"
 
 #include <gtest/gtest.h>
 

@@ -46,7 +46,7 @@ class SensorComparisonTest : public ::testing::Test {
       const Scan scan = lidar.take(request, PoseTrack(pose), *renderer_, executor_);
       RealScan real{"scan", pose, {}};
       for (const ScanPoint& point : scan.points) {
-        real.points_sensor.push_back(point.position_sensor);
+        real.rays.push_back(survey_ray(pose, point.position_sensor.cast<double>(), true));
       }
       scans_.push_back(std::move(real));
     }
@@ -93,7 +93,10 @@ TEST_F(SensorComparisonTest, Statistics_AnotherReflectivityIsFartherOff) {
 TEST_F(SensorComparisonTest, Statistics_DirectionsThatSomethingBlocksDoNotCount) {
   if (testing::kSanitized) GTEST_SKIP() << "numbers; the code is that of the other tests";
   for (RealScan& scan : scans_) {  // the mast behind the sensor
-    std::erase_if(scan.points_sensor, [](const Vector3f& p) { return p.x() < -std::abs(p.y()); });
+    std::erase_if(scan.rays, [&](const SurveyRay& ray) {
+      const Vector3d p = scan.T_world_sensor.inverse() * ray.point_world();
+      return p.x() < -std::abs(p.y());
+    });
   }
   const SensorComparison made = against(reflecting(0.2));
   EXPECT_NEAR(made.blocked, 0.25 * made.beams, 0.05 * made.beams);

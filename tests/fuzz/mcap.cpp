@@ -3,8 +3,8 @@
 #include <cstdint>
 #include <string>
 
-#include "recording/mcap_reader.hpp"
-#include "recording/mcap_timeline.hpp"
+#include "pointflight/recording/mcap_reader.hpp"
+#include "pointflight/recording/mcap_timeline.hpp"
 #include "tests/fuzz/one_line.hpp"
 
 namespace {

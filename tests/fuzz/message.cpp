@@ -2,7 +2,7 @@
 #include <cstdint>
 #include <tuple>
 
-#include "ros_common/codec.hpp"
+#include "pointflight/ros/common/codec.hpp"
 
 namespace {
 

@@ -3,7 +3,7 @@
 // The input is a list of messages, each a byte that says what it is (bits 0 to 2 the type and
 // topic, bit 3 the wire), two bytes of its length, and its bytes. An input whose first byte is 255
 // is taken as edits (message, offset, value) of a good recording.
-#include "recording/recorded_survey.hpp"
+#include "pointflight/recording/recorded_survey.hpp"
 
 #include <cmath>
 #include <cstdint>
@@ -13,9 +13,9 @@
 #include <vector>
 
 #include "pointflight/core/input_error.hpp"
-#include "ros_common/codec.hpp"
-#include "ros_common/conversion.hpp"
-#include "ros_common/point_layout.hpp"
+#include "pointflight/ros/common/codec.hpp"
+#include "pointflight/ros/common/conversion.hpp"
+#include "pointflight/ros/common/point_layout.hpp"
 
 namespace pointflight {
 namespace {

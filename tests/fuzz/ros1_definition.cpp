@@ -1,5 +1,5 @@
 // Any text as a ROS 1 definition with any bytes after a zero: numbers, or nothing.
-#include "ros_common/ros1_definition.hpp"
+#include "pointflight/ros/common/ros1_definition.hpp"
 
 #include <algorithm>
 #include <cstdint>

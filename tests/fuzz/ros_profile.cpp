@@ -4,7 +4,7 @@
 #include <string_view>
 
 #include "pointflight/core/input_error.hpp"
-#include "ros_common/profile.hpp"
+#include "pointflight/ros/common/profile.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::string_view text(reinterpret_cast<const char*>(data), size);

@@ -6,9 +6,9 @@
 
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/geometry/shape_scene.hpp"
-#include "pointflight/map/map_builder.hpp"
-#include "share/common_ground.hpp"
-#include "share/share_link.hpp"
+#include "pointflight/map/build/map_builder.hpp"
+#include "pointflight/share/common_ground.hpp"
+#include "pointflight/share/share_link.hpp"
 #include "tests/share/bus.hpp"
 
 namespace {

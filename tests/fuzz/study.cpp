@@ -1,11 +1,11 @@
 // Any bytes as a campaign's study: its flights and a scenario with its values, or an InputError of
 // one line.
-#include "campaign/study.hpp"
+#include "pointflight/campaign/study.hpp"
 
 #include <cstdint>
 #include <string>
 
-#include "campaign/run_record.hpp"
+#include "pointflight/campaign/run_record.hpp"
 #include "tests/fuzz/one_line.hpp"
 
 namespace {

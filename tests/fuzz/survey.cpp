@@ -8,8 +8,8 @@
 #include <string_view>
 
 #include "pointflight/core/input_error.hpp"
-#include "pointflight/fit/survey_files.hpp"
-#include "pointflight/fit/surveyed_places.hpp"
+#include "pointflight/survey/posed_scans.hpp"
+#include "pointflight/survey/surveyed_places.hpp"
 
 namespace pointflight {
 namespace {

@@ -6,10 +6,10 @@
 #include <vector>
 
 #include "pointflight/core/input_error.hpp"
-#include "view/foxglove.hpp"
-#include "view/page_content.hpp"
-#include "view/page_orders.hpp"
-#include "view/web_rules.hpp"
+#include "pointflight/view/foxglove.hpp"
+#include "pointflight/view/page_content.hpp"
+#include "pointflight/view/page_orders.hpp"
+#include "pointflight/view/web_rules.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace pointflight;

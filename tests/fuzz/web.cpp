@@ -14,7 +14,7 @@
 #include <string>
 #include <string_view>
 
-#include "view/live_server.hpp"
+#include "pointflight/view/live_server.hpp"
 
 namespace {
 

@@ -1,4 +1,4 @@
-#include "pointflight/geometry/ball_tree.hpp"
+#include "pointflight/geometry/internal/ball_tree.hpp"
 
 #include <gtest/gtest.h>
 

@@ -4,7 +4,7 @@
 
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/random.hpp"
-#include "pointflight/geometry/morton.hpp"
+#include "pointflight/geometry/internal/morton.hpp"
 #include "pointflight/geometry/rotation.hpp"
 #include "pointflight/geometry/shape_scene.hpp"
 

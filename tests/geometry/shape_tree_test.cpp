@@ -1,4 +1,4 @@
-#include "pointflight/geometry/shape_tree.hpp"
+#include "pointflight/geometry/internal/shape_tree.hpp"
 
 #include <gtest/gtest.h>
 

@@ -113,6 +113,14 @@ TEST_F(Program, MakesAMapOfARecordingAndSaysWhatItSaw) {
     const Json only = Json::parse(diff.out)["only_in_first"];
     EXPECT_GT(only["surfels"].get<int>(), 5000);
     EXPECT_LT(only["share"].get<double>(), 0.002) << diff.out;
+    // and its rays lead to that map
+    const Result compared = run(fmt::format(
+        "compare {} --scans {} --scan-topic /drone0/mid360/points --json", map(), recording));
+    ASSERT_EQ(compared.code, 0) << compared.err;
+    const Json rays = Json::parse(compared.out)["overall"]["all"];
+    EXPECT_GT(rays["rays"].get<int>(), 40000);
+    EXPECT_LT(rays["median_abs_error"].get<double>(), 0.03);
+    EXPECT_LT(rays["wrong_fraction"].get<double>(), 0.05);
   }
   const Json info = Json::parse(
       run(fmt::format("map info {} --json --at 2,5,-3 --at 0,0,99", in("seen.pfmap"))).out);

@@ -11,7 +11,7 @@
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/random.hpp"
 #include "pointflight/geometry/rotation.hpp"
-#include "pointflight/map/map_edit.hpp"
+#include "pointflight/map/edit/map_edit.hpp"
 #include "tests/support.hpp"
 
 namespace pointflight {

@@ -7,8 +7,8 @@
 
 #include "pointflight/core/hash.hpp"
 #include "pointflight/geometry/shape_scene.hpp"
-#include "pointflight/map/map_builder.hpp"
-#include "pointflight/map/map_edit.hpp"
+#include "pointflight/map/build/map_builder.hpp"
+#include "pointflight/map/edit/map_edit.hpp"
 #include "tests/support.hpp"
 
 namespace pointflight {

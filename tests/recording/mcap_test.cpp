@@ -2,9 +2,9 @@
 // tests/integration.
 #include <gtest/gtest.h>
 
-#include "recording/mcap_reader.hpp"
-#include "recording/mcap_writer.hpp"
-#include "ros_common/description.hpp"
+#include "pointflight/recording/mcap_reader.hpp"
+#include "pointflight/recording/mcap_writer.hpp"
+#include "pointflight/ros/common/description.hpp"
 #include "tests/support.hpp"
 
 namespace pointflight {

@@ -1,15 +1,15 @@
 // A recording read from any time on: beside the plain reader, of files cut anywhere, with chunks
 // that overlap or with none.
-#include "recording/mcap_timeline.hpp"
+#include "pointflight/recording/mcap_timeline.hpp"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
-#include "recording/mcap_format.hpp"
-#include "recording/mcap_reader.hpp"
-#include "recording/mcap_writer.hpp"
-#include "ros_common/description.hpp"
+#include "pointflight/recording/internal/mcap_format.hpp"
+#include "pointflight/recording/mcap_reader.hpp"
+#include "pointflight/recording/mcap_writer.hpp"
+#include "pointflight/ros/common/description.hpp"
 #include "tests/support.hpp"
 
 namespace pointflight {

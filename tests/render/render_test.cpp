@@ -9,8 +9,8 @@
 #include "pointflight/core/output_file.hpp"
 #include "pointflight/core/random.hpp"
 #include "pointflight/lidar/beam_pattern.hpp"
-#include "pointflight/render/beam_renderer.hpp"
-#include "pointflight/render/paper_renderer.hpp"
+#include "pointflight/render/internal/beam_renderer.hpp"
+#include "pointflight/render/internal/paper_renderer.hpp"
 #include "tests/render/coverage_reference.hpp"
 #include "tests/support.hpp"
 

@@ -1,9 +1,9 @@
 #!/bin/sh
-# The packages of ros/ by Debian's catkin and ament: do they build, do the launch files start what they
+# The packages of ros_packages/ by Debian's catkin and ament: do they build, do the launch files start what they
 # say? packages_test.sh PROGRAM SOURCE_FOLDER
 set -eu
 program=$1
-ros=$2/ros
+ros=$2/ros_packages
 PATH=/usr/bin:/bin
 export PATH ROS_VERSION=1
 unset ROS_DISTRO CMAKE_PREFIX_PATH

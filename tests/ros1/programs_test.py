@@ -129,7 +129,7 @@ class Launch:
         self.log = open(f"{self.results}.log", "w+")
         environment = dict(
             os.environ, ROS_MASTER_URI=f"http://127.0.0.1:{port}", ROS_IP="127.0.0.1",
-            ROS_HOME=f"{folder}/home", ROS_PACKAGE_PATH=f"{SOURCE}/ros/catkin:{folder}/packages",
+            ROS_HOME=f"{folder}/home", ROS_PACKAGE_PATH=f"{SOURCE}/ros_packages/catkin:{folder}/packages",
             STUB_RESULTS=self.results, STUB_HELPERS=HERE, PATH="/usr/bin:/bin")
         self.process = subprocess.Popen(
             ["/usr/bin/roslaunch", "-p", str(port), "pointflight_ros", *words,
@@ -162,7 +162,7 @@ class Launch:
 def check_ros2_files():
     """Types of the ROS 2 configurations (a double is never written as an integer, lists are of one
     type), and that the launch files name files that there are."""
-    folder = f"{SOURCE}/ros/ament/pointflight_ros"
+    folder = f"{SOURCE}/ros_packages/ament/pointflight_ros"
     integers = {"point_filter_num", "max_iteration", "lidar_type", "scan_line", "scan_rate",
                 "timestamp_unit", "interval"}
 
@@ -183,7 +183,7 @@ def check_ros2_files():
         own = yaml.safe_load(open(name))["/**"]["ros__parameters"]
         check(name, "", own)
         # what ROS 1 is told, ROS 2 is told
-        ros1 = yaml.safe_load(open(f"{SOURCE}/ros/catkin/pointflight_ros/config/fast_lio_{lidar}.yaml"))
+        ros1 = yaml.safe_load(open(f"{SOURCE}/ros_packages/catkin/pointflight_ros/config/fast_lio_{lidar}.yaml"))
         assert own == ros1, f"{name} differs from the one for ROS 1"
     launch = open(f"{folder}/launch/fast_lio.launch.py").read()
     tree = ast.parse(launch)

@@ -5,6 +5,7 @@
 #include <thread>
 
 #include "messages.h"
+#include "services.h"
 #include "tests/ros2/node_options.hpp"
 
 using pointflight::testing::Counted;

@@ -23,7 +23,8 @@
 #include <vector>
 
 #include "messages.h"
-#include "ros_common/description.hpp"
+#include "pointflight/ros/common/description.hpp"
+#include "services.h"
 #include "tests/integration/program.hpp"
 #include "tests/paths.hpp"
 

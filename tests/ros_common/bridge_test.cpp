@@ -1,5 +1,5 @@
 // A run's messages as an outlet gets them: which, how often, in which frame, with which numbers.
-#include "ros_common/bridge.hpp"
+#include "pointflight/ros/common/bridge.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,8 +7,8 @@
 #include <set>
 
 #include "pointflight/core/hash.hpp"
-#include "ros_common/conversion.hpp"
-#include "ros_common/scan_messages.hpp"
+#include "pointflight/ros/common/conversion.hpp"
+#include "pointflight/ros/common/scan_messages.hpp"
 #include "tests/sim/runs.hpp"
 
 namespace pointflight {

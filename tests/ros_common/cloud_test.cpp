@@ -5,8 +5,8 @@
 #include <cstring>
 
 #include "pointflight/core/input_error.hpp"
-#include "ros_common/point_layout.hpp"
-#include "ros_common/profile.hpp"
+#include "pointflight/ros/common/point_layout.hpp"
+#include "pointflight/ros/common/profile.hpp"
 #include "tests/support.hpp"
 
 namespace pointflight {
@@ -48,15 +48,15 @@ double value_of(const msg::PointCloud2& cloud, std::size_t i, const std::string&
       return static_cast<double>(value);
     };
     switch (field.datatype) {
-      case msg::PointField::kUint8:
+      case msg::PointField::UINT8:
         return as(std::uint8_t{});
-      case msg::PointField::kUint16:
+      case msg::PointField::UINT16:
         return as(std::uint16_t{});
-      case msg::PointField::kUint32:
+      case msg::PointField::UINT32:
         return as(std::uint32_t{});
-      case msg::PointField::kFloat32:
+      case msg::PointField::FLOAT32:
         return as(float{});
-      case msg::PointField::kFloat64:
+      case msg::PointField::FLOAT64:
         return as(double{});
       default:
         break;

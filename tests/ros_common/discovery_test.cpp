@@ -1,5 +1,5 @@
 // What ROS 2's environment variables ask for.
-#include "ros2/discovery.hpp"
+#include "pointflight/ros/ros2/discovery.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,7 +1,7 @@
 // rmw_dds_common's message about a node, byte by byte.
 #include <gtest/gtest.h>
 
-#include "ros2/graph_message.hpp"
+#include "pointflight/ros/ros2/graph_message.hpp"
 
 namespace pointflight {
 namespace {

@@ -5,9 +5,9 @@
 
 #include "pointflight/core/constants.hpp"
 #include "pointflight/geometry/rotation.hpp"
-#include "ros_common/description.hpp"
-#include "ros_common/inputs.hpp"
-#include "ros_common/ros1_definition.hpp"
+#include "pointflight/ros/common/description.hpp"
+#include "pointflight/ros/common/inputs.hpp"
+#include "pointflight/ros/common/ros1_definition.hpp"
 #include "tests/sim/runs.hpp"
 
 namespace pointflight {
@@ -181,11 +181,13 @@ TEST(Inputs, AttitudeTargetsFollowTheirMask) {
   msg::AttitudeTarget target;
   target.thrust = 0.5f;
   target.body_rate = {1, 2, 3};
-  target.type_mask = msg::AttitudeTarget::kIgnoreAttitude;
+  target.type_mask = msg::AttitudeTarget::IGNORE_ATTITUDE;
   const auto rates = command_in<BodyRateCommand>(order_for<Wire::kRos1>("attitude", target));
   EXPECT_EQ(rates.omega_body, Vector3d(1, 2, 3));
   EXPECT_EQ(rates.thrust, 20.0);
-  target.type_mask = msg::AttitudeTarget::kIgnoreRates | msg::AttitudeTarget::kIgnoreThrust;
+  target.type_mask = msg::AttitudeTarget::IGNORE_ROLL_RATE |
+                     msg::AttitudeTarget::IGNORE_PITCH_RATE | msg::AttitudeTarget::IGNORE_YAW_RATE |
+                     msg::AttitudeTarget::IGNORE_THRUST;
   const auto attitude = command_in<AttitudeCommand>(order_for<Wire::kCdr>("attitude", target));
   EXPECT_EQ(attitude.omega_body, Vector3d(0, 0, 0));
   EXPECT_EQ(attitude.thrust, 2.0 * kGravity);

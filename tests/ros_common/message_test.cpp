@@ -4,7 +4,7 @@
 #include <tuple>
 
 #include "pointflight/core/random.hpp"
-#include "ros_common/description.hpp"
+#include "pointflight/ros/common/description.hpp"
 #include "tests/paths.hpp"
 #include "tests/support.hpp"
 
@@ -149,7 +149,7 @@ TEST(MessageTypes, DefinitionsNameNestedTypesOnce) {
 TEST(MessageTypes, TheFilesForWorkspacesSayTheSame) {
   const auto expect_file = [](const std::string& path, const TypeDescription& type) {
     const std::string text = definition_text(type, 2);
-    EXPECT_EQ(testing::read_file(std::string(testing::kSource) + "/ros/messages/" + path),
+    EXPECT_EQ(testing::read_file(std::string(testing::kSource) + "/ros_packages/messages/" + path),
               text.substr(0, text.find("====")))
         << path;
   };

@@ -1,8 +1,8 @@
 // Definitions of the messages of barometers and the like, by ROS 1's checksums of them.
 #include <gtest/gtest.h>
 
-#include "ros_common/description.hpp"
-#include "ros_common/messages/navigation.hpp"
+#include "pointflight/ros/common/description.hpp"
+#include "pointflight/ros/common/messages.hpp"
 
 namespace pointflight {
 namespace {

@@ -1,8 +1,8 @@
 // Kinds of messages, in and out, that a program adds.
 #include <gtest/gtest.h>
 
-#include "ros_common/bridge.hpp"
-#include "ros_common/inputs.hpp"
+#include "pointflight/ros/common/bridge.hpp"
+#include "pointflight/ros/common/inputs.hpp"
 #include "tests/sim/runs.hpp"
 
 namespace pointflight {

@@ -8,11 +8,11 @@
 #include <map>
 #include <set>
 
-#include "pointflight/map/map_builder.hpp"
+#include "pointflight/map/build/map_builder.hpp"
 #include "pointflight/map/map_file.hpp"
+#include "pointflight/ros/common/ros_link.hpp"
 #include "pointflight/run/run_loop.hpp"
 #include "pointflight/run/threaded_link.hpp"
-#include "ros_common/ros_link.hpp"
 #include "tests/run/recorder.hpp"
 #include "tests/sim/runs.hpp"
 

@@ -7,7 +7,7 @@
 #include <mutex>
 #include <vector>
 
-#include "share/share_transport.hpp"
+#include "pointflight/share/share_transport.hpp"
 
 namespace pointflight::testing {
 

@@ -5,9 +5,9 @@
 
 #include <filesystem>
 
+#include "pointflight/share/common_ground.hpp"
 #include "pointflight/sim/flight_recorder.hpp"
 #include "pointflight/sim/run_folder.hpp"
-#include "share/common_ground.hpp"
 #include "tests/share/members.hpp"
 
 namespace pointflight {

@@ -1,12 +1,12 @@
 // Processes that share a run by their clocks: where others are, who is lost and what was missed,
 // who is refused, strangers. (In lockstep: lockstep_test.cpp.)
-#include "share/fleet_share.hpp"
+#include "pointflight/share/fleet_share.hpp"
 
 #include <gtest/gtest.h>
 
 #include <limits>
 
-#include "share/common_ground.hpp"
+#include "pointflight/share/common_ground.hpp"
 #include "tests/share/members.hpp"
 
 namespace pointflight {
@@ -325,7 +325,7 @@ TEST(FleetShare, StrangersChangeNothingAndAreSaidOnce) {
       intro.parts = {{"map", "x"}};
       world.bus.shout(ShareChannel::kCrew, encode<Wire::kCdr>(intro));
       // in the other's name, with what no vehicle does
-      states.head.version = share_msg::kVersion;
+      states.head.version = share_msg::Head::VERSION;
       states.head.process = 2;
       states.time = a.simulation.time().time_since_epoch().count();
       states.vehicles[0].position = {std::numeric_limits<double>::quiet_NaN(), 0, 0};

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "share/share_link.hpp"
+#include "pointflight/share/share_link.hpp"
 #include "tests/share/bus.hpp"
 #include "tests/sim/runs.hpp"
 #include "tests/support.hpp"

@@ -1,5 +1,5 @@
 // States of vehicles of other processes: moved on, put between two, bounded; clocks of others.
-#include "share/other_track.hpp"
+#include "pointflight/share/other_track.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,8 +7,8 @@
 
 #include "pointflight/core/math.hpp"
 #include "pointflight/geometry/rotation.hpp"
+#include "pointflight/share/clock_estimate.hpp"
 #include "pointflight/vehicle/multirotor.hpp"
-#include "share/clock_estimate.hpp"
 
 namespace pointflight {
 namespace {

@@ -12,7 +12,7 @@
 #include <thread>
 #include <vector>
 
-#include "ros2/raw_type.hpp"
+#include "pointflight/ros/ros2/raw_type.hpp"
 
 namespace {
 

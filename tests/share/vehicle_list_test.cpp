@@ -1,4 +1,4 @@
-#include "share/vehicle_list.hpp"
+#include "pointflight/share/vehicle_list.hpp"
 
 #include <gtest/gtest.h>
 

@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "pointflight/core/random.hpp"
-#include "pointflight/render/beam_renderer.hpp"
+#include "pointflight/render/internal/beam_renderer.hpp"
 #include "pointflight/sim/flight_recorder.hpp"
 #include "pointflight/vehicle/controllers/cascaded_pid.hpp"
 #include "tests/sim/runs.hpp"

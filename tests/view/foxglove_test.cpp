@@ -1,4 +1,4 @@
-#include "view/foxglove.hpp"
+#include "pointflight/view/foxglove.hpp"
 
 #include <gtest/gtest.h>
 

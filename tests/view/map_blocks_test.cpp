@@ -1,12 +1,12 @@
-#include "view/map_blocks.hpp"
+#include "pointflight/view/map_blocks.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cstring>
 #include <set>
 
+#include "pointflight/view/page_content.hpp"
 #include "tests/support.hpp"
-#include "view/page_content.hpp"
 
 namespace pointflight {
 namespace {

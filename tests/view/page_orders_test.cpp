@@ -1,4 +1,4 @@
-#include "view/page_orders.hpp"
+#include "pointflight/view/page_orders.hpp"
 
 #include <gtest/gtest.h>
 

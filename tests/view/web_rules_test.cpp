@@ -1,4 +1,4 @@
-#include "view/web_rules.hpp"
+#include "pointflight/view/web_rules.hpp"
 
 #include <gtest/gtest.h>
 

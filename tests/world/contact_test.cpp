@@ -9,8 +9,8 @@
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/random.hpp"
 #include "pointflight/geometry/rotation.hpp"
-#include "pointflight/map/near_surfels.hpp"
-#include "pointflight/sim/proximity.hpp"
+#include "pointflight/map/internal/near_surfels.hpp"
+#include "pointflight/sim/internal/proximity.hpp"
 #include "tests/support.hpp"
 
 namespace pointflight {

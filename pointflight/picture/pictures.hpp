@@ -1,0 +1,57 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "pointflight/lidar/lidar.hpp"
+#include "pointflight/map/surfel_map.hpp"
+#include "pointflight/picture/canvas.hpp"
+#include "pointflight/picture/run_picture.hpp"
+#include "pointflight/vehicle/step_response.hpp"
+
+/// Each writes a PNG; throws InputError if it cannot.
+namespace pointflight::picture {
+
+/// A top and a side view of a map, coloured by height. A ceiling over most of it is left out of the
+/// top view.
+void draw_map(const SurfelMap& map, const std::string& title, const std::string& path);
+
+/// Where a scan was taken.
+struct ScanPlace {
+  const SurfelMap& map;  ///< The map.
+  Pose T_world_sensor;   ///< For all of the scan.
+};
+
+/// Range over azimuth and elevation, one mark for each beam; beams without a return stay dark. And
+/// the points in the map, in perspective.
+void draw_scan(const std::vector<Beam>& beams,
+               const Scan& scan,
+               const LidarSettings& lidar,
+               const ScanPlace& place,
+               const std::string& path);
+
+/// Top and side view of map, flown paths, obstacles, waypoints and what the LiDARs saw. The map
+/// above the flight is left out of the top view.
+void draw_overview(const SurfelMap& map, const RunPicture& run, const std::string& path);
+
+/// The colour of a vehicle; neighbours are told apart without red and green too.
+Color vehicle_color(std::size_t number);
+
+/// A vehicle's step responses beside what its loops were designed for.
+void draw_step_responses(const VehicleSettings& vehicle,
+                         const std::vector<StepResponse>& responses,
+                         const std::string& path);
+
+/// A sensor's pattern after 0.1 s and after 1 s, and how its coverage grows. Throws InputError if
+/// it cannot be written.
+void draw_lidar(const LidarSettings& lidar, const std::string& path);
+
+/// The page of `draw_overview`, for tests of what is written on it.
+std::unique_ptr<Canvas> overview_page(const SurfelMap& map, const RunPicture& run);
+/// The page of `draw_map`.
+std::unique_ptr<Canvas> map_page(const SurfelMap& map, const std::string& title);
+/// The page of `draw_lidar`.
+std::unique_ptr<Canvas> lidar_page(const LidarSettings& lidar);
+
+}  // namespace pointflight::picture

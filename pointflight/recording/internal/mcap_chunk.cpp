@@ -1,0 +1,69 @@
+#include "pointflight/recording/internal/mcap_chunk.hpp"
+
+#include <lz4frame.h>
+#include <zlib.h>
+#include <zstd.h>
+
+namespace pointflight::mcap {
+namespace {
+
+constexpr std::uint64_t kLargestChunk = std::uint64_t{1} << 28;  // bytes, unpacked
+
+/// Bytes of a packed chunk; empty where they do not unpack to `size`.
+std::vector<std::byte> unpacked(std::span<const std::byte> packed,
+                                const std::string& how,
+                                std::uint64_t size) {
+  std::vector<std::byte> out;
+  if (how.empty()) {
+    out.assign(packed.begin(), packed.end());
+  } else if (how == "zstd") {
+    // the frame says its size as well: memory is taken only where both agree
+    if (ZSTD_getFrameContentSize(packed.data(), packed.size()) != size) return {};
+    out.resize(size);
+    if (ZSTD_decompress(out.data(), size, packed.data(), packed.size()) != size) return {};
+  } else if (how == "lz4") {
+    constexpr std::uint64_t kMostGain = 255;  // of LZ4
+    if (size > kMostGain * packed.size()) return {};
+    out.resize(size);
+    LZ4F_dctx* context = nullptr;
+    if (LZ4F_isError(LZ4F_createDecompressionContext(&context, LZ4F_VERSION)) != 0) return {};
+    std::size_t to = 0;
+    std::size_t from = 0;
+    for (;;) {
+      std::size_t room = out.size() - to;
+      std::size_t taken = packed.size() - from;
+      const std::size_t more =
+          LZ4F_decompress(context, out.data() + to, &room, packed.data() + from, &taken, nullptr);
+      to += room;
+      from += taken;
+      if (LZ4F_isError(more) != 0 || more == 0 || (room == 0 && taken == 0)) break;
+    }
+    LZ4F_freeDecompressionContext(context);
+    if (to != size) return {};
+  }
+  return out.size() == size ? out : std::vector<std::byte>{};
+}
+
+}  // namespace
+
+std::optional<PackedChunk> chunk_of(RecordReader& record) {
+  PackedChunk chunk;
+  chunk.start = record.number<std::uint64_t>();
+  chunk.end = record.number<std::uint64_t>();
+  chunk.size = record.number<std::uint64_t>();
+  chunk.crc = record.number<std::uint32_t>();
+  chunk.compression = record.text();
+  chunk.data = record.take(record.number<std::uint64_t>());
+  if (!record.ok() || chunk.size > kLargestChunk) return std::nullopt;
+  return chunk;
+}
+
+std::optional<std::vector<std::byte>> unpack(const PackedChunk& chunk) {
+  std::vector<std::byte> bytes = unpacked(chunk.data, chunk.compression, chunk.size);
+  if (bytes.size() != chunk.size) return std::nullopt;
+  const auto crc = crc32_z(0, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size());
+  if (chunk.crc != 0 && chunk.crc != crc) return std::nullopt;
+  return bytes;
+}
+
+}  // namespace pointflight::mcap

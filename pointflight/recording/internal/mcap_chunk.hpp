@@ -1,0 +1,32 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "pointflight/recording/internal/mcap_format.hpp"
+
+namespace pointflight::mcap {
+
+/// A chunk as it lies in a file, of a record's content.
+struct PackedChunk {
+  /// ns, of its first and last message, as it says itself.
+  ///@{
+  std::uint64_t start = 0, end = 0;
+  ///@}
+  std::uint64_t size = 0;           ///< Bytes, unpacked.
+  std::uint32_t crc = 0;            ///< Of them; 0: not known.
+  std::string compression;          ///< "", "lz4", "zstd"
+  std::span<const std::byte> data;  ///< Packed.
+};
+
+/// Nothing where the record is cut, or claims more than is taken.
+std::optional<PackedChunk> chunk_of(RecordReader& record);
+
+/// Its records; nothing where they do not unpack to the size and the checksum that it says.
+std::optional<std::vector<std::byte>> unpack(const PackedChunk& chunk);
+
+}  // namespace pointflight::mcap

@@ -1,0 +1,224 @@
+// Groups of beams that go down the tree together: who they are, and the frustum around them.
+//
+// Neighbouring beams meet much the same nodes of the hierarchy. Eight beams make a group, whose
+// lanes the arithmetic works on; up to eight groups go together, as a packet where they lie close
+// (packet-inl.hpp), as a bundle where they do not (bundle-inl.hpp). Around them lies a frustum:
+// four planes through an apex (the first beam's origin, moved outwards by as far as other origins
+// lie from it), with the mean direction w as its axis and u, v across it.
+//
+// Included once a target by Highway's foreach_target; see beam_kernel.cpp.
+#if defined(POINTFLIGHT_RENDER_BEAM_GROUPS_INL_HPP) == defined(HWY_TARGET_TOGGLE)
+#ifdef POINTFLIGHT_RENDER_BEAM_GROUPS_INL_HPP
+#undef POINTFLIGHT_RENDER_BEAM_GROUPS_INL_HPP
+#else
+#define POINTFLIGHT_RENDER_BEAM_GROUPS_INL_HPP
+#endif
+
+#include "pointflight/render/internal/beam_kernel-inl.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace pointflight::HWY_NAMESPACE {
+
+inline constexpr std::size_t kGroups = 8;
+inline constexpr std::size_t kTogether = 8 * kGroups;  ///< Beams.
+
+/// Eight beams.
+struct Group {
+  alignas(32) float dx[8], dy[8], dz[8];
+  alignas(32) float end[8];
+  alignas(32) float first[8];
+  alignas(32) std::int32_t total[8];
+  alignas(32) float nearest[8];  ///< The least t of all hits.
+  float mean[3];                 ///< Of the directions.
+  double origin[3][8];           ///< From the map's origin, m.
+};
+
+/// Up to 64 beams.
+struct BeamGroups {
+  // The beams' directions d as places (d.u / d.w, d.v / d.w) in a plane across the mean direction
+  // w: a rectangle around each group; lanes are groups.
+  alignas(32) float middle_u[8], middle_v[8], half_u[8], half_v[8], group_end[8];
+  float u[3], v[3], w[3];
+  float low_u, high_u, low_v, high_v;  ///< Around all groups.
+  float norm;                          ///< Of the frustum's normals below, the greatest.
+  double apex[3];                      ///< From the map's origin.
+  float apex_box[3];                   ///< The same in float, for boxes.
+  float spread;                        ///< Origins lie so far from the apex at most.
+  bool one_origin;
+  float plane[4][3];               ///< Inward normals of the frustum's sides.
+  float offset[4];                 ///< n . (p - apex) >= offset inside.
+  std::uint32_t plane_side[4][3];  ///< Of the box: where its corner farthest inside is.
+  int main_axis;
+  std::uint32_t main_side;
+  float main_step;    ///< 1 / (greatest component along the main axis), signed.
+  float main_offset;  ///< Of the origins along the main axis, the one that shortens most.
+  float end;          ///< Farthest end of all beams.
+  std::size_t count;  ///< Of the groups that are there.
+  Group groups[kGroups];
+};
+
+/// Copies eight beams to a group. False where they are too far apart to go together: more than
+/// `widest` from their mean direction, rad.
+POINTFLIGHT_INLINE bool take_beams(
+    const KernelMap& map, const Ray* rays, const std::uint32_t* beams, float widest, Group& group) {
+  for (std::size_t i = 0; i < 8; ++i) {
+    const Ray& ray = rays[beams[i]];
+    group.dx[i] = ray.direction_world.x();
+    group.dy[i] = ray.direction_world.y();
+    group.dz[i] = ray.direction_world.z();
+    group.end[i] = ray.range_max;
+    for (int k = 0; k < 3; ++k) group.origin[k][i] = ray.origin_world[k] - map.origin[k];
+  }
+  const F8 dx = load(group.dx);
+  const F8 dy = load(group.dy);
+  const F8 dz = load(group.dz);
+  group.mean[0] = 0.125f * sum(dx);
+  group.mean[1] = 0.125f * sum(dy);
+  group.mean[2] = 0.125f * sum(dz);
+  const F8 x = dx - splat(group.mean[0]);
+  const F8 y = dy - splat(group.mean[1]);
+  const F8 z = dz - splat(group.mean[2]);
+  if (!(greatest(x * x + y * y + z * z) <= widest * widest)) return false;
+  store(splat(kNever), group.first);
+  store(splat(kNever), group.nearest);
+  store(splat_int(0), group.total);
+  return true;
+}
+
+/// True if a group may join another, up to `farthest` away, rad: neighbours along the curve through
+/// the beams lie together, but for the curve's leaps.
+POINTFLIGHT_INLINE bool lies_near(const Group& group, const Group& other, float farthest) {
+  float squared = 0.0f;
+  for (int k = 0; k < 3; ++k) {
+    squared += (group.mean[k] - other.mean[k]) * (group.mean[k] - other.mean[k]);
+  }
+  return squared <= farthest * farthest;
+}
+
+/// How far the origins of the beams lie from the apex, which is the first one.
+POINTFLIGHT_INLINE float spread_of(const BeamGroups& p) {
+  F8 squared = splat(0.0f);
+  bool moves = false;
+  for (std::size_t g = 0; g < p.count; ++g) {
+    for (int k = 0; k < 3; ++k) {
+      for (std::size_t i = 0; i < 8; ++i) moves = moves || p.groups[g].origin[k][i] != p.apex[k];
+    }
+  }
+  if (!moves) return 0.0f;
+  for (std::size_t g = 0; g < p.count; ++g) {
+    F8 distance = splat(0.0f);
+    for (int k = 0; k < 3; ++k) {
+      alignas(32) float away[8];
+      for (std::size_t i = 0; i < 8; ++i) {
+        away[i] = static_cast<float>(p.groups[g].origin[k][i] - p.apex[k]);
+      }
+      distance = distance + load(away) * load(away);
+    }
+    squared = max(squared, distance);
+  }
+  return std::sqrt(greatest(squared)) * 1.001f;
+}
+
+/// The four planes around all groups, which lie within [low_u, high_u] x [low_v, high_v].
+POINTFLIGHT_INLINE void set_up_planes(BeamGroups& p,
+                                      const Vector3f& mean,
+                                      const Vector3f& u,
+                                      const Vector3f& v) {
+  const Vector3f normals[4] = {
+      u - p.low_u * mean, p.high_u * mean - u, v - p.low_v * mean, p.high_v * mean - v};
+  p.norm = 0.0f;
+  for (int k = 0; k < 4; ++k) {
+    p.norm = std::max(p.norm, normals[k].norm() * 1.001f);
+    p.offset[k] = -p.spread * normals[k].norm() * 1.001f;  // origins lie up to the spread outside
+    for (int axis = 0; axis < 3; ++axis) {
+      p.plane[k][axis] = normals[k][axis];
+      p.plane_side[k][axis] =
+          static_cast<std::uint32_t>(axis) + (normals[k][axis] > 0.0f ? 3u : 0u);
+    }
+  }
+}
+
+/// The apex is the first beam's origin; the others lie up to the spread away.
+POINTFLIGHT_INLINE void set_up_apex(BeamGroups& p) {
+  for (int k = 0; k < 3; ++k) {
+    p.apex[k] = p.groups[0].origin[k][0];
+    p.apex_box[k] = static_cast<float>(p.apex[k]);
+  }
+  p.spread = spread_of(p);
+  p.one_origin = p.spread == 0.0f;
+}
+
+/// Sets up the frustum around the first `count` groups.
+POINTFLIGHT_INLINE void set_up(BeamGroups& p, std::size_t count) {
+  p.count = count;
+  set_up_apex(p);
+
+  // the frame: w along the mean direction, u and v across it
+  Vector3f mean = Vector3f::Zero();
+  for (std::size_t g = 0; g < kGroups; ++g) {
+    // what is not there meets nothing
+    p.group_end[g] = g < count ? greatest(load(p.groups[g].end)) : -kNever;
+    for (int k = 0; k < 3 && g < count; ++k) mean[k] += p.groups[g].mean[k];
+  }
+  p.end = greatest(load(p.group_end));
+  mean.normalize();
+  const Vector3f helper = std::abs(mean.z()) < 0.9f ? Vector3f::UnitZ() : Vector3f::UnitX();
+  const Vector3f u = mean.cross(helper).normalized();
+  const Vector3f v = mean.cross(u);
+  for (int k = 0; k < 3; ++k) {
+    p.u[k] = u[k];
+    p.v[k] = v[k];
+    p.w[k] = mean[k];
+  }
+  int main_axis = 0;
+  mean.cwiseAbs().maxCoeff(&main_axis);
+
+  // where each group's beams cross the plane at distance 1 along w, and how fast they go along the
+  // main axis
+  F8 steepest = splat(0.0f);
+  alignas(32) float low[2][8];  // by group
+  alignas(32) float high[2][8];
+  for (std::size_t g = 0; g < kGroups; ++g) {
+    const Group& group = p.groups[g < count ? g : 0];
+    const F8 dx = load(group.dx);
+    const F8 dy = load(group.dy);
+    const F8 dz = load(group.dz);
+    const F8 ahead = dx * splat(mean.x()) + dy * splat(mean.y()) + dz * splat(mean.z());
+    const F8 per_ahead = splat(1.0f) / ahead;
+    const F8 at_u = (dx * splat(u.x()) + dy * splat(u.y()) + dz * splat(u.z())) * per_ahead;
+    const F8 at_v = (dx * splat(v.x()) + dy * splat(v.y()) + dz * splat(v.z())) * per_ahead;
+    low[0][g] = least(at_u);
+    high[0][g] = greatest(at_u);
+    low[1][g] = least(at_v);
+    high[1][g] = greatest(at_v);
+    steepest = max(steepest, abs(main_axis == 0 ? dx : main_axis == 1 ? dy : dz));
+  }
+
+  // a rectangle around each group, and one around all
+  const float room = 1e-5f;  // for rounding
+  const F8 half = splat(0.5f);
+  const F8 half_u = (load(high[0]) - load(low[0])) * half;
+  const F8 half_v = (load(high[1]) - load(low[1])) * half;
+  store((load(low[0]) + load(high[0])) * half, p.middle_u);
+  store((load(low[1]) + load(high[1])) * half, p.middle_v);
+  store(half_u + splat(room), p.half_u);
+  store(half_v + splat(room), p.half_v);
+
+  p.low_u = least(load(low[0])) - room;
+  p.high_u = greatest(load(high[0])) + room;
+  p.low_v = least(load(low[1])) - room;
+  p.high_v = greatest(load(high[1])) + room;
+  set_up_planes(p, mean, u, v);
+
+  // along the axis that the mean direction is closest to, all beams go forward: a bound of t
+  p.main_axis = main_axis;
+  const bool forward = mean[main_axis] > 0.0f;
+  p.main_side = static_cast<std::uint32_t>(main_axis) + (forward ? 0u : 3u);
+  p.main_step = (forward ? 1.0f : -1.0f) / (greatest(steepest) * 1.0001f);
+  p.main_offset = (forward ? p.spread : -p.spread) * 1.001f;
+}
+
+}  // namespace pointflight::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif

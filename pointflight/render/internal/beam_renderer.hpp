@@ -1,0 +1,43 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+
+#include "pointflight/render/internal/beam_kernel.hpp"
+#include "pointflight/render/renderer.hpp"
+
+namespace pointflight {
+
+/// One ray per beam through the map's hierarchy; a return is where the surfels met within half a
+/// voxel of depth cover at least the share tau of the beam (docs/architecture.md, "Hit rule").
+///
+/// Rays longer than `range_max` end there. Uses + - * / and sqrt only: the same bytes everywhere.
+class BeamRenderer : public Renderer {
+ public:
+  explicit BeamRenderer(const Scene& scene, BeamGrouping grouping = BeamGrouping::kAsSuits);
+
+  [[nodiscard]] Hit trace(const Ray& ray) const override;
+
+  /// Beams whose list of surfels overflowed and lost its farthest entry: there the result may
+  /// depend on the shape of the tree (never on threads).
+  [[nodiscard]] std::uint64_t overflow_count() const { return overflows_; }
+
+  [[nodiscard]] Scene scene() const { return {map_}; }
+
+ protected:
+  void render_one(const RenderJob& job, const Executor& executor) const override;
+
+ private:
+  [[nodiscard]] std::uint64_t trace_part(const RenderJob& job,
+                                         std::span<const std::uint32_t> part,
+                                         std::span<KernelHit> found) const;
+  [[nodiscard]] Hit hit_of(const KernelHit& found) const;
+
+  std::shared_ptr<const SurfelMap> map_;
+  KernelMap kernel_map_;
+  BeamGrouping grouping_;
+  mutable std::atomic<std::uint64_t> overflows_{0};
+};
+
+}  // namespace pointflight

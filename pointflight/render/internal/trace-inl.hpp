@@ -1,0 +1,274 @@
+// Which beams go through the tree together: packets where they lie close, bundles where they lie
+// farther apart, single rays where even the way down is hardly shared. However they go, the results
+// are the same bits.
+//
+// Included once a target by Highway's foreach_target; see beam_kernel.cpp.
+#if defined(POINTFLIGHT_RENDER_TRACE_INL_HPP) == defined(HWY_TARGET_TOGGLE)
+#ifdef POINTFLIGHT_RENDER_TRACE_INL_HPP
+#undef POINTFLIGHT_RENDER_TRACE_INL_HPP
+#else
+#define POINTFLIGHT_RENDER_TRACE_INL_HPP
+#endif
+
+#include <memory>
+
+#include "pointflight/render/internal/beam_packets-inl.hpp"
+#include "pointflight/render/internal/bundle-inl.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace pointflight::HWY_NAMESPACE {
+
+/// Beams farther apart than this (rad) do not go together.
+inline constexpr float kWidestBundle = 0.4f;
+/// Where a bundle visits fewer nodes and leaves for each of its beams, it is faster than single
+/// rays anywhere.
+inline constexpr float kFewVisits = 3.5f;
+
+/// Nodes and leaves of a bundle for each of its beams that take as long as a single ray, which
+/// visits so many nodes: a fit to scans by four patterns of the hall and the forest at 0.02 and
+/// 0.05 m.
+POINTFLIGHT_INLINE float visits_worth(float nodes_of_single_ray) {
+  return 0.38f * nodes_of_single_ray - 1.0f;
+}
+
+/// Beams of one call, and where to write what they meet.
+struct Beams {
+  const KernelMap& map;
+  const Ray* rays;
+  KernelHit* hits;
+};
+
+/// The hits of single rays. Returns how many lists overflowed; adds to the nodes visited.
+static std::uint64_t trace_singly(const Beams& beams,
+                                  const std::uint32_t* order,
+                                  std::size_t count,
+                                  std::size_t& nodes) {
+  const std::size_t steps = most_steps(beams.map);
+  const auto finish = [&](RayState& s) {
+    beams.hits[s.ray] = return_of(beams.map, s.first, s.hits);
+    nodes += steps - s.steps;
+  };
+  return follow_singly<Meetings::kEndTheWay>(beams.map, beams.rays, order, count, finish);
+}
+
+static std::uint64_t trace_singly(const Beams& beams,
+                                  const std::uint32_t* order,
+                                  std::size_t count) {
+  std::size_t nodes = 0;
+  return trace_singly(beams, order, count, nodes);
+}
+
+/// Beams that wait for another way to go.
+struct Waiting {
+  std::uint32_t beams[256] = {};
+  std::size_t count = 0;
+
+  [[nodiscard]] bool has_room() const { return count + 8 <= std::size(beams); }
+  void add(const std::uint32_t* eight) {
+    std::copy(eight, eight + 8, beams + count);
+    count += 8;
+  }
+};
+
+/// How wide groups of eight beams may be, and how far apart those that go together, rad.
+struct Widths {
+  float group, together;
+};
+
+/// Takes groups of eight beams from `at` on, as far as they lie together; `taken` tells where each
+/// begins. Groups that are too wide go to those that wait. Returns the number of groups.
+POINTFLIGHT_INLINE std::size_t fill(const Beams& beams,
+                                    const std::uint32_t* order,
+                                    std::size_t count,
+                                    const Widths& widths,
+                                    std::size_t& at,
+                                    BeamGroups& p,
+                                    std::size_t (&taken)[kGroups],
+                                    Waiting& waiting) {
+  std::size_t groups = 0;
+  while (groups < kGroups && at + 8 <= count && waiting.has_room()) {
+    // beams lie scattered: the next ones are fetched meanwhile
+    for (std::size_t i = at + kTogether; i < std::min(at + kTogether + 8, count); ++i) {
+      hwy::Prefetch(beams.rays + order[i]);
+    }
+    const bool close =
+        take_beams(beams.map, beams.rays, order + at, widths.group, p.groups[groups]);
+    if (close && groups > 0 && !lies_near(p.groups[groups], p.groups[0], widths.together)) break;
+    if (close) {
+      taken[groups++] = at;
+    } else {
+      waiting.add(order + at);
+    }
+    at += 8;
+  }
+  return groups;
+}
+
+static std::uint64_t trace_bundles(const Beams& beams,
+                                   const std::uint32_t* order,
+                                   std::size_t count,
+                                   bool always) {
+  // 280 KB, too large for the small stacks that some shells and embedding programs give; filled by
+  // take_beams and set_up
+  thread_local const auto room = std::make_unique_for_overwrite<Bundle>();
+  Bundle& bundle = *room;
+  const Widths widths{kWidestBundle, kWidestBundle};
+  std::uint64_t overflows = 0;
+  std::size_t at = 0;
+  std::size_t singly = 4 * kTogether;  // that go by themselves where the way is hardly shared
+  float worth = -1.0f;                 // visits for each beam, not known yet
+  Waiting waiting;
+  std::size_t taken[kGroups];
+  const auto trace_waiting = [&] {
+    overflows += trace_singly(beams, waiting.beams, waiting.count);
+    waiting.count = 0;
+  };
+  while (at + 8 <= count) {
+    const std::size_t groups = fill(beams, order, count, widths, at, bundle, taken, waiting);
+    if (!waiting.has_room()) trace_waiting();
+    if (groups == 0) continue;
+    set_up_bundle(bundle, groups);
+    walk(beams.map, bundle);
+    for (std::size_t n = 0; n < 8 * groups; ++n) {
+      const std::uint32_t* beam = order + taken[n / 8] + n % 8;
+      if ((bundle.failed >> n & 1u) != 0) {
+        overflows += trace_singly(beams, beam, 1);
+      } else {
+        beams.hits[*beam] = return_of(beams.map, bundle.beams[n].first, bundle.beams[n].hits);
+      }
+    }
+    const float visits = static_cast<float>(bundle.visits) / static_cast<float>(8 * groups);
+    if (always || visits <= std::max(kFewVisits, worth)) continue;
+    if (worth < 0.0f && at < count) {
+      const std::size_t next = std::min(kTogether, count - at);
+      std::size_t nodes = 0;
+      overflows += trace_singly(beams, order + at, next, nodes);
+      at += next;
+      worth = visits_worth(static_cast<float>(nodes) / static_cast<float>(next));
+      if (visits <= worth) continue;
+    }
+    const std::size_t next = std::min(singly, count - at);
+    overflows += trace_singly(beams, order + at, next);
+    at += next;
+    singly *= 4;
+  }
+  trace_waiting();
+  return overflows + trace_singly(beams, order + at, count - at);
+}
+
+static std::uint64_t trace_packets(const Beams& beams,
+                                   const std::uint32_t* order,
+                                   std::size_t count,
+                                   Packet& packet) {
+  const float widest = beams.map.widest_group;
+  const Widths widths{widest, 8.0f * widest};
+  std::uint64_t overflows = 0;
+  std::size_t at = 0;
+  Waiting waiting;
+  std::size_t taken[kGroups];
+  const auto trace_waiting = [&] {
+    overflows += trace_bundles(beams, waiting.beams, waiting.count, false);
+    waiting.count = 0;
+  };
+  while (at + 8 <= count) {
+    const std::size_t groups = fill(beams, order, count, widths, at, packet, taken, waiting);
+    if (!waiting.has_room()) trace_waiting();
+    if (groups == 0) continue;
+    set_up_packet(packet, groups, false);
+    walk(beams.map, packet);
+    for (std::size_t g = 0; g < groups; ++g) {
+      const std::uint32_t* eight = order + taken[g];
+      if ((packet.failed >> g & 1u) != 0) {
+        overflows += trace_singly(beams, eight, 8);
+      } else {
+        finish(beams.map, packet.groups[g], packet.rows[g], eight, beams.hits);
+      }
+    }
+  }
+  trace_waiting();
+  return overflows + trace_singly(beams, order + at, count - at);
+}
+
+/// Footprints wider than this (radius, rad) go down by themselves, a sub-ray at a time.
+inline constexpr float kWidestFootprint = 0.1f;
+
+/// Beams of eight sub-rays, one after the other in `order`: `trace_footprints` of beam_kernel.hpp.
+static std::uint64_t trace_sub_rays(const KernelMap& map,
+                                    const Ray* rays,
+                                    const std::uint32_t* order,
+                                    std::size_t count,
+                                    KernelHit* hits,
+                                    float* nearest) {
+  const Beams beams{map, rays, hits};
+  thread_local const auto room = std::make_unique_for_overwrite<Packet>();
+  Packet& packet = *room;
+  const Widths widths{kWidestFootprint, 8.0f * map.widest_group};
+  std::uint64_t overflows = 0;
+  std::size_t at = 0;
+  Waiting waiting;
+  std::size_t taken[kGroups];
+  const auto trace_waiting = [&] {
+    overflows += trace_singly(beams, waiting.beams, waiting.count);
+    for (std::size_t i = 0; i < waiting.count; i += 8) nearest[waiting.beams[i] / 8] = kNever;
+    waiting.count = 0;
+  };
+  while (at < count) {
+    const std::size_t groups = fill(beams, order, count, widths, at, packet, taken, waiting);
+    if (!waiting.has_room()) trace_waiting();
+    if (groups == 0) continue;
+    set_up_packet(packet, groups, true);
+    walk(map, packet);
+    for (std::size_t g = 0; g < groups; ++g) {
+      const std::uint32_t* eight = order + taken[g];
+      if ((packet.failed >> g & 1u) != 0) {
+        overflows += trace_singly(beams, eight, 8);
+      } else {
+        finish(map, packet.groups[g], packet.rows[g], eight, hits);
+      }
+      nearest[eight[0] / 8] = least(load(packet.nearest[g]));
+    }
+  }
+  trace_waiting();
+  return overflows;
+}
+
+/// True if most groups of eight lie close enough together for packets: a look at a few of them.
+POINTFLIGHT_INLINE bool is_dense(const Beams& beams,
+                                 const std::uint32_t* order,
+                                 std::size_t count,
+                                 Group& room) {
+  constexpr std::size_t kLooks = 8;
+  if (count < 8 * kLooks) return true;
+  std::size_t together = 0;
+  for (std::size_t i = 0; i < kLooks; ++i) {
+    const std::size_t at = (count - 8) * i / (kLooks - 1) / 8 * 8;
+    const float widest = beams.map.widest_group;
+    together += take_beams(beams.map, beams.rays, order + at, widest, room) ? 1 : 0;
+  }
+  return 2 * together >= kLooks;
+}
+
+static std::uint64_t trace(const KernelMap& map,
+                           const Ray* rays,
+                           const std::uint32_t* order,
+                           std::size_t count,
+                           BeamGrouping grouping,
+                           KernelHit* hits) {
+  if (map.node_count == 0) {
+    for (std::size_t i = 0; i < count; ++i) hits[order[i]] = {};
+    return 0;
+  }
+  const Beams beams{map, rays, hits};
+  if (grouping == BeamGrouping::kSingly) return trace_singly(beams, order, count);
+  if (grouping == BeamGrouping::kBundles) return trace_bundles(beams, order, count, true);
+  // 80 KB, as above
+  thread_local const auto packet = std::make_unique_for_overwrite<Packet>();
+  return is_dense(beams, order, count, packet->groups[0])
+             ? trace_packets(beams, order, count, *packet)
+             : trace_bundles(beams, order, count, false);
+}
+
+}  // namespace pointflight::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif

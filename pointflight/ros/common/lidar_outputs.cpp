@@ -1,0 +1,143 @@
+// Messages about each scan of a LiDAR: clouds, pictures, the sensor's poses.
+#include "pointflight/ros/common/output_rows.hpp"
+#include "pointflight/ros/common/point_layout.hpp"
+#include "pointflight/ros/common/scan_messages.hpp"
+
+namespace pointflight {
+namespace {
+
+using Frame = OutputType::Frame;
+using Cameras = OutputType::Cameras;
+
+/// Of returns that have no intensity.
+float plain_intensity(const OutputStream& stream) {
+  return stream.ros.run.map->has_intensity() ? 0.0f : kPlainIntensity;
+}
+
+/// In the sensor's frame, in one of the layouts or Livox' own message.
+class Cloud : public Output {
+ public:
+  using Output::Output;
+  void on_sample(const Sample& sample) override {
+    const auto* scanned = std::get_if<ScanSample>(&sample);
+    if (scanned == nullptr || !stream_.is_about(*scanned)) return;
+    const Scan& scan = *scanned->scan;
+    if (!stream_.is_due(scan.end)) return;
+    const RosOutput& s = stream_.settings;
+    const Duration epoch = stream_.ros.epoch;
+    const float plain = plain_intensity(stream_);
+    if (s.layout == kLivoxCustom) {
+      stream_.send(custom_cloud_of(scan, s.frame, epoch, plain), scan.end);
+    } else {
+      stream_.send(cloud_of(scan, point_layout(s.layout), s.frame, epoch, {}, plain), scan.end);
+    }
+  }
+};
+
+msg::PointCloud2 world_cloud(const OutputStream& stream, const ScanSample& sample) {
+  const auto points = world_points(*sample.scan, sample.T_world_sensor);
+  return cloud_of(*sample.scan,
+                  point_layout(stream.settings.layout),
+                  stream.settings.frame,
+                  stream.ros.epoch,
+                  points,
+                  plain_intensity(stream));
+}
+
+msg::Image depth_image(const OutputStream& stream, const ScanSample& sample) {
+  msg::Image image = depth_image_of(*sample.scan, stream.of_lidar().settings);
+  image.header = stream.header(cloud_time(*sample.scan, false));
+  return image;
+}
+
+/// Where a scan has one.
+class Infrared : public Output {
+ public:
+  using Output::Output;
+  void on_sample(const Sample& sample) override {
+    const auto* scanned = std::get_if<ScanSample>(&sample);
+    if (scanned == nullptr || !stream_.is_about(*scanned)) return;
+    const Scan& scan = *scanned->scan;
+    if (scan.infrared.empty() || !stream_.is_due(scan.end)) return;
+    msg::Image image = infrared_image_of(scan, stream_.of_lidar().settings);
+    image.header = stream_.header(cloud_time(scan, false));
+    stream_.send(image, scan.end);
+  }
+};
+
+msg::CameraInfo camera_info(const OutputStream& stream, const ScanSample& sample) {
+  msg::CameraInfo info = camera_info_of(stream.of_lidar().settings);
+  info.header = stream.header(cloud_time(*sample.scan, false));
+  return info;
+}
+
+msg::PoseStamped sensor_pose(const OutputStream& stream, const ScanSample& sample) {
+  const SimTime time = cloud_time(*sample.scan, false);
+  Pose pose = sample.T_world_sensor.at(time);
+  pose.rotation = optical(pose.rotation);
+  return {stream.header(time), pose_of(pose)};
+}
+
+msg::TFMessage sensor_transform(const OutputStream& stream, const ScanSample& sample) {
+  const SimTime time = cloud_time(*sample.scan, false);
+  return {{transform_of(
+      sample.T_world_sensor.at(time), stream.header(time), stream.settings.child_frame)}};
+}
+
+}  // namespace
+
+std::vector<OutputType> lidar_outputs() {
+  constexpr auto kLidar = OutputType::Per::kLidar;
+  return {
+      {.name = "tf_scan",
+       .help = "the sensor in the world, with each scan",
+       .make = per_sample<sensor_transform>(),
+       .per = kLidar,
+       .child = Frame::kSensor,
+       .has_child = true,
+       .is_transform = true,
+       .depth = 100},
+      {.name = "sensor_pose",
+       .help = "the sensor's pose with each scan, optical axes",
+       .make = per_sample<sensor_pose>(),
+       .per = kLidar},
+      {.name = "cloud",
+       .help = "a scan in the sensor's frame",
+       .make = made_by<Cloud, msg::PointCloud2>(),
+       .per = kLidar,
+       .frame = Frame::kSensor,
+       .large = true,
+       .depth = 5,
+       .layout = "xyzit"},
+      {.name = "cloud_world",
+       .help = "a scan in the world",
+       .make = per_sample<world_cloud>(),
+       .per = kLidar,
+       .large = true,
+       .depth = 5},
+      {.name = "depth",
+       .help = "depth picture, 32FC1",
+       .make = per_sample<depth_image>(),
+       .per = kLidar,
+       .frame = Frame::kOptical,
+       .cameras = Cameras::kRather,
+       .large = true,
+       .depth = 5},
+      {.name = "infrared",
+       .help = "infrared picture of a depth camera, mono8",
+       .make = made_by<Infrared, msg::Image>(),
+       .per = kLidar,
+       .frame = Frame::kOptical,
+       .cameras = Cameras::kOnly,
+       .large = true,
+       .depth = 5},
+      {.name = "camera_info",
+       .help = "camera matrix of a depth camera",
+       .make = per_sample<camera_info>(),
+       .per = kLidar,
+       .frame = Frame::kOptical,
+       .cameras = Cameras::kOnly},
+  };
+}
+
+}  // namespace pointflight

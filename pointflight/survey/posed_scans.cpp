@@ -1,0 +1,142 @@
+#include "pointflight/survey/posed_scans.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <filesystem>
+#include <utility>
+
+#include "pointflight/core/input_error.hpp"
+#include "pointflight/io/byte_cursor.hpp"
+
+namespace pointflight {
+namespace {
+
+constexpr double kNearest = 0.01;  // m: the sensor itself
+constexpr double kFarthest = 1e6;  // m: no sensor sees so far
+constexpr double kMostApart =
+    2.0;  // s between poses: farther apart they say nothing of a scan's motion
+
+}  // namespace
+
+/// Batch by batch, as the source gives them.
+class PosedScanReader : public SurveyReader {
+ public:
+  PosedScanReader(const PosedScans& survey, const std::function<bool(std::size_t)>& chosen)
+      : survey_(survey), has_intensity_(survey.source_->has_intensity()) {
+    number_of_.resize(survey.source_->scan_count(), kNone);
+    for (std::size_t i = 0; i < survey.scans_.size(); ++i) {
+      if (!chosen || chosen(i)) number_of_[survey.scans_[i].number] = i;
+    }
+    scans_ = survey.source_->open([this](std::size_t scan) { return number_of_[scan] != kNone; });
+  }
+
+  bool read(std::vector<SurveyRay>& batch) override {
+    batch.clear();
+    while (batch.empty()) {
+      if (!scans_->read(points_)) return false;
+      add_rays(batch);
+    }
+    return true;
+  }
+  [[nodiscard]] std::size_t scan() const override { return number_of_[points_.scan]; }
+  [[nodiscard]] bool has_intensity() const override { return has_intensity_; }
+  [[nodiscard]] double share_read() const override { return scans_->share_read(); }
+
+ private:
+  void add_rays(std::vector<SurveyRay>& batch) {
+    const std::vector<TimedPose>& poses = survey_.trajectory_.poses;
+    const SimTime start = survey_.scans_[scan()].time;
+    const bool is_registered = survey_.point_times_ == PosedScans::PointTimes::kRegistered;
+    const bool uses_times = survey_.point_times_ == PosedScans::PointTimes::kUsed &&
+                            poses_apart(poses, start) <= kMostApart;
+    const Pose at_start = pose_on(poses, start);
+    for (const RecordedPoint& point : points_.points) {
+      if (point.position.isZero(0.0)) continue;  // drivers say so: no return
+      Pose pose = at_start;
+      Vector3d seen = point.position;
+      if (is_registered) {
+        seen -= pose.translation;
+        pose.rotation.setIdentity();
+      }
+      const double range = seen.norm();
+      if (!(range >= kNearest && range < kFarthest)) continue;  // NaN as well
+      if (uses_times && std::isfinite(point.time)) pose = pose_of(point, start);
+      batch.push_back(survey_ray(pose, seen, points_.is_return));
+      batch.back().intensity = point.intensity;
+    }
+  }
+
+  [[nodiscard]] Pose pose_of(const RecordedPoint& point, SimTime start) const {
+    const SurveyPoses& trajectory = survey_.trajectory_;
+    const std::string path = survey_.source_->path(points_.scan);
+    if (!trajectory.has_times) {
+      throw InputError(
+          fmt::format("{}: its points have times and the poses of {} have none; give a TUM "
+                      "trajectory, or --deskewed if motion was taken out",
+                      path,
+                      survey_.poses_name_));
+    }
+    return pose_on(trajectory.poses, time_of_point(trajectory.poses, start, point.time, path));
+  }
+
+  static constexpr auto kNone = static_cast<std::size_t>(-1);
+  const PosedScans& survey_;
+  bool has_intensity_;
+  std::vector<std::size_t> number_of_;  ///< Of each scan of the source; kNone: not read.
+  std::unique_ptr<ScanReader> scans_;
+  ScanBatch points_;
+};
+
+std::string PosedScans::name(std::size_t scan) const {
+  return source_->name(scans_[scan].number);
+}
+
+Pose PosedScans::pose(std::size_t scan) const {
+  return pose_on(trajectory_.poses, scans_[scan].time);
+}
+
+std::unique_ptr<SurveyReader> PosedScans::open(
+    const std::function<bool(std::size_t)>& chosen) const {
+  return std::make_unique<PosedScanReader>(*this, chosen);
+}
+
+SurveyFolder::SurveyFolder(const SurveyFiles& files) {
+  trajectory_ = read_survey_poses(files.poses, files.T_pose_sensor);
+  poses_name_ = files.poses;
+  if (files.is_deskewed) point_times_ = PointTimes::kIgnored;
+  std::vector<std::string> names =
+      trajectory_.files.empty() ? scan_files_in(files.scans, files.poses) : trajectory_.files;
+  source_ = std::make_shared<ScanFolder>(files.scans, names, files.free);
+  const std::vector<TimedPose>& poses = trajectory_.poses;
+  if (names.size() == poses.size()) {
+    for (std::size_t i = 0; i < names.size(); ++i) scans_.push_back({i, poses[i].time});
+    return;
+  }
+  constexpr double kSecondsEnd = 1e11;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    double time = 0.0;
+    if (!parse_number(std::filesystem::path(names[i]).stem().string(), time)) {
+      throw InputError(fmt::format(
+          "{}: {} poses for {} scans in {}; name the scan of each pose in a ninth column, or name "
+          "the scans by their times",
+          files.poses,
+          poses.size(),
+          names.size(),
+          files.scans));
+    }
+    if (time > kSecondsEnd) time *= 1e-9;
+    const std::string path = source_->path(i);
+    const SimTime at = time_of(time, path);
+    if (at < poses.front().time || at > poses.back().time) {
+      throw InputError(fmt::format("{}: its time is not within the poses of {} ({} to {} s)",
+                                   path,
+                                   files.poses,
+                                   to_seconds(poses.front().time),
+                                   to_seconds(poses.back().time)));
+    }
+    scans_.push_back({i, at});
+  }
+}
+
+}  // namespace pointflight

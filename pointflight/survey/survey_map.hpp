@@ -1,0 +1,65 @@
+// A map made of a survey: of its points, fitted to its rays, at the resolution that suits it.
+#pragma once
+
+#include <vector>
+
+#include "pointflight/map/build/map_builder.hpp"
+#include "pointflight/survey/map_fit.hpp"
+#include "pointflight/survey/posed_scans.hpp"
+
+namespace pointflight {
+
+/// How a resolution did on scans that were left out.
+struct TriedResolution {
+  double resolution;   ///< r, m.
+  double right;        ///< Share of their rays, those without a return included.
+  std::uint64_t rays;  ///< That judged it; 0: the scans do not overlap.
+};
+
+/// A finished map of a survey.
+struct SurveyMap {
+  EditedMap map;                       ///< Fitted.
+  ImportReport imported;               ///< Before the fit.
+  std::vector<CloudPoint> outliers;    ///< Of the import.
+  FitReport fit;                       ///< The fit.
+  OwnRays after;                       ///< The survey's rays in the fitted map.
+  std::vector<TriedResolution> tried;  ///< In ascending order; empty where one was given.
+};
+
+/// Scans that can be opened as often as wanted, all or those that a function accepts.
+using ScanOpener = std::function<std::unique_ptr<SurveyReader>(
+    const std::function<bool(std::size_t scan)>& chosen)>;
+
+/// Clouds that were made of the scans; without names the survey's returns are the map's points.
+struct SurveyPoints {
+  std::vector<std::string> names;  ///< For messages.
+  CloudOpener open;                ///< One of them at its beginning.
+};
+
+/// Tries resolutions a factor of the square root of two apart, from 1.4 spacings of the points to
+/// 4, or to 0.1 m where these lie closer: maps of the points beside which nine tenths of the scans
+/// saw something, fitted to these, judged by the rays of the others: those that end where the nine
+/// tenths saw something and those without a return. Coarser maps close gaps that a survey left, so
+/// that they may win without being truer: hence the limit. Without `points` the returns of the nine
+/// tenths. Two scans at least. Throws InputError.
+std::vector<TriedResolution> try_resolutions(const ScanOpener& survey,
+                                             std::size_t scan_count,
+                                             const SurveyPoints& points,
+                                             const ImportOptions& options,
+                                             const FitOptions& fit,
+                                             const Executor& executor,
+                                             const Progress& progress = {});
+
+/// The best one of those tried.
+double best_resolution(const std::vector<TriedResolution>& tried);
+
+/// Makes the map of a survey. Without a resolution in
+/// `options` the best one is found.
+SurveyMap map_survey(const SurveySource& survey,
+                     const SurveyPoints& points,
+                     const ImportOptions& options,
+                     const FitOptions& fit,
+                     const Executor& executor,
+                     const Progress& progress = {});
+
+}  // namespace pointflight

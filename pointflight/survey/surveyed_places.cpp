@@ -1,0 +1,41 @@
+#include "pointflight/survey/surveyed_places.hpp"
+
+#include "pointflight/survey/place_cells.hpp"
+
+namespace pointflight {
+namespace {
+
+constexpr double kCell = 0.1;  // m
+
+/// Of whole numbers of cells; NaN is not.
+bool is_in_reach(const Vector3d& p) {
+  return p.cwiseAbs().maxCoeff() < 1e9 && p.allFinite();
+}
+
+}  // namespace
+
+void SurveyedPlaces::add(const Vector3d& point_world) {
+  if (!is_in_reach(point_world)) return;
+  cells_.insert(place_key(place_cell(point_world, kCell)));
+}
+
+bool SurveyedPlaces::has(const Vector3d& point_world) const {
+  if (!is_in_reach(point_world)) return false;
+  const PlaceCell middle = place_cell(point_world, kCell);
+  for (std::int64_t i = 0; i < 27; ++i) {
+    if (cells_.contains(place_key(neighbour(middle, i)))) return true;
+  }
+  return false;
+}
+
+SurveyedPlaces places_of(const SurveyOpener& survey) {
+  SurveyedPlaces seen;
+  const auto reader = cloud_of(survey());
+  std::vector<CloudPoint> points;
+  while (reader->read(points)) {
+    for (const CloudPoint& point : points) seen.add(point.position);
+  }
+  return seen;
+}
+
+}  // namespace pointflight
