@@ -24,6 +24,7 @@
 #include "pointflight/core/number_text.hpp"
 #include "pointflight/core/resources.hpp"
 #include "pointflight/sim/flight_recorder.hpp"
+#include "pointflight/sim/run_summary.hpp"
 #include "pointflight/sim/scenario_maker.hpp"
 #include "pointflight/sim/start_check.hpp"
 

@@ -116,47 +116,60 @@ void print_places(const std::vector<PlaceInfo>& places) {
   }
 }
 
-void print_info(const SurfelMap& map, const InfoFlags& flags) {
-  const std::vector<PlaceInfo> places = places_at(map, flags.points);
-  const KnownSpace* known = map.known_space();
-  std::uint64_t planar = 0;
+/// What a map's surfels are like.
+struct SurfelCount {
   std::uint64_t surfels = 0;
-  map.for_each_surfel([&](const Vector3d&, const Vector3d&, double, std::uint32_t word) {
-    ++surfels;
-    planar += is_planar(map.words()[word]) ? 1 : 0;
-  });
-  const double planar_share =
-      surfels == 0 ? 0.0 : static_cast<double>(planar) / static_cast<double>(surfels);
-  const double bytes_each =
-      surfels == 0 ? 0.0 : static_cast<double>(map.file_size()) / static_cast<double>(surfels);
+  std::uint64_t planar = 0;
+
+  explicit SurfelCount(const SurfelMap& map) {
+    map.for_each_surfel([&](const Vector3d&, const Vector3d&, double, std::uint32_t word) {
+      ++surfels;
+      planar += is_planar(map.words()[word]) ? 1 : 0;
+    });
+  }
+  [[nodiscard]] double planar_share() const {
+    return surfels == 0 ? 0.0 : static_cast<double>(planar) / static_cast<double>(surfels);
+  }
+  [[nodiscard]] double bytes_each(const SurfelMap& map) const {
+    return surfels == 0 ? 0.0 : static_cast<double>(map.file_size()) / static_cast<double>(surfels);
+  }
+};
+
+nlohmann::ordered_json info_json(const SurfelMap& map,
+                                 const SurfelCount& count,
+                                 const InfoFlags& flags) {
+  const Aabb& b = map.bounds_world();
+  nlohmann::ordered_json json;
+  json["file"] = flags.map;
+  json["surfels"] = count.surfels;
+  json["resolution"] = map.resolution();
+  json["min"] = {b.min.x(), b.min.y(), b.min.z()};
+  json["max"] = {b.max.x(), b.max.y(), b.max.z()};
+  json["planar_share"] = count.planar_share();
+  json["bytes"] = map.file_size();
+  json["bytes_per_surfel"] = count.bytes_each(map);
+  json["has_intensity"] = map.has_intensity();
+  if (map.reflectivity_per_intensity() > 0.0) {
+    json["reflectivity_per_intensity"] = map.reflectivity_per_intensity();
+  }
+  if (const KnownSpace* known = map.known_space()) {
+    json["known_space"]["share"] = known->known_share();
+    json["known_space"]["cell"] = known->grid().cell;
+  }
+  if (const auto places = places_at(map, flags.points); !places.empty()) {
+    json["at"] = json_of(places);
+  }
+  json["verified"] = flags.verify;
+  json["made"] = metadata_of(map);
+  return json;
+}
+
+void print_info(const SurfelMap& map, const SurfelCount& count, const InfoFlags& flags) {
+  const KnownSpace* known = map.known_space();
   const Aabb& b = map.bounds_world();
   const auto metadata = metadata_of(map);
-  if (flags.json) {
-    nlohmann::ordered_json json;
-    json["file"] = flags.map;
-    json["surfels"] = surfels;
-    json["resolution"] = map.resolution();
-    json["min"] = {b.min.x(), b.min.y(), b.min.z()};
-    json["max"] = {b.max.x(), b.max.y(), b.max.z()};
-    json["planar_share"] = planar_share;
-    json["bytes"] = map.file_size();
-    json["bytes_per_surfel"] = bytes_each;
-    json["has_intensity"] = map.has_intensity();
-    if (map.reflectivity_per_intensity() > 0.0) {
-      json["reflectivity_per_intensity"] = map.reflectivity_per_intensity();
-    }
-    if (known != nullptr) {
-      json["known_space"]["share"] = known->known_share();
-      json["known_space"]["cell"] = known->grid().cell;
-    }
-    if (!places.empty()) json["at"] = json_of(places);
-    json["verified"] = flags.verify;
-    json["made"] = metadata;
-    print_json(json);
-    return;
-  }
   fmt::print("{}\n", flags.map);
-  fmt::print("  surfels     {}, {:.0f} % planar\n", surfels, 100.0 * planar_share);
+  fmt::print("  surfels     {}, {:.0f} % planar\n", count.surfels, 100.0 * count.planar_share());
   fmt::print("  resolution  {:.4g} m\n", map.resolution());
   fmt::print("  extent      {:.2f} x {:.2f} x {:.2f} m, from {}\n",
              b.size().x(),
@@ -165,7 +178,7 @@ void print_info(const SurfelMap& map, const InfoFlags& flags) {
              point_text(b.min));
   fmt::print("  size        {:.1f} MB, {:.1f} bytes per surfel\n",
              static_cast<double>(map.file_size()) * 1e-6,
-             bytes_each);
+             count.bytes_each(map));
   print_findings(metadata, map.resolution());
   fmt::print("  coverage    {:.2f} makes a return\n", map.model().tau);
   fmt::print("  intensity   {}{}\n",
@@ -181,7 +194,7 @@ void print_info(const SurfelMap& map, const InfoFlags& flags) {
         100.0 * (1.0 - known->known_share()),
         known->grid().cell);
   }
-  print_places(places);
+  print_places(places_at(map, flags.points));
   if (flags.verify) fmt::print("  checksums   match\n");
   fmt::print("  made\n");
   for (const auto& [key, value] : metadata.items())
@@ -193,7 +206,11 @@ void show_info(const InfoFlags& flags) {
   check_outputs({flags.png}, {flags.map}, flags.force);
   const auto map = SurfelMap::open(flags.map);
   if (flags.verify) map->verify();
-  print_info(*map, flags);
+  if (flags.json) {
+    print_json(info_json(*map, SurfelCount(*map), flags));
+  } else {
+    print_info(*map, SurfelCount(*map), flags);
+  }
   if (!flags.png.empty()) {
     picture::draw_map(*map, flags.map, flags.png);
     log("picture: " + flags.png);

@@ -162,6 +162,41 @@ void import_map(const ImportFlags& flags) {
   print_end(flags, map.report, start);
 }
 
+/// How surfels are made of the points. Returns --reflectivity.
+CLI::Option* add_quality_flags(CLI::App& app, ImportFlags& flags) {
+  app.add_option("--quality",
+                 flags.quality,
+                 "Of the hierarchy: normal builds it three times faster, rays in foliage are a "
+                 "fifth slower")
+      ->check(CLI::IsMember({"normal", "high"}))
+      ->capture_default_str();
+  app.add_option("--tau",
+                 flags.tau,
+                 "Coverage that makes a return, 0.3 (fewest holes) to 0.5 (sharpest edges); "
+                 "default: by the density of the points")
+      ->check(within(0.05, 1.0));
+  app.add_flag("--keep-outliers",
+               flags.keep_outliers,
+               "No outlier removal (thin wires, very uneven clouds)");
+  app.add_option("--outlier-neighbours",
+                 flags.outlier_neighbours,
+                 "Cells that a cell's distance is measured to")
+      ->check(CLI::Range(1, 100))
+      ->capture_default_str();
+  app.add_option("--outlier-sigmas",
+                 flags.outlier_sigmas,
+                 "A cell goes if it is this many deviations farther than the mean")
+      ->check(within(0.0, 1e6))
+      ->capture_default_str();
+  app.add_option("--export-outliers", flags.outliers_out, "Write the dropped cells as a PCD cloud");
+  return app
+      .add_option("--reflectivity",
+                  flags.reflectivity,
+                  "Reflectivity (0 to 1, at the laser's wavelength) per unit of the points' "
+                  "intensity, where this is calibrated: 0.01 for percent")
+      ->check(within(1e-9, 1e6));
+}
+
 }  // namespace
 
 void add_import(CLI::App& parent) {
@@ -199,38 +234,7 @@ void add_import(CLI::App& parent) {
   app->add_option("--up", flags->up, "The files' up axis; y is turned to z")
       ->check(CLI::IsMember({"y", "z"}))
       ->capture_default_str();
-  app->add_option("--quality",
-                  flags->quality,
-                  "Of the hierarchy: normal builds it three times faster, rays in foliage are a "
-                  "fifth slower")
-      ->check(CLI::IsMember({"normal", "high"}))
-      ->capture_default_str();
-  app->add_option("--tau",
-                  flags->tau,
-                  "Coverage that makes a return, 0.3 (fewest holes) to 0.5 (sharpest edges); "
-                  "default: by the density of the points")
-      ->check(within(0.05, 1.0));
-  app->add_flag("--keep-outliers",
-                flags->keep_outliers,
-                "No outlier removal (thin wires, very uneven clouds)");
-  app->add_option("--outlier-neighbours",
-                  flags->outlier_neighbours,
-                  "Cells that a cell's distance is measured to")
-      ->check(CLI::Range(1, 100))
-      ->capture_default_str();
-  app->add_option("--outlier-sigmas",
-                  flags->outlier_sigmas,
-                  "A cell goes if it is this many deviations farther than the mean")
-      ->check(within(0.0, 1e6))
-      ->capture_default_str();
-  app->add_option(
-      "--export-outliers", flags->outliers_out, "Write the dropped cells as a PCD cloud");
-  auto* reflectivity =
-      app->add_option("--reflectivity",
-                      flags->reflectivity,
-                      "Reflectivity (0 to 1, at the laser's wavelength) per unit of the points' "
-                      "intensity, where this is calibrated: 0.01 for percent");
-  reflectivity->check(within(1e-9, 1e6));
+  auto* reflectivity = add_quality_flags(*app, *flags);
   add_fit_flags(*app, flags->fit, false);
   reflectivity->excludes(app->get_option("--signal-of"));
   add_force_flag(*app, flags->force);

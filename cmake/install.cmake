@@ -4,10 +4,15 @@ include(CMakePackageConfigHelpers)
 get_property(modules GLOBAL PROPERTY POINTFLIGHT_MODULES)
 install(TARGETS ${modules} EXPORT pointflight ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
 install(TARGETS pointflight RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
-install(DIRECTORY pointflight DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}
-        FILES_MATCHING PATTERN "*.hpp" PATTERN "*-inl.hpp" EXCLUDE)
-install(DIRECTORY ${PROJECT_BINARY_DIR}/generated/pointflight DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}
-        FILES_MATCHING PATTERN "*.hpp")
+# file by file: CMake would make folders that hold none of these, and `uninstall` knows of files alone
+foreach(root ${PROJECT_SOURCE_DIR} ${PROJECT_BINARY_DIR}/generated)
+  file(GLOB_RECURSE headers RELATIVE ${root} CONFIGURE_DEPENDS ${root}/pointflight/*.hpp)
+  list(FILTER headers EXCLUDE REGEX "-inl\\.hpp$|/ros[12]/|/dds/|/mpi/")
+  foreach(header IN LISTS headers)
+    get_filename_component(folder ${header} DIRECTORY)
+    install(FILES ${root}/${header} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/${folder})
+  endforeach()
+endforeach()
 install(DIRECTORY data/ DESTINATION ${CMAKE_INSTALL_DATADIR}/pointflight)
 install(EXPORT pointflight NAMESPACE pointflight:: FILE pointflight-targets.cmake
         DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/pointflight)

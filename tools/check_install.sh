@@ -17,6 +17,7 @@ for file in bin/pointflight share/man/man1/pointflight.1 share/bash-completion/c
             share/pointflight/lidars/mid360.yaml; do
   [ -f "$folder/first/$file" ] || fail "$file was not installed"
 done
+[ "$(ls "$folder/first/include")" = pointflight ] || fail "headers lie outside of include/pointflight"
 mv "$folder/first" "$folder/usr"  # a prefix that no build has heard of
 cd "$folder"
 usr/bin/pointflight lidar list | grep -q mid360

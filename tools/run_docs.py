@@ -111,7 +111,7 @@ def check_launch(place, command):
     """A launch file of ours, and arguments that it declares."""
     words = command.split()
     name = next(word for word in words if ".launch" in word)
-    files = list((SOURCE / "ros").rglob(name))
+    files = list((SOURCE / "ros_packages").rglob(name))
     if not files:
         raise Broken(f"{place}: there is no {name}")
     text = files[0].read_text()

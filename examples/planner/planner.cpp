@@ -21,6 +21,19 @@ constexpr double kInterval = 0.25;  // s between knots
 constexpr double kHorizon = 9.0;    // m of path that is flown at once
 constexpr std::size_t kNodesMax = 60000;
 
+/// Steps from a cell to the 26 around it.
+std::vector<Eigen::Vector3i> neighbours() {
+  std::vector<Eigen::Vector3i> steps;
+  for (int z = -1; z <= 1; ++z) {
+    for (int y = -1; y <= 1; ++y) {
+      for (int x = -1; x <= 1; ++x) {
+        if (x != 0 || y != 0 || z != 0) steps.emplace_back(x, y, z);
+      }
+    }
+  }
+  return steps;
+}
+
 }  // namespace
 
 /// Distance of the hull to what stands still and to where movers will be.
@@ -64,6 +77,7 @@ std::vector<Vector3d> Planner::search(const Vector3d& from, double time) const {
   std::size_t best = start;
   double best_score = left(from);
   std::size_t visited = 0;
+  const auto around = neighbours();
   while (!open.empty() && visited++ < kNodesMax) {
     const Open node = open.top();
     open.pop();
@@ -86,28 +100,22 @@ std::vector<Vector3d> Planner::search(const Vector3d& from, double time) const {
       best = node.cell;
       break;
     }
-    for (int dz = -1; dz <= 1; ++dz) {
-      for (int dy = -1; dy <= 1; ++dy) {
-        for (int dx = -1; dx <= 1; ++dx) {
-          if (dx == 0 && dy == 0 && dz == 0) continue;
-          const Vector3d q = p + LocalMap::kCell * Vector3d(dx, dy, dz);
-          if (!map_.contains(q) || q.z() < options_.height_min || q.z() > options_.height_max) {
-            continue;
-          }
-          const double room = room_at(q, time, away / options_.speed);
-          // out of a tight place any way is good that leads to more room
-          if (room < kMargin && room <= room_at(p, time, away / options_.speed)) continue;
-          const double tight = std::clamp((kComfort - room) / kComfort, 0.0, 1.5);
-          const double step = LocalMap::kCell * std::sqrt(dx * dx + dy * dy + 4.0 * dz * dz) *
-                              (1.0 + 6.0 * tight * tight);
-          const std::size_t to = map_.index_of(q);
-          const auto total = static_cast<float>(so_far + step);
-          if (total >= cost[to]) continue;
-          cost[to] = total;
-          parent[to] = static_cast<std::uint32_t>(node.cell);
-          open.push({static_cast<double>(total) + left(q), to});
-        }
-      }
+    for (const Eigen::Vector3i& d : around) {
+      const Vector3d q = p + LocalMap::kCell * d.cast<double>();
+      if (!map_.contains(q) || q.z() < options_.height_min || q.z() > options_.height_max) continue;
+      const double room = room_at(q, time, away / options_.speed);
+      // out of a tight place any way is good that leads to more room
+      if (room < kMargin && room <= room_at(p, time, away / options_.speed)) continue;
+      const double tight = std::clamp((kComfort - room) / kComfort, 0.0, 1.5);
+      const double step = LocalMap::kCell *
+                          std::sqrt(d.x() * d.x() + d.y() * d.y() + 4.0 * d.z() * d.z()) *
+                          (1.0 + 6.0 * tight * tight);
+      const std::size_t to = map_.index_of(q);
+      const auto total = static_cast<float>(so_far + step);
+      if (total >= cost[to]) continue;
+      cost[to] = total;
+      parent[to] = static_cast<std::uint32_t>(node.cell);
+      open.push({static_cast<double>(total) + left(q), to});
     }
   }
   std::vector<Vector3d> path;

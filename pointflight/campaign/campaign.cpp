@@ -1,7 +1,6 @@
 #include "pointflight/campaign/campaign.hpp"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -14,6 +13,7 @@
 #include <system_error>
 #include <utility>
 
+#include "pointflight/campaign/internal/attempt.hpp"
 #include "pointflight/campaign/process.hpp"
 #include "pointflight/core/hash.hpp"
 #include "pointflight/core/input_error.hpp"
@@ -34,100 +34,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kIdentity = "campaign.json";
-constexpr const char* kResult = "result.json";
-constexpr const char* kAttempt = ".attempt-";
-constexpr const char* kRuns = "runs";
-constexpr const char* kOutput = "output";  // of a flight: what its program writes
-
-void write_text(const fs::path& path, std::string_view text) {
-  OutputFile file(path.string());
-  file.write(text);
-  file.commit();
-}
-
-std::string host_name() {
-  std::array<char, 256> name{};
-  if (gethostname(name.data(), name.size() - 1) != 0) return "host";
-  return name.data();
-}
-
-/// Of a flight in the campaign's folder.
-std::string name_of(std::size_t number) {
-  return fmt::format("{}/{:06}", kRuns, number);
-}
-
-/// Of an attempt at it: it says whose it is.
-std::string attempt_name(std::size_t number) {
-  static std::atomic<int> count = 0;
-  return fmt::format("{}{}{}-{}-{}", name_of(number), kAttempt, host_name(), getpid(), ++count);
-}
-
-/// Removes what we and our own `fly` wrote for a flight. Returns true if that was all: what a
-/// program of the user's left there stays.
-bool remove_flight(const Folder& home, const std::string& name) {
-  if (const auto flight = home.below(name)) remove_run(*flight, kOutput);
-  return remove_owned(home, name);
-}
-
-/// What has no result is no flight, and what is not ours stays: under another name.
-void make_way(const Folder& home, const std::string& name) {
-  if (home.entry(name + "/" + kResult) != Entry::kNothing || remove_flight(home, name)) return;
-  for (int i = 1; home.rename(name, home, fmt::format("{}.aside-{}", name, i)) == EEXIST; ++i) {
-  }
-}
-
-/// A flight while it is flown, in a folder of its own. One that ends without a result leaves
-/// nothing of ours.
-class Attempt {
- public:
-  Attempt(const Folder& home, std::size_t number)
-      : home_(home),
-        number_(number),
-        name_(attempt_name(number)),
-        folder_(home, name_),
-        lock_(folder_.path()) {}
-  ~Attempt() {
-    if (!kept_) remove_flight(home_, name_);
-  }
-  Attempt(const Attempt&) = delete;
-  Attempt& operator=(const Attempt&) = delete;
-
-  [[nodiscard]] OwnedFolder& folder() { return folder_; }
-
-  /// Takes away what a thousand flights need not keep of a run that lists its files.
-  void remove_bulk(const std::string& figures) const {
-    const auto output = folder_.folder().below(kOutput);
-    auto files = output ? read_file_list(*output) : std::nullopt;
-    if (!files) return;
-    const std::set<std::string> kept = {"summary.json", "timing.json", "events.csv", figures};
-    remove_listed(*output, *files, [&](const std::string& name) { return kept.contains(name); });
-    std::erase_if(*files, [&](const ListedFile& file) { return !kept.contains(file.name); });
-    output->write(kFileList, file_list_text(*files));
-  }
-
-  /// It is over: its folder gets the flight's name.
-  void keep(const RunRecord& record) {
-    write_text(folder_.file(kResult), record_json(record));
-    const std::string name = name_of(number_);
-    make_way(home_, name);
-    const int error = home_.rename(name_, home_, name);
-    const bool is_flown = home_.entry(name + "/" + kResult) == Entry::kFile;
-    if (error == EEXIST && is_flown) return;  // by somebody else meanwhile: the same
-    if (error != 0) {
-      throw InputError(
-          fmt::format("{}/{}: {}", home_.path(), name, std::generic_category().message(error)));
-    }
-    kept_ = true;
-  }
-
- private:
-  const Folder& home_;
-  std::size_t number_;
-  std::string name_;
-  OwnedFolder folder_;
-  FolderLock lock_;
-  bool kept_ = false;
-};
 
 void replace_all(std::string& text, std::string_view what, const std::string& by) {
   for (std::size_t at = 0; (at = text.find(what, at)) != std::string::npos; at += by.size()) {
@@ -291,17 +197,17 @@ void Campaign::check_folder() const {
         "folder",
         folder_));
   }
-  if (!home.make(kRuns)) {
+  if (!home.make(kFlights)) {
     throw InputError(fmt::format(
         "{}/{}: cannot be used as a folder: it is a link, a file, a mount or not writable; give "
         "another with -o",
         folder_,
-        kRuns));
+        kFlights));
   }
 }
 
 std::string Campaign::run_folder(std::size_t number) const {
-  return (fs::path(folder_) / name_of(number)).string();
+  return (fs::path(folder_) / flight_name(number)).string();
 }
 
 std::vector<std::size_t> Campaign::missing() const {
@@ -311,7 +217,7 @@ std::vector<std::size_t> Campaign::missing() const {
        !error && at != fs::directory_iterator();
        at.increment(error)) {
     std::error_code ignored;
-    const bool is_over = fs::exists(at->path() / kResult, ignored);
+    const bool is_over = fs::exists(at->path() / kFlightResult, ignored);
     if (is_over) there.insert(at->path().filename().string());
   }
   std::vector<std::size_t> missing;
@@ -328,9 +234,10 @@ std::size_t Campaign::forget_failed() {
     const auto record = result(run.number);
     if (!record || record->status != RunStatus::kFailed) continue;
     // at one stroke: whoever is killed meanwhile leaves no half of a result
-    const std::string name = name_of(run.number);
-    if (!home.remove_file(name + "/" + kResult)) {
-      throw InputError(fmt::format("{}/{}: cannot be removed", run_folder(run.number), kResult));
+    const std::string name = flight_name(run.number);
+    if (!home.remove_file(name + "/" + kFlightResult)) {
+      throw InputError(
+          fmt::format("{}/{}: cannot be removed", run_folder(run.number), kFlightResult));
     }
     remove_flight(home, name);
     ++count;
@@ -340,8 +247,8 @@ std::size_t Campaign::forget_failed() {
 
 std::size_t Campaign::remove_leftovers() const {
   const Folder home(folder_);
-  const auto runs = home.below(kRuns);
-  const std::string ours = kAttempt + host_name() + "-";
+  const auto runs = home.below(kFlights);
+  const std::string ours = kFlightAttempt + host_name() + "-";
   std::size_t left = 0;
   for (const std::string& name : runs ? runs->names() : std::vector<std::string>()) {
     const std::size_t found = name.find(ours);
@@ -368,7 +275,7 @@ std::size_t Campaign::remove_leftovers() const {
 }
 
 std::optional<RunRecord> Campaign::result(std::size_t number) const {
-  const fs::path path = fs::path(run_folder(number)) / kResult;
+  const fs::path path = fs::path(run_folder(number)) / kFlightResult;
   std::error_code ignored;
   if (!fs::exists(path, ignored)) return std::nullopt;
   return parse_record(MappedFile(path.string()).text(), path.string());
@@ -436,8 +343,8 @@ std::optional<RunRecord> Campaign::fly(std::size_t number, const std::atomic<boo
                       map != maps_.end() ? *map->second : *scenario.open_map(),
                       folder,
                       run_folder(number));
-  const std::string output = folder.path() + "/" + kOutput;
-  if (!folder.folder().make(kOutput)) {
+  const std::string output = folder.path() + "/" + kFlightOutput;
+  if (!folder.folder().make(kFlightOutput)) {
     throw InputError(fmt::format("{}: cannot make the folder", output));
   }
   ProcessRequest request;

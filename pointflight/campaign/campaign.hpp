@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
+#include "pointflight/campaign/plan.hpp"
 #include "pointflight/campaign/run_record.hpp"
-#include "pointflight/campaign/study.hpp"
 #include "pointflight/map/surfel_map.hpp"
 #include "pointflight/sim/scenario.hpp"
 

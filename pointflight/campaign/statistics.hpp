@@ -9,8 +9,8 @@
 #include <string_view>
 #include <vector>
 
+#include "pointflight/campaign/plan.hpp"
 #include "pointflight/campaign/run_record.hpp"
-#include "pointflight/campaign/study.hpp"
 
 namespace pointflight {
 

@@ -91,6 +91,22 @@ void draw_shares(Canvas& canvas, const SensorComparison& comparison) {
   draw_legend(canvas, entries, plot.left, kLegendMiddle - kLegendRow, plot.width);
 }
 
+/// Lines across the plot at whole steps of y, and what y is.
+void draw_percent_axis(Canvas& canvas, const Plot& plot) {
+  for (double y : ticks(0.0, plot.y.to, tick_step(plot.y.to, 7))) {
+    const double at = plot.at(0.0, y).second;
+    canvas.line({{plot.left, at}, {plot.right(), at}}, 0.7, kDim, 0.5);
+    canvas.text(plot.left - 8.0,
+                at + 4.0,
+                fmt::format("{:.0f}", std::abs(y)),
+                kTickText,
+                kInk,
+                Align::kRight);
+  }
+  canvas.text_upwards(
+      plot.left - 42.0, plot.top + 0.5 * plot.height, plot.y.label, kLabelText, kInk);
+}
+
 void draw_edges(Canvas& canvas, const SensorComparison& comparison) {
   constexpr std::size_t kBins = std::tuple_size_v<decltype(SensorComparison::edges)>;
   Sides all;
@@ -111,18 +127,7 @@ void draw_edges(Canvas& canvas, const SensorComparison& comparison) {
   plot.y = {0.0, 1.05 * highest, "returns at edges (%)"};
   plot.x = {0.0, static_cast<double>(kBins), ""};
   const double wide = plot.width / static_cast<double>(kBins);
-  for (double y : ticks(0.0, plot.y.to, tick_step(plot.y.to, 7))) {
-    const double at = plot.at(0.0, y).second;
-    canvas.line({{plot.left, at}, {plot.right(), at}}, 0.7, kDim, 0.5);
-    canvas.text(plot.left - 8.0,
-                at + 4.0,
-                fmt::format("{:.0f}", std::abs(y)),
-                kTickText,
-                kInk,
-                Align::kRight);
-  }
-  canvas.text_upwards(
-      plot.left - 42.0, plot.top + 0.5 * plot.height, plot.y.label, kLabelText, kInk);
+  draw_percent_axis(canvas, plot);
   for (std::size_t b = 0; b < kBins; ++b) {
     const Sides& bin = comparison.edges[b];
     for (std::size_t s = 0; s < kSides.size(); ++s) {

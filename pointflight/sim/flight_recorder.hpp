@@ -62,9 +62,6 @@ class FlightRecorder : public SampleSink {
   std::optional<OutputFile> obstacles_;
 };
 
-/// summary.json as text: what happened, without wall-clock figures.
-std::string summary_json(const Simulation& simulation);
-
 /// "map", "drone1", "obstacle 3": what a label stands for in a run.
 std::string label_name(const Simulation& simulation, Label label);
 

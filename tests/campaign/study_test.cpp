@@ -6,6 +6,7 @@
 #include <cmath>
 #include <set>
 
+#include "pointflight/campaign/plan.hpp"
 #include "tests/support.hpp"
 
 namespace pointflight {

@@ -1,10 +1,9 @@
 // Any bytes as a campaign's study: its flights and a scenario with its values, or an InputError of
 // one line.
-#include "pointflight/campaign/study.hpp"
-
 #include <cstdint>
 #include <string>
 
+#include "pointflight/campaign/plan.hpp"
 #include "pointflight/campaign/run_record.hpp"
 #include "tests/fuzz/one_line.hpp"
 

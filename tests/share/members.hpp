@@ -1,6 +1,8 @@
 // Processes of a shared run as tests have them: each with its simulation, on a bus in memory.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <map>
 #include <memory>
 #include <string>
@@ -130,5 +132,28 @@ inline Scenario through_each_other() {
   setup.lease = 0.5;
   return with_share(s, setup);
 }
+
+/// By clocks: time that only moves when it is told to.
+struct World {
+  std::int64_t now = 1'000'000'000;
+  Bus bus{[this] { return now; }};
+  std::vector<std::unique_ptr<Member>> members;
+  std::uint64_t last_id = 0;
+
+  Member& add(const Scenario& scenario, std::vector<std::size_t> vehicles) {
+    members.push_back(std::make_unique<Member>(
+        bus, scenario, std::move(vehicles), [this] { return now; }, ++last_id));
+    return *members.back();
+  }
+  /// All that are not in `still`.
+  void pass(double seconds, const std::vector<Member*>& still = {}) {
+    const std::int64_t until = now + std::llround(1e9 * seconds);
+    for (; now < until; now += 1'000'000) {
+      for (const auto& member : members) {
+        if (std::find(still.begin(), still.end(), member.get()) == still.end()) member->tick();
+      }
+    }
+  }
+};
 
 }  // namespace pointflight::testing

@@ -7,6 +7,7 @@
 
 #include "pointflight/core/constants.hpp"
 #include "pointflight/sim/flight_recorder.hpp"
+#include "pointflight/sim/run_summary.hpp"
 #include "pointflight/vehicle/feasibility.hpp"
 #include "tests/sim/runs.hpp"
 

@@ -1,0 +1,30 @@
+// A sensor's settings with the figures of a fit.
+#include "pointflight/core/constants.hpp"
+#include "pointflight/core/math.hpp"
+#include "pointflight/survey/sensor_fit.hpp"
+
+namespace pointflight {
+
+LidarSettings with_fit(LidarSettings base, const SensorFit& fit, const std::string& rings_table) {
+  const auto rounded = [](double value, double step) {
+    return step * static_cast<double>(floor_to_integer(value / step + 0.5));
+  };
+  if (fit.turn) {
+    base.rate = rounded(fit.turn->rate, 0.01);
+  } else if (fit.rate) {
+    base.rate = rounded(*fit.rate, 0.01);
+  }
+  base.noise.range_sigma = rounded(fit.range_sigma, 1e-4);
+  base.noise.range_sigma_per_m2 = 0.0;
+  base.noise.range_step = fit.range_step;
+  base.optics.angle_sigma_deg = rounded(fit.angle_sigma / kDegree, 1e-4);
+  if (fit.turn && !rings_table.empty()) {
+    base.pattern = ScanPattern::kRings;
+    base.rings = {};
+    base.rings.table = rings_table;
+    base.rings.cycle_us = rounded(fit.turn->cycle_us, 1e-3);
+  }
+  return base;
+}
+
+}  // namespace pointflight
