@@ -215,10 +215,10 @@ int fly_by_mpi(const CampaignFlags& flags, const std::vector<Condition>& conditi
     clear(*campaign);
     if (flags.retry) campaign->forget_failed();
   }
-  mpi.meet();  // the folder is there
+  mpi.barrier();  // the folder is there
   if (!is_first) campaign.emplace(load_study(flags.study), flags.folder, own_program());
   const std::vector<std::size_t> missing = campaign->missing();
-  mpi.meet();  // nobody flies while others look what is missing
+  mpi.barrier();  // nobody flies while others look what is missing
   const StopWatch watch;
   const std::size_t all = campaign->plan().runs.size();
   const FlightDone done =
@@ -227,7 +227,7 @@ int fly_by_mpi(const CampaignFlags& flags, const std::vector<Condition>& conditi
     const auto record = campaign->fly(missing[i], watch.stop());
     if (record && done) done(missing[i], *record);
   }
-  mpi.meet();
+  mpi.barrier();
   const int code = is_first ? finish(*campaign, flags, conditions, watch.stop()) : int{kDone};
   mpi.end();
   return code;
@@ -295,6 +295,8 @@ void add_campaign_command(CLI::App& parent, int& exit_code) {
                   "0.2\"; again for more");
   app->add_flag("--retry-failed", flags->retry, "Fly those again that failed");
   app->add_flag("--json", flags->json, "For programs");
+  app->footer(
+      "Example: pointflight campaign study.yaml -o results --fail-if \"collision_rate > 0.02\"");
   app->callback([flags, &exit_code] { exit_code = run_campaign(*flags); });
 }
 

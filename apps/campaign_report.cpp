@@ -51,7 +51,7 @@ std::vector<Line> lines_over(const Plan& plan, const std::vector<Runs>& points, 
   return lines;
 }
 
-/// A value with its interval, where there is one.
+/// A value with its interval, if there is one.
 struct Estimate {
   double value, low, high;
 };
@@ -208,7 +208,7 @@ std::string escaped(const std::string& text) {
   return out;
 }
 
-/// A picture as part of a page, where names are the page's: each picture's get a word in front.
+/// A picture as part of a page, if names are the page's: each picture's get a word in front.
 std::string inlined(std::string svg, const std::string& prefix) {
   svg.erase(0, std::min(svg.find("<svg"), svg.size()));
   for (const std::string_view before : {"id=\"", "href=\"#", "url(#"}) {

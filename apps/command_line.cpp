@@ -45,6 +45,18 @@ std::string guess(const std::string& word, const std::vector<std::string>& known
   return near.empty() ? std::string() : fmt::format(", did you mean '{}'?", near);
 }
 
+/// The commands below `app` whose last word is this one: "map info".
+void find_commands(const CLI::App& app,
+                   const std::string& word,
+                   const std::string& path,
+                   std::vector<std::string>& found) {
+  for (const CLI::App* command : subcommands_of(app)) {
+    const std::string name = path + command->get_name();
+    if (command->get_name() == word) found.push_back(name);
+    find_commands(*command, word, name + " ", found);
+  }
+}
+
 /// How far the words lead down the tree, and the first one that names no command, if there is one.
 struct Reached {
   const CLI::App* app;
@@ -142,11 +154,16 @@ std::string explain(const CLI::ParseError& error,
   const std::string see = fmt::format("see {} --help", full_name(*reached.app));
   const auto below = names_of(subcommands_of(*reached.app));
   if (!reached.unknown.empty()) {
-    const std::string meant = guess(reached.unknown, below);
+    std::string meant = guess(reached.unknown, below);
+    std::vector<std::string> elsewhere;
+    find_commands(app, reached.unknown, "", elsewhere);
+    if (!elsewhere.empty()) {
+      meant = fmt::format(", did you mean '{}'?", fmt::join(elsewhere, "' or '"));
+    }
     return fmt::format(
-        "'{}' is no command{}; {}",
+        "unknown command '{}'{}; {}",
         reached.unknown,
-        meant.empty() ? fmt::format(", these are: {}", fmt::join(below, ", ")) : meant,
+        meant.empty() ? fmt::format(", expected one of: {}", fmt::join(below, ", ")) : meant,
         see);
   }
   if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::ExtrasError)) {

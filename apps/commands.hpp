@@ -3,7 +3,7 @@
 #include <CLI/App.hpp>
 
 /// One function a subcommand: adds its flags and help to `app`; its callback does the work, throws
-/// InputError for what is wrong outside, and sets `exit_code` (0 where it does not).
+/// InputError for what is wrong outside, and sets `exit_code` (0 if it does not).
 namespace pointflight::apps {
 
 void add_map_command(CLI::App& app, int& exit_code);

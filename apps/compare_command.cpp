@@ -229,14 +229,17 @@ void add_compare_command(CLI::App& parent, int& /*exit_code*/) {
   auto flags = std::make_shared<CompareFlags>();
   app->add_option("map", flags->map, "A .pfmap")->required();
   add_scans_flags(*app, flags->scans, true);
-  app->add_option(
-      "--cloud", flags->cloud, "What the map was made from: tells which rays it supports");
+  app->add_option("--cloud",
+                  flags->cloud,
+                  "The cloud that the map was made from: also restricts the comparison to rays "
+                  "that it supports");
   app->add_option("--renderer", flags->renderer, "How ranges are made")
       ->check(CLI::IsMember(renderer_names()))
       ->capture_default_str();
-  app->add_flag("--floor",
-                flags->floor,
-                "Also each scan against the local planes of the others: what the data allow");
+  app->add_flag(
+      "--floor",
+      flags->floor,
+      "Also compare each scan with local planes of the other scans: the best that the data allow");
   auto* lidar = app->add_option(
       "--lidar",
       flags->lidar,
@@ -245,10 +248,12 @@ void add_compare_command(CLI::App& parent, int& /*exit_code*/) {
   for (CLI::Option* option : add_surroundings_flags(*app, flags->surroundings)) {
     option->needs(lidar);
   }
-  app->add_option("--png", flags->png, "Folder for a picture of each scan's errors");
+  app->add_option("--png", flags->png, "Folder for pictures of each scan's errors");
   add_force_flag(*app, flags->force);
   app->add_flag("--json", flags->json, "JSON on stdout");
   app->add_option("--threads", flags->threads, "0: all cores")->check(CLI::Range(0, 1024));
+  app->footer(
+      "Example: pointflight compare hall.pfmap --scans scans/ --poses poses.tum --png errors");
   app->callback([flags] { compare(*flags); });
 }
 

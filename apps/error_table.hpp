@@ -9,7 +9,7 @@ namespace pointflight::apps {
 
 /// How `fidelity` and `compare` show error statistics.
 struct ErrorTable {
-  /// Whether some rays meet nothing in truth: real scans have none of those.
+  /// Whether some rays hit nothing in truth: real scans have none of those.
   bool has_empty_rays = false;
 
   /// As in the struct: shares 0 to 1, lengths in m.

@@ -184,7 +184,7 @@ void run_scene(const ExactScene& scene,
   }
 }
 
-/// What both kinds share, where it was given; defaults differ.
+/// What both kinds share, if it was given; defaults differ.
 void complete_survey_flags(const CLI::App& app, FidelityFlags& flags) {
   const auto was_given = [&](const char* name) { return app.count(name) > 0; };
   for (const char* name : {"--points-per-cell", "--density-min", "--thinned", "--beams", "--png"}) {
@@ -272,23 +272,27 @@ void add_fidelity_command(CLI::App& parent, int& /*exit_code*/) {
                   flags->lidar,
                   "avia_grid, mid360_uniform, vlp32_grid, a shipped sensor or a .yaml (default: "
                   "avia_grid in large scenes, beams aimed at what matters in small ones)");
-  app->add_option("--renderer", flags->renderers, "How ranges are made; several: beam,paper")
+  app->add_option(
+         "--renderer", flags->renderers, "Renderers to compare, separated by commas: beam,paper")
       ->delimiter(',')
       ->check(CLI::IsMember(renderer_names()))
       ->capture_default_str();
   app->add_option("--tau", flags->tau, "Coverage that makes a return (default: by the density)")
       ->check(within(0.05, 1.0));
-  app->add_option("--poses", flags->poses, "Random ones where a scene has none of its own")
+  app->add_option("--poses",
+                  flags->poses,
+                  "Number of random sensor poses, for scenes that have none of their own")
       ->check(CLI::Range(1, 100000))
       ->capture_default_str();
-  app->add_option("--beams", flags->beams, "Aimed beams a pose")
+  app->add_option(
+         "--beams", flags->beams, "Number of beams per pose that are aimed at edges and surfaces")
       ->check(CLI::Range(1, 100000000))
       ->capture_default_str();
-  app->add_option("--seed", flags->seed, "Of clouds, poses and aimed beams")
+  app->add_option("--seed", flags->seed, "Seed of clouds, poses and aimed beams")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   app->add_flag("--json", flags->json, "JSON on stdout");
-  app->add_option("--png", flags->png, "Folder for pictures of where the errors sit");
+  app->add_option("--png", flags->png, "Folder for pictures of the errors");
   add_survey_flags(*app, flags->survey);
   add_force_flag(*app, flags->force);
   app->add_option("--threads", flags->threads, "0: all cores")->check(CLI::Range(0, 1024));

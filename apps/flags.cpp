@@ -42,7 +42,7 @@ std::vector<double> parse_numbers(const std::string& text,
     numbers.push_back(value);
   }
   if (count > 0 && numbers.size() != count) {
-    throw InputError(fmt::format("{}: {} numbers; {} are wanted", flag, numbers.size(), count));
+    throw InputError(fmt::format("{}: expected {} numbers, got {}", flag, count, numbers.size()));
   }
   return numbers;
 }

@@ -12,11 +12,11 @@ namespace pointflight::apps {
 /// Check of a flag: a number within limits. (CLI::Range lets NaN pass.)
 CLI::Validator within(double min, double max);
 
-/// --start-in: a box in the world, m. `box_from` throws InputError where it is none.
+/// --start-in: a box in the world, m. `box_from` throws InputError if it is none.
 void add_start_in_flag(CLI::App& app, std::vector<double>& numbers);
 Aabb box_from(const std::vector<double>& numbers, const std::string& flag);
 
-/// Numbers of a flag, commas or blanks between. Throws InputError where there are not `count` of
+/// Numbers of a flag, commas or blanks between. Throws InputError if there are not `count` of
 /// them (0: any number) or one is not finite.
 std::vector<double> parse_numbers(const std::string& text,
                                   std::size_t count,
@@ -42,11 +42,11 @@ void check_outputs(const std::vector<std::string>& outputs,
                    const std::vector<std::string>& inputs,
                    bool force);
 
-/// Makes a folder for a command's pictures. Throws InputError where it cannot be made, or where it
+/// Makes a folder for a command's pictures. Throws InputError if it cannot be made, or if it
 /// holds anything that may not be replaced.
 void make_picture_folder(const std::string& folder, bool force);
 
-/// The clouds of a command line; "-" is standard input, kept in `scratch` where it has to be read
+/// The clouds of a command line; "-" is standard input, kept in `scratch` if it has to be read
 /// again. `format`: what all of them are, empty: by their names. Throws InputError.
 std::vector<CloudSource> cloud_sources(const std::vector<std::string>& inputs,
                                        const std::string& format,

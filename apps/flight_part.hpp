@@ -13,7 +13,7 @@ inline constexpr std::chrono::milliseconds kFilesWait(5);
 
 /// Somebody whom a flight is for: the user at the terminal, a folder of results, ROS, recordings
 /// and viewers, other processes that share the run. `fly` calls each part's functions in this
-/// order; where one throws InputError nothing is flown.
+/// order; if one throws InputError nothing is flown.
 class FlightPart {
  public:
   virtual ~FlightPart() = default;

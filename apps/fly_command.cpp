@@ -78,7 +78,7 @@ std::vector<Vector3d> waypoints_from(const std::vector<std::string>& words) {
 Scenario scenario_for_map(const FlyFlags& flags,
                           const std::optional<Aabb>& bounds,
                           const Executor& executor) {
-  ScenarioWish wish;
+  ScenarioRequest wish;
   wish.map_path = flags.input;
   wish.map_key = flags.input;
   if (!flags.lidar.empty()) wish.lidar = flags.lidar;
@@ -119,6 +119,12 @@ Scenario load_input(const FlyFlags& flags, const Executor& executor) {
   const bool is_map = fs::path(flags.input).extension() == ".pfmap";
   if (is_map && !flags.map.empty()) {
     throw InputError(fmt::format("--map: is for a scenario; {} is a map itself", flags.input));
+  }
+  if (!is_map && has_cloud_extension(flags.input)) {
+    throw InputError(
+        fmt::format("{0}: is a point cloud; import it first: pointflight map import {0} -o {1}",
+                    flags.input,
+                    fs::path(flags.input).stem().string() + ".pfmap"));
   }
   Scenario scenario =
       is_map ? scenario_for_map(flags, bounds, executor) : scenario_from_file(flags);
@@ -284,28 +290,31 @@ int fly(const FlyFlags& flags) {
 }  // namespace
 
 void add_fly_command(CLI::App& parent, int& exit_code) {
-  auto* app = parent.add_subcommand("fly", "Fly a scenario, or a map in a scenario made up for it");
+  auto* app = parent.add_subcommand("fly", "Fly a scenario, or a map with a generated scenario");
   auto flags = std::make_shared<FlyFlags>();
   app->add_option("scenario", flags->input, "A scenario .yaml, or a .pfmap")->required();
   app->add_option(
       "-o,--output", flags->output, "Folder for the results; needed without ROS and --view");
-  app->add_option("--seed", flags->seed, "Instead of the scenario's")
+  app->add_option("--seed", flags->seed, "Seed of everything random, instead of the scenario's")
       ->check(CLI::Range(std::int64_t{0}, std::int64_t{9000000000000000}));
-  app->add_option(
-      "--rate",
-      flags->rate,
-      "Simulated seconds per second: 'max', or 1.0 for real time (the default with ROS)");
-  app->add_option(
-      "--map",
-      flags->map,
-      "Where the scenario's map lies now; one that a run was flown in must be the same");
+  app->add_option("--rate",
+                  flags->rate,
+                  "Simulated seconds per wall-clock second: 'max', or 1.0 for real time (the "
+                  "default with ROS)");
+  app->add_option("--map",
+                  flags->map,
+                  "Use this .pfmap instead of the scenario's path; must be the same map if the "
+                  "scenario has its hash");
   app->add_option("--lidar",
                   flags->lidar,
-                  "A shipped sensor or a path; a scenario's vehicles carry it instead of theirs");
-  app->add_option("--vehicle", flags->vehicle, "A shipped vehicle or a path, for all that fly");
+                  "LiDAR of all vehicles, instead of the scenario's: a shipped sensor or a path");
+  app->add_option("--vehicle",
+                  flags->vehicle,
+                  "Model of all vehicles, instead of the scenario's: a shipped vehicle or a path");
   app->add_option("--mission", flags->mission, "Waypoints x,y,z x,y,z ... of the first vehicle, m")
       ->type_name("X,Y,Z ...");
-  app->add_option("--duration", flags->duration, "s; 0: as long as the mission takes")
+  app->add_option(
+         "--duration", flags->duration, "Length of the flight, s; 0: as long as the mission takes")
       ->check(within(0.0, 1e6));
   app->add_option("--start", flags->start, "x,y,z where the first vehicle starts, m")
       ->delimiter(',')
@@ -314,15 +323,19 @@ void add_fly_command(CLI::App& parent, int& exit_code) {
   add_start_in_flag(*app, flags->start_in);
   app->add_option("--threads", flags->threads, "0: all cores; results never depend on it")
       ->check(CLI::Range(0, 1024));
-  app->add_flag("--force",
-                flags->force,
-                "Write into a folder that is not empty: an earlier run's files go, others stay; "
-                "and over recordings");
+  app->add_flag(
+      "--force",
+      flags->force,
+      "Replace an earlier run in the output folder (other files there stay) and recordings "
+      "of the same name");
   app->add_flag("--no-scans", flags->no_scans, "Do not write scans as PCD");
   app->add_flag("--no-picture", flags->no_picture, "Do not draw overview.png; `picture` can later");
   app->add_flag("--json", flags->json, "summary.json on stdout, with the real-time factor");
   app->add_flag(
-      "--snapshot", flags->snapshot, "All beams of a scan from one pose, as in the paper");
+      "--snapshot",
+      flags->snapshot,
+      "Take all beams of a scan from one pose, without motion distortion, as in the paper");
+  app->footer("Example: pointflight fly forest.pfmap -o run --record run.mcap");
   add_ros_flags(*app, flags->ros);
   add_view_flags(*app, flags->ros.view);
   add_share_flags(*app, flags->share);

@@ -24,8 +24,8 @@ std::string about_noise(double noise, std::uint64_t projected, std::uint64_t too
       noise * 1e3,
       projected > 0
           ? fmt::format(
-                "{} cells moved onto their planes, {} left (two faces?)", projected, too_thick)
-          : "clean enough to be left as it is");
+                "removed from {} cells; {} skipped (two parallel surfaces?)", projected, too_thick)
+          : "too little to remove");
 }
 
 void print_report(const ImportReport& r, const ImportOptions& options) {
@@ -51,17 +51,17 @@ void print_report(const ImportReport& r, const ImportOptions& options) {
                       : "kept"));
   log("noise         " + about_noise(r.noise, r.projection.projected, r.projection.too_thick));
   if (r.grown_surfels + r.wide_surfels > 0) {
-    log(fmt::format("thin scan     {} surfels widened to close gaps, {} for several cells each",
+    log(fmt::format("thin scan     {} surfels widened to close gaps, {} cover several cells each",
                     r.grown_surfels,
                     r.wide_surfels));
   }
   if (r.merged_surfels > 0) {
-    log(fmt::format("planes        {} surfels for several cells each", r.merged_surfels));
+    log(fmt::format("planes        {} surfels that cover several cells each", r.merged_surfels));
   }
   if (r.small_surfels > 0) {
-    log(fmt::format("fine forms    {} surfels for parts of cells", r.small_surfels));
+    log(fmt::format("detail        {} surfels smaller than a cell", r.small_surfels));
   }
-  log(fmt::format("coverage      {:.2f} makes a return ({:.0f} points per planar surfel)",
+  log(fmt::format("hit threshold {:.2f} of a beam covered ({:.0f} points per planar surfel)",
                   r.tau,
                   r.points_per_cell));
   log(fmt::format("surfels       {}, {:.0f} % planar{}",

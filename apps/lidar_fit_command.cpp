@@ -226,13 +226,14 @@ void add_lidar_fit_command(CLI::App& parent) {
       ->check(CLI::ExistingPath);
   app->add_option("--scan-topic",
                   flags->topic,
-                  "Clouds of a recording (PointCloud2, CustomMsg); without it the only ones");
-  app->add_option("--scans", flags->scans, "So many at most, from the first")
+                  "Topic of the clouds in a recording (PointCloud2, CustomMsg); needed only if "
+                  "there are several");
+  app->add_option("--scans", flags->scans, "Use at most this many scans, from the first")
       ->check(CLI::Range(1, 100000))
       ->capture_default_str();
   app->add_option("--like",
                   flags->like,
-                  "A sensor whose file says what the scans do not: pattern, rated ranges, optics");
+                  "Take what scans cannot tell (pattern, rated ranges, optics) from this sensor");
   app->add_option("-o,--output",
                   flags->output,
                   "Sensor file (.yaml) with the figures; a turning sensor gets a table of its "
@@ -241,6 +242,7 @@ void add_lidar_fit_command(CLI::App& parent) {
   app->add_flag("--json", flags->json, "JSON on stdout");
   add_force_flag(*app, flags->force);
   app->add_option("--threads", flags->threads, "0: all cores")->check(CLI::Range(0, 1024));
+  app->footer("Example: pointflight lidar fit still.mcap --like mid360 -o mine.yaml");
   app->callback([flags] { fit_lidar(*flags); });
 }
 

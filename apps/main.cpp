@@ -51,10 +51,6 @@ int run(int argc, char** argv) {
   CLI::App app{"pointflight: a LiDAR drone in point-cloud maps of real places", "pointflight"};
   app.set_version_flag("--version", version_text);
   app.require_subcommand(1);
-  app.footer(
-      "A first tour: pointflight map forest -o forest.pcd\n"
-      "              pointflight map import forest.pcd -o forest.pfmap\n"
-      "              pointflight fly forest.pfmap -o run");
   int exit_code = kDone;
   add_map_command(app, exit_code);
   add_scenario_command(app, exit_code);
@@ -69,6 +65,10 @@ int run(int argc, char** argv) {
   add_view_command(app, exit_code);
   add_campaign_command(app, exit_code);
   add_shell_commands(app);
+  app.footer(  // not of the commands, which have examples of their own
+      "A first tour: pointflight map forest -o forest.pcd\n"
+      "              pointflight map import forest.pcd -o forest.pfmap\n"
+      "              pointflight fly forest.pfmap -o run");
   const std::vector<std::string> words = command_words(argc, argv);
   try {
     // CLI11 takes them from the back

@@ -37,7 +37,7 @@ nlohmann::ordered_json metadata_of(const SurfelMap& map) {
   return parsed.is_object() ? parsed : nlohmann::ordered_json::object();
 }
 
-/// A number of the metadata, 0 where there is none: the file may hold anything.
+/// A number of the metadata, 0 if there is none: the file may hold anything.
 double number_in(const nlohmann::ordered_json& json, const char* key) {
   if (!json.is_object() || !json.contains(key) || !json[key].is_number()) return 0.0;
   return json[key].get<double>();
@@ -77,7 +77,7 @@ constexpr double kNearestReach = 1e3;  // m
 struct PlaceInfo {
   Vector3d point_world;
   std::optional<Nearest> nearest;
-  std::optional<bool> known;  ///< Nothing where the map does not say.
+  std::optional<bool> known;  ///< Nothing if the map does not say.
 };
 
 std::vector<PlaceInfo> places_at(const SurfelMap& map, const std::vector<std::string>& points) {
@@ -180,7 +180,7 @@ void print_info(const SurfelMap& map, const SurfelCount& count, const InfoFlags&
              static_cast<double>(map.file_size()) * 1e-6,
              count.bytes_each(map));
   print_findings(metadata, map.resolution());
-  fmt::print("  coverage    {:.2f} makes a return\n", map.model().tau);
+  fmt::print("  threshold   {:.2f} of a beam covered makes a return\n", map.model().tau);
   fmt::print("  intensity   {}{}\n",
              map.has_intensity() ? "yes" : "no",
              map.reflectivity_per_intensity() > 0.0

@@ -53,7 +53,7 @@ EditOptions edit_options(const EditFlags& flags, const std::string& note);
 /// The whole file is read: an edit must not make a sound map of a damaged one.
 std::shared_ptr<const SurfelMap> open_sound_map(const std::string& path);
 
-/// Writes an edited map, says what became of it, and draws it where --png asks.
+/// Writes an edited map, says what became of it, and draws it if --png asks.
 void finish_map(const EditFlags& flags, OutputFile output, const EditedMap& edited);
 
 /// A cloud on its way out: counted, sampled for the picture.
@@ -64,8 +64,8 @@ class CloudOutput {
   void write(std::span<const CloudPoint> points);
   void write(std::span<const CloudRow> rows);
 
-  /// Completes the file, says what became of `points_read`, and draws it where --png asks. Throws
-  /// InputError where no point is left.
+  /// Completes the file, says what became of `points_read`, and draws it if --png asks. Throws
+  /// InputError if no point is left.
   void finish(std::uint64_t points_read, std::uint64_t not_finite, const std::string& title);
 
  private:

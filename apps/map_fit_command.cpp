@@ -54,6 +54,8 @@ void add_fit(CLI::App& parent) {
   app->add_option("input", flags->inputs, "A .pfmap")->required()->expected(1);
   add_fit_flags(*app, flags->fit, true);
   add_edit_flags(*app, *flags, "The .pfmap to write", true);
+  app->footer(
+      "Example: pointflight map fit hall.pfmap --scans scans/ --poses poses.tum -o fitted.pfmap");
   app->callback([flags] { run_fit(*flags); });
 }
 

@@ -164,10 +164,11 @@ void import_map(const ImportFlags& flags) {
 
 /// How surfels are made of the points. Returns --reflectivity.
 CLI::Option* add_quality_flags(CLI::App& app, ImportFlags& flags) {
-  app.add_option("--quality",
-                 flags.quality,
-                 "Of the hierarchy: normal builds it three times faster, rays in foliage are a "
-                 "fifth slower")
+  app.add_option(
+         "--quality",
+         flags.quality,
+         "Quality of the search tree: normal is built three times faster; rays through foliage "
+         "are 20 % slower")
       ->check(CLI::IsMember({"normal", "high"}))
       ->capture_default_str();
   app.add_option("--tau",
@@ -235,6 +236,7 @@ void add_import(CLI::App& parent) {
       ->check(CLI::IsMember({"y", "z"}))
       ->capture_default_str();
   auto* reflectivity = add_quality_flags(*app, *flags);
+  app->footer("Example: pointflight map import hall.pcd -o hall.pfmap --resolution 0.05");
   add_fit_flags(*app, flags->fit, false);
   reflectivity->excludes(app->get_option("--signal-of"));
   add_force_flag(*app, flags->force);

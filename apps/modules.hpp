@@ -8,12 +8,12 @@
 
 namespace pointflight::apps {
 
-/// True where this build came with a module ("pointflight_ros1", "pointflight_ros2",
+/// True if this build came with a module ("pointflight_ros1", "pointflight_ros2",
 /// "pointflight_mpi", "pointflight_dds").
 bool has_module(const std::string& name);
 
 /// The library that speaks ROS 1, loaded when first asked for. Throws InputError that says what to
-/// install where this build has none.
+/// install if this build has none.
 const Ros1Module& ros1_module();
 /// The same for ROS 2.
 const Ros2Module& ros2_module();

@@ -116,7 +116,7 @@ picture::RunPicture read_run(const fs::path& folder) {
     figures.end = summary.at("end").get<std::string>();
     for (const auto& vehicle : vehicles) {
       const std::string name = vehicle.at("name").get<std::string>();
-      // one of several, where other processes flew the rest
+      // one of several, if other processes flew the rest
       const bool has_folder = fs::exists(folder / name / "trajectory.csv");
       read_vehicle(has_folder ? folder / name : folder, picture.names.size(), picture);
       picture.names.push_back(name);
@@ -154,8 +154,11 @@ picture::RunPicture read_run(const fs::path& folder) {
   return picture;
 }
 
-/// The scenario that a run was flown from; nothing where its folder has none.
+/// The scenario that a run was flown from; nothing if its folder has none.
 std::optional<Scenario> scenario_of(const PictureFlags& flags) {
+  if (!fs::is_directory(flags.run)) {
+    throw InputError(fmt::format("{}: no such run folder", flags.run));
+  }
   const fs::path file = fs::path(flags.run) / "scenario.yaml";
   if (!fs::exists(file)) return std::nullopt;
   return load_scenario(file.string());
@@ -167,7 +170,7 @@ std::shared_ptr<const SurfelMap> map_of(const PictureFlags& flags,
                                         std::optional<Scenario> scenario) {
   if (!scenario) {
     if (!flags.map.empty()) return SurfelMap::open(flags.map);
-    throw InputError(fmt::format("{}: is not there; give the map that was flown in with --map",
+    throw InputError(fmt::format("{}: is missing; give the map of the flight with --map",
                                  (fs::path(flags.run) / "scenario.yaml").string()));
   }
   if (!flags.map.empty()) scenario->map = fs::absolute(flags.map).string();
@@ -249,6 +252,7 @@ void add_picture_command(CLI::App& parent, int& /*exit_code*/) {
       ->check(within(0.1, 240.0))
       ->capture_default_str();
   add_force_flag(*app, flags->force);
+  app->footer("Example: pointflight picture run --video run.mp4");
   app->callback([flags] {
     if (!flags->video.empty() || !flags->frames.empty()) return film(*flags);
     const std::string own = (fs::path(flags->run) / kOverview).string();

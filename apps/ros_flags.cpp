@@ -74,12 +74,17 @@ void check_twice(const std::vector<std::string>& paths) {
 
 void add_ros_flags(CLI::App& app, RosFlags& flags) {
   app.add_flag("--ros1", flags.ros1, "Publish to ROS 1 and take commands from it, in real time");
-  app.add_flag("--ros2", flags.ros2, "The same with ROS 2, for which none has to be installed");
+  app.add_flag(
+      "--ros2",
+      flags.ros2,
+      "Publish to ROS 2 and take commands from it, in real time; ROS 2 need not be installed");
   app.add_flag("--ros2-localhost", flags.localhost, "Let only this machine find the ROS 2 node");
-  app.add_option("--profile",
-                 flags.profile,
-                 "Names of messages: default, marsim, ego, livox, ... or a path (docs/ros.md)");
-  app.add_option("--epoch", flags.epoch, "Stamps start 'now', or at seconds since 1970");
+  app.add_option(
+      "--profile",
+      flags.profile,
+      "Topics, frames and message types: default, marsim, ego, livox, ... or a path (docs/ros.md)");
+  app.add_option(
+      "--epoch", flags.epoch, "Time stamp of the start of the run: 'now', or seconds since 1970");
   app.add_option("--node", flags.node, "Name of the ROS node")->capture_default_str();
   app.add_flag("--no-wait", flags.no_wait, "Fly even while there is no ROS 1 master yet");
   auto* stay = app.add_flag("--stay",
@@ -87,17 +92,19 @@ void add_ros_flags(CLI::App& app, RosFlags& flags) {
                             "Hover when the mission is flown, until interrupted (the default with "
                             "ROS in real time, unless --lockstep or a duration is given)");
   app.add_flag("--no-stay", flags.no_stay, "End when the mission is flown")->excludes(stay);
-  app.add_option("--lockstep",
-                 flags.lockstep,
-                 "Wait after each scan for a command, so many seconds at most")
+  app.add_option(
+         "--lockstep",
+         flags.lockstep,
+         "Pause the simulation after each scan until a command arrives, for at most this many "
+         "seconds of wall-clock time")
       ->check(within(0.0, 3600.0));
   app.add_option("--record",
                  flags.records,
-                 "Record all messages into FILE.mcap (ROS 2) or FILE.bag (ROS 1); again for more")
+                 "Record all messages into FILE.mcap (ROS 2) or FILE.bag (ROS 1); may be repeated")
       ->type_name("FILE")
       ->expected(1)
       ->take_all();
-  app.add_option("--compression", flags.compression, "Of recordings: zstd, lz4 or none")
+  app.add_option("--compression", flags.compression, "Compression of recordings: zstd, lz4 or none")
       ->check(CLI::IsMember({"zstd", "lz4", "none"}))
       ->capture_default_str();
 }

@@ -169,6 +169,8 @@ void add_scan_command(CLI::App& parent, int& /*exit_code*/) {
   app->add_flag("--json", flags->json, "JSON on stdout");
   add_force_flag(*app, flags->force);
   app->add_option("--threads", flags->threads, "0: all cores")->check(CLI::Range(0, 1024));
+  app->footer(
+      "Example: pointflight scan forest.pfmap --lidar mid360 --pose 0,0,2,0,0,0 -o scan.pcd");
   app->callback([flags] { take_scan(*flags); });
 }
 

@@ -51,7 +51,7 @@ void new_scenario(const NewFlags& flags) {
     const fs::path relative = absolute.lexically_relative(folder);
     return relative.empty() ? absolute.string() : relative.string();
   };
-  ScenarioWish wish;
+  ScenarioRequest wish;
   wish.map_path = flags.map;
   wish.map_key = from_folder(flags.map);
   wish.lidar = flags.lidar;

@@ -16,7 +16,7 @@
 #include "pointflight/ros/common/ros_names.hpp"
 #include "pointflight/share/common_ground.hpp"
 #include "pointflight/share/vehicle_list.hpp"
-#include "pointflight/sim/ended_run.hpp"
+#include "pointflight/sim/interrupted_run.hpp"
 
 namespace pointflight::apps {
 namespace {

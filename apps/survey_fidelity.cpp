@@ -163,14 +163,20 @@ void add_survey_flags(CLI::App& app, SurveyFlags& flags) {
         ->capture_default_str()
         ->needs(survey);
   };
-  app.add_option("--seconds", flags.walk.seconds, "Of the walk")
+  app.add_option("--seconds", flags.walk.seconds, "Duration of the simulated survey walk, s")
       ->check(within(1.0, 3600.0))
       ->capture_default_str()
       ->needs(survey);
-  add("--tilt", flags.walk.tilt_deg, 80.0, "The carried LiDAR looks down ahead by it, degrees");
-  add("--shake", flags.walk.shake, 1.0, "Deviation of each scan's believed place, m");
-  add("--shake-deg", flags.walk.shake_deg, 10.0, "Of its believed attitude, degrees");
-  app.add_option("--thin", flags.thin, "One point is kept in each cube of it, m; 0: all")
+  add("--tilt", flags.walk.tilt_deg, 80.0, "Downward tilt of the carried LiDAR, degrees");
+  add("--shake",
+      flags.walk.shake,
+      1.0,
+      "Standard deviation of the error of each scan's estimated position, m");
+  add("--shake-deg",
+      flags.walk.shake_deg,
+      10.0,
+      "Standard deviation of the error of its estimated attitude, degrees");
+  app.add_option("--thin", flags.thin, "Keep one point in each cube of this size, m; 0: all")
       ->check(within(0.0, 0.0) | within(1e-3, 10.0))
       ->capture_default_str()
       ->needs(survey);

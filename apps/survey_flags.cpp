@@ -114,37 +114,42 @@ CLI::Option* add_scans_flags(CLI::App& app, ScansFlags& flags, bool required) {
   if (required) scans->required();
   app.add_option("--scan-topic",
                  flags.scan_topic,
-                 "Clouds of a recording (PointCloud2, CustomMsg); without it the only ones")
+                 "Topic of the clouds in a recording (PointCloud2, CustomMsg); needed only if "
+                 "there are several")
       ->needs(scans);
   app.add_option("--pose-topic",
                  flags.pose_topic,
-                 "Poses of a recording (Odometry, PoseStamped); without it the only ones")
+                 "Topic of the poses in a recording (Odometry, PoseStamped); needed only if there "
+                 "are several")
       ->excludes(poses)
       ->needs(scans);
-  app.add_option("--sensor-pose",
-                 flags.sensor_pose,
-                 "x,y,z,roll,pitch,yaw of the sensor in the frame that the poses are of: metres, "
-                 "degrees; without it a recording's /tf_static is asked")
+  app.add_option(
+         "--sensor-pose",
+         flags.sensor_pose,
+         "Pose of the sensor in the frame of the given poses, x,y,z,roll,pitch,yaw in metres and "
+         "degrees; without it a recording's /tf_static is used")
       ->needs(scans);
   app.add_flag("--deskewed",
                flags.files.is_deskewed,
-               "Motion within the scans was taken out: times of points are left aside")
+               "Ignore times of points: motion within the scans was compensated already")
       ->needs(scans);
   return scans;
 }
 
 void add_fit_flags(CLI::App& app, FitFlags& flags, bool required) {
   auto* scans = add_scans_flags(app, flags, required);
-  app.add_option("--free",
-                 flags.files.free,
-                 "Folder of clouds under the scans' names: shots without a return, up to where "
-                 "all was free")
+  app.add_option(
+         "--free",
+         flags.files.free,
+         "Folder of clouds with the scans' names: shots without a return, as points up to which "
+         "the space is free")
       ->check(CLI::ExistingDirectory)
       ->needs(scans);
-  app.add_option("--leak-weight",
-                 flags.leak_weight,
-                 "A ray that the map lets through weighs as many that it stops early; lower makes "
-                 "openings and foliage opener")
+  app.add_option(
+         "--leak-weight",
+         flags.leak_weight,
+         "How much a ray that passes through a surface of the map counts against one that the "
+         "map stops too early; lower values open foliage and gaps more")
       ->check(within(0.1, 100.0))
       ->capture_default_str()
       ->needs(scans);
@@ -162,7 +167,7 @@ void add_fit_flags(CLI::App& app, FitFlags& flags, bool required) {
       ->needs(signal);
   app.add_option("--export-ghosts",
                  flags.ghosts_out,
-                 "Write where what moved through the survey was taken out, as a PCD cloud")
+                 "Write the positions of removed moving objects as a PCD cloud")
       ->needs(scans);
 }
 

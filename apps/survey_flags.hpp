@@ -36,7 +36,7 @@ struct FitFlags : ScansFlags {
 /// Those of a survey, --free, --leak-weight, --export-ghosts, --signal-of, --signal-limit.
 void add_fit_flags(CLI::App& app, FitFlags& flags, bool required);
 
-/// The MCAP files of a folder, in the order of their names. Throws InputError where it holds a
+/// The MCAP files of a folder, in the order of their names. Throws InputError if it holds a
 /// recording in SQLite.
 std::vector<std::string> recordings_in(const std::string& folder);
 
@@ -78,7 +78,7 @@ void paint_by_signal(EditedMap& map,
                      const Executor& executor,
                      const Progress& progress);
 
-/// The file of --export-ghosts, opened before any work is done; nothing where none was asked for.
+/// The file of --export-ghosts, opened before any work is done; nothing if none was asked for.
 std::optional<OutputFile> open_ghosts(const FitFlags& flags);
 
 /// Writes the centres of removed surfels as a cloud.

@@ -27,7 +27,7 @@ extern "C" void on_interrupt(int /*signal*/) {
 }  // namespace
 
 void say(std::string_view text) {
-  // not fmt::print, which throws where stderr is closed or full
+  // not fmt::print, which throws if stderr is closed or full
   std::fwrite(text.data(), 1, text.size(), stderr);
 }
 

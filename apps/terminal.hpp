@@ -27,7 +27,7 @@ void say(std::string_view text);
 /// A line on stderr.
 void log(std::string_view text);
 
-/// This process's command line, quoted where a shell would need it.
+/// This process's command line, quoted if a shell would need it.
 std::string command_line();
 
 /// "1.2 M", "34 k", "567".

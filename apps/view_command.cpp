@@ -86,7 +86,7 @@ void view_recording(const ViewCommandFlags& flags) {
   player.play(interrupted);
 }
 
-/// The recording in a folder that `ros2 bag record` made; nothing where it is another folder.
+/// The recording in a folder that `ros2 bag record` made; nothing if it is another folder.
 std::optional<std::string> recording_in(const std::string& folder) {
   std::error_code ignored;
   if (!fs::exists(fs::path(folder) / "metadata.yaml", ignored)) return std::nullopt;
@@ -154,6 +154,7 @@ void add_view_command(CLI::App& parent, int& exit_code) {
                                 "machine can connect)");
   app->add_flag("--no-view-control", flags->no_control, "They may only watch")->excludes(control);
   app->add_option("--threads", flags->threads, "0: all cores")->check(CLI::Range(0, 1024));
+  app->footer("Example: pointflight view run.mcap --map forest.pfmap");
   app->callback([flags, &exit_code] { exit_code = view(*flags); });
 }
 

@@ -41,7 +41,7 @@ std::shared_ptr<LiveServer> serve_view(
 /// --view, --view-control, --no-view-control.
 void add_view_flags(CLI::App& app, ViewFlags& flags);
 
-/// As the flags say; null where nobody asked. Throws InputError.
+/// As the flags say; null if nobody asked. Throws InputError.
 std::shared_ptr<LiveServer> start_viewing(const ViewFlags& flags,
                                           const std::shared_ptr<const SurfelMap>& map);
 

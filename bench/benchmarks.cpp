@@ -125,7 +125,7 @@ void register_kernels() {
             [=](benchmark::State& state) { kernel(state, name, lidar, grouping); })
             ->Unit(benchmark::kMillisecond);
       };
-      add("as_suits", BeamGrouping::kAsSuits);
+      add("as_suits", BeamGrouping::kAutomatic);
       add("singly", BeamGrouping::kSingly);
     }
   }

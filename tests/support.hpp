@@ -87,10 +87,10 @@ std::shared_ptr<const SurfelMap> map_of(const std::vector<Vector3d>& points, dou
 /// The import of given points in memory.
 ImportedMap import_points(const std::vector<CloudPoint>& points, const ImportOptions& options);
 
-/// Path below the shared data, or "" where it is absent (the test is then skipped).
+/// Path below the shared data, or "" if it is absent (the test is then skipped).
 std::string shared_data(const std::string& relative);
 
-/// The text of the InputError that `action` throws; a test failure where it throws none.
+/// The text of the InputError that `action` throws; a test failure if it throws none.
 template <class Action>
 std::string error_of(const Action& action) {
   try {

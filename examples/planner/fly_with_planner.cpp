@@ -227,7 +227,7 @@ Options parse(int argc, char** argv) {
   return options;
 }
 
-/// A line about it; true where it arrived without a collision.
+/// A line about it; true if it arrived without a collision.
 bool say(std::int64_t seed, const Outcome& o) {
   std::printf(
       "seed %lld: %s, %.1f m in %.1f s, closest %.2f m, %llu collision%s, a plan in %.0f ms at "

@@ -203,7 +203,7 @@ void LocalMap::add_scan(const std::vector<SeenPoint>& points, const Vector3d& ce
   for (const SeenPoint& s : points) {
     if (!contains(s.point)) continue;
     const std::size_t i = index_of(s.point);
-    // where there surely was nothing something has come
+    // if there surely was nothing something has come
     if (free_[i] >= kSurelyFree) fresh.push_back(s.point);
     seen[i] = kHit;
   }

@@ -18,7 +18,7 @@ struct SeenPoint {
   Vector3d origin, point;
 };
 
-/// Something that moves: a ball around points that appeared where there was nothing.
+/// Something that moves: a ball around points that appeared if there was nothing.
 struct Mover {
   Vector3d center;
   Vector3d velocity = Vector3d::Zero();

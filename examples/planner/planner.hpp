@@ -24,7 +24,7 @@ class Planner {
  public:
   Planner(const PlannerOptions& options, const Vector3d& goal) : options_(options), goal_(goal) {}
 
-  /// Takes a scan and plans from the present motion (`now`, time in s). Nothing where the
+  /// Takes a scan and plans from the present motion (`now`, time in s). Nothing if the
   /// trajectory that is flown is still the best.
   std::shared_ptr<const pointflight::Trajectory> update(const std::vector<SeenPoint>& points,
                                                         const pointflight::PositionCommand& now,
@@ -40,7 +40,7 @@ class Planner {
       const std::vector<Vector3d>& path,
       const pointflight::PositionCommand& now,
       double speed) const;
-  /// Least room of a trajectory from `skip` seconds on, m: negative where it touches.
+  /// Least room of a trajectory from `skip` seconds on, m: negative if it touches.
   [[nodiscard]] double room(const pointflight::Trajectory& trajectory,
                             double time,
                             double skip) const;

@@ -133,7 +133,7 @@ void Campaign::check_values() {
     check(axis.key, axis.values.back(), axis.line);
   }
   for (const StudyDraw& draw : study_.draws) {
-    for (const std::string& end : ends_of(draw)) check(draw.key, end, draw.line);
+    for (const std::string& end : extremes_of(draw)) check(draw.key, end, draw.line);
   }
 }
 

@@ -25,7 +25,7 @@ namespace pointflight {
 class Campaign {
  public:
   /// Opens or makes the folder. `program`: our own, for flights without a command of the user's.
-  /// Throws InputError where a value does not fit the scenario, and where the folder is of another
+  /// Throws InputError if a value does not fit the scenario, and where the folder is of another
   /// study, scenario or map.
   Campaign(Study study, std::string folder, std::string program);
 
@@ -42,13 +42,13 @@ class Campaign {
   /// Returns how many folders stay for what the user's program has written into them.
   std::size_t remove_leftovers() const;
 
-  /// Flies one and puts its result into the folder; nothing where `stop` or somebody outside
+  /// Flies one and puts its result into the folder; nothing if `stop` or somebody outside
   /// (SIGKILL, SIGTERM) ended it. Callable from
-  /// several threads and processes. Throws InputError where it cannot be started or the folder
+  /// several threads and processes. Throws InputError if it cannot be started or the folder
   /// cannot be written.
   std::optional<RunRecord> fly(std::size_t number, const std::atomic<bool>& stop) const;
 
-  /// The result of a flight; nothing where there is none. Throws InputError.
+  /// The result of a flight; nothing if there is none. Throws InputError.
   [[nodiscard]] std::optional<RunRecord> result(std::size_t number) const;
   /// Folder of a flight, whether it is there or not.
   [[nodiscard]] std::string run_folder(std::size_t number) const;

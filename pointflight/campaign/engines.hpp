@@ -45,7 +45,7 @@ struct SlurmOptions {
 
 /// Has Slurm fly them: a job array by `sbatch`, each task a share of the campaign. Waits for its
 /// end; a campaign whose job still runs is waited for and not sent again. With `stop` it comes back
-/// and leaves the job running. Returns a line that says which job. Throws InputError where Slurm
+/// and leaves the job running. Returns a line that says which job. Throws InputError if Slurm
 /// refuses or is not there.
 std::string fly_by_slurm(const Campaign& campaign,
                          const std::vector<std::size_t>& numbers,

@@ -15,8 +15,8 @@ struct MpiModule {
   int (*size)();
   ///@}
   /// Waits until all have come here, without keeping a core busy.
-  void (*meet)();
-  /// Returns the next number of 0, 1, 2, ...: each once per job, between two calls of `meet`.
+  void (*barrier)();
+  /// Returns the next number of 0, 1, 2, ...: each once per job, between two calls of `barrier`.
   std::size_t (*next)();
   /// Leaves the job.
   void (*end)();

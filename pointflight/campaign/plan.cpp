@@ -69,8 +69,8 @@ std::vector<Part> parts_of(const std::string& key) {
   return parts;
 }
 
-void set_value(YAML::Node root, const std::string& key, const std::string& value) {
-  YAML::Node node = std::move(root);
+void set_value(const YAML::Node& root, const std::string& key, const std::string& value) {
+  YAML::Node node = root;
   for (const Part& part : parts_of(key)) {
     if (part.index) {
       if (!node.IsSequence() || *part.index >= node.size()) {
@@ -128,7 +128,7 @@ Plan plan_of(const Study& study) {
   return plan;
 }
 
-std::vector<std::string> ends_of(const StudyDraw& draw) {
+std::vector<std::string> extremes_of(const StudyDraw& draw) {
   if (!draw.choices.empty()) return draw.choices;
   constexpr double kNearlyOne = 1.0 - 1e-12;
   return {drawn_text(draw, 0.0), drawn_text(draw, kNearlyOne)};

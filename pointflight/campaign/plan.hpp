@@ -28,11 +28,11 @@ struct Plan {
   std::vector<PlannedRun> runs;                        ///< By number.
 };
 
-/// Throws InputError where there would be more than ten million flights.
+/// Throws InputError if there would be more than ten million flights.
 Plan plan_of(const Study& study);
 
 /// The extreme values of a draw, or all of its choices.
-std::vector<std::string> ends_of(const StudyDraw& draw);
+std::vector<std::string> extremes_of(const StudyDraw& draw);
 
 /// A scenario's text with other values of some keys. Where a key's sections are missing they are
 /// made; an entry of a list has to be there. Throws InputError that names the key.

@@ -166,7 +166,7 @@ ProcessResult run_process(const ProcessRequest& request, const std::atomic<bool>
       if (WIFSIGNALED(status)) result.signal = WTERMSIG(status);
       break;
     }
-    if (ended < 0 && errno == ECHILD) break;  // the kernel took it where SIGCHLD is ignored
+    if (ended < 0 && errno == ECHILD) break;  // the kernel took it if SIGCHLD is ignored
     const Clock::time_point now = Clock::now();
     const std::chrono::duration<double> taken = now - begin;
     const bool is_late = request.time_limit > 0.0 && taken.count() > request.time_limit;

@@ -28,7 +28,7 @@ struct ProcessResult {
 
 /// Runs it in a process group of its own and waits. It ends with the calling thread, whatever ends
 /// that; after its time, and once `stop` is set, the group gets SIGTERM and 5 s later SIGKILL.
-/// Callable from several threads. Throws InputError where it cannot be started.
+/// Callable from several threads. Throws InputError if it cannot be started.
 ProcessResult run_process(const ProcessRequest& request, const std::atomic<bool>& stop);
 
 }  // namespace pointflight

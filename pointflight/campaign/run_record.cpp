@@ -34,7 +34,7 @@ json parsed(std::string_view text, const std::string& name) {
   return value;
 }
 
-/// Nothing where the file is not there.
+/// Nothing if the file is not there.
 std::optional<json> read_json(const fs::path& path) {
   std::error_code ignored;
   if (!fs::is_regular_file(path, ignored)) return std::nullopt;
@@ -47,7 +47,7 @@ std::optional<double> number_in(const json& object, const char* key) {
   return found->get<double>();
 }
 
-/// Takes `value` where there is none yet or it is farther out.
+/// Takes `value` if there is none yet or it is farther out.
 void keep_least(std::optional<double>& kept, std::optional<double> value) {
   if (value && (!kept || *value < *kept)) kept = value;
 }
@@ -76,7 +76,7 @@ void read_summary(const json& summary, RunRecord& record) {
   }
 }
 
-/// A figure of the user's; one that a summary has as well fills its column where there is none.
+/// A figure of the user's; one that a summary has as well fills its column if there is none.
 void take_figure(const std::string& name, double value, RunRecord& record) {
   if (std::find(kReserved.begin(), kReserved.end(), name) != kReserved.end()) {
     throw InputError(name + ": is a column of runs.csv; give the figure another name");

@@ -25,7 +25,7 @@ struct RunRecord {
   RunStatus status = RunStatus::kFailed;  ///< As above.
   std::string reason;  ///< Of a failure: "exit code 2", "signal 11", "took longer than 600 s".
   std::string end;     ///< In the run's words: "completed", "mission unfinished".
-  /// What summary.json says; nothing where a user's program left none. Of several vehicles the sum
+  /// What summary.json says; nothing if a user's program left none. Of several vehicles the sum
   /// of `collisions`, the greatest errors, the closest approach.
   ///@{
   std::optional<std::int64_t> collisions;
@@ -55,12 +55,12 @@ inline constexpr std::array<SummaryFigure, 5> kSummaryFigures = {
 
 /// As the text of a file.
 std::string record_json(const RunRecord& record);
-/// Throws InputError where it is no record; `name` stands for the path.
+/// Throws InputError if it is no record; `name` stands for the path.
 RunRecord parse_record(std::string_view json, const std::string& name);
 
 /// Takes from a run's folder what its files say: summary.json, timing.json, and `figures` (a JSON
 /// object of numbers; empty: none), in which a name of the above fills what no summary has. What is
-/// not there stays open. Throws InputError where a file is none, or a figure has the name of a
+/// not there stays open. Throws InputError if a file is none, or a figure has the name of a
 /// column that is filled.
 void read_results(const std::string& folder, const std::string& figures, RunRecord& record);
 

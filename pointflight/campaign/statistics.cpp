@@ -38,7 +38,7 @@ constexpr std::array<Statistic, 6> kStatistics = {{{"mean", &Spread::mean},
                                                    {"p95", &Spread::p95},
                                                    {"max", &Spread::greatest}}};
 
-/// A cell; quoted where it would be several (RFC 4180).
+/// A cell; quoted if it would be several (RFC 4180).
 std::string cell(const std::string& text) {
   if (text.find_first_of(",\"\n") == std::string::npos) return text;
   std::string out = "\"";

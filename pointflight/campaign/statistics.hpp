@@ -41,7 +41,7 @@ std::string_view name_of(Counted counted);
 Rate rate_of(const std::vector<const RunRecord*>& runs, Counted counted);
 
 /// A number of a run by its column in runs.csv: "closest_approach", "wall_seconds", or a figure of
-/// the user's; nothing where the run does not tell.
+/// the user's; nothing if the run does not tell.
 std::optional<double> number_of(const RunRecord& run, const std::string& column);
 /// Columns that `number_of` knows, of these runs.
 std::vector<std::string> number_columns(const std::vector<const RunRecord*>& runs);
@@ -83,7 +83,7 @@ class Condition {
   explicit Condition(std::string text);
   /// As given.
   [[nodiscard]] const std::string& text() const { return text_; }
-  /// Of these; throws InputError where no run tells of its column.
+  /// Of these; throws InputError if no run tells of its column.
   [[nodiscard]] bool holds(const std::vector<const RunRecord*>& runs) const;
   /// What stands on its left.
   [[nodiscard]] double value(const std::vector<const RunRecord*>& runs) const;

@@ -163,7 +163,7 @@ class Child {
   [[nodiscard]] int pipe() const { return pipe_; }
   [[nodiscard]] int status() const { return status_; }
 
-  /// True once it has ended; where the program ignores SIGCHLD or waits for it elsewhere, how it
+  /// True once it has ended; if the program ignores SIGCHLD or waits for it elsewhere, how it
   /// ended is not known.
   bool wait(int flags) {
     while (!ended_) {

@@ -30,7 +30,7 @@ class ChildOutput {
 /// What came back from a child.
 struct ChildResult {
   std::vector<std::byte> bytes;  ///< All that was written, in order.
-  std::string failure;           ///< Empty where the work was done, else why not: for a message.
+  std::string failure;           ///< Empty if the work was done, else why not: for a message.
 };
 
 /// Between fork and exec, or in a copy: signals do what they do in a program that was just started,
@@ -44,7 +44,7 @@ void restore_default_signals();
 /// twice.
 ///
 /// `while_waiting` is called about ten times a second and may throw, which ends the child. Throws
-/// InputError where the system gives no process.
+/// InputError if the system gives no process.
 ChildResult run_in_child(const std::function<void(ChildOutput&)>& work,
                          const ChildLimits& limits,
                          const std::function<void()>& while_waiting = {});

@@ -27,7 +27,7 @@ std::string reason_of(int error) {
   return std::generic_category().message(error);
 }
 
-/// A mount: of the same file system, too, where the kernel tells them apart (5.8 and later).
+/// A mount: of the same file system, too, if the kernel tells them apart (5.8 and later).
 struct Mount {
   std::uint64_t device = 0;
   std::uint64_t number = 0;

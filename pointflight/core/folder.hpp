@@ -42,7 +42,7 @@ class Folder {
 
   /// A folder below; nullopt unless `entry` says that it is one.
   [[nodiscard]] std::optional<Folder> below(std::string_view name) const;
-  /// The same, made where parts of it are missing.
+  /// The same, made if parts of it are missing.
   [[nodiscard]] std::optional<Folder> make(std::string_view name) const;
   /// A regular file's text; nullopt if there is none or it is larger than `most` bytes.
   [[nodiscard]] std::optional<std::string> read(std::string_view name, std::size_t most) const;
@@ -56,7 +56,7 @@ class Folder {
   bool remove_file(std::string_view name) const;
   /// Removes a folder that is empty; false if it is not one.
   bool remove_empty_folder(std::string_view name) const;
-  /// Gives an entry another name, in `to`, where nothing has it yet. Returns 0 or errno (EEXIST).
+  /// Gives an entry another name, in `to`, if nothing has it yet. Returns 0 or errno (EEXIST).
   [[nodiscard]] int rename(std::string_view from, const Folder& to, std::string_view name) const;
 
  private:
@@ -70,7 +70,7 @@ class Folder {
   std::string path_;
 };
 
-/// Gives a file another name where nothing has it yet; both names are paths of the user. Returns 0
+/// Gives a file another name if nothing has it yet; both names are paths of the user. Returns 0
 /// or errno.
 [[nodiscard]] int rename_to_new(const std::string& from, const std::string& to);
 

@@ -33,7 +33,7 @@ class OutputName {
 /// system knows no locks on folders, nothing is kept.
 class FolderLock {
  public:
-  /// Throws InputError where another holds it.
+  /// Throws InputError if another holds it.
   explicit FolderLock(const std::string& folder);
   ~FolderLock();
   FolderLock(const FolderLock&) = delete;

@@ -82,7 +82,7 @@ void forget_mapping(const std::byte* data) {
   all.any_cut = any_cut || !all.untold_path.empty();
 }
 
-/// Puts zeros where the file has ended, so that the reader goes on until somebody looks; its
+/// Puts zeros if the file has ended, so that the reader goes on until somebody looks; its
 /// offsets are bounded, whatever the bytes say.
 void on_bus_error(int signal, siginfo_t* info, void* /*context*/) {
   const auto address = reinterpret_cast<std::uintptr_t>(info->si_addr);

@@ -8,7 +8,7 @@
 
 namespace pointflight {
 
-/// Throws InputError where the path is missing, or is a folder, a pipe, a socket or a device: these
+/// Throws InputError if the path is missing, or is a folder, a pipe, a socket or a device: these
 /// have no beginning to come back to, and opening a pipe waits for whoever writes into it. What
 /// reads a user's file by other means than MappedFile asks this first.
 void require_regular_file(const std::string& path);
@@ -16,7 +16,7 @@ void require_regular_file(const std::string& path);
 /// A file mapped read-only: pages come from the page cache and are shared between processes.
 class MappedFile {
  public:
-  /// Throws InputError where the file is missing, unreadable or not a regular file.
+  /// Throws InputError if the file is missing, unreadable or not a regular file.
   explicit MappedFile(const std::string& path);
 
   /// Maps an open file, which stays open; `name` stands for its path in messages.
@@ -27,7 +27,7 @@ class MappedFile {
   /// Changes places with `other`, which closes this one's file later.
   MappedFile& operator=(MappedFile&& other) noexcept;
 
-  /// The whole file; valid as long as this one lives. Zeros where it was cut (`survive_cut_files`).
+  /// The whole file; valid as long as this one lives. Zeros if it was cut (`survive_cut_files`).
   [[nodiscard]] std::span<const std::byte> bytes() const { return {data_, size_}; }
   /// The same as characters.
   [[nodiscard]] std::string_view text() const {
@@ -55,7 +55,7 @@ class MappedFile {
 /// `main`: the handler of SIGBUS is the process's.
 void survive_cut_files();
 
-/// Throws InputError where a mapped file of this process was cut short while it was read, as long
+/// Throws InputError if a mapped file of this process was cut short while it was read, as long
 /// as that is open, and once after that if nobody was told. Loops and
 /// outputs ask (`Executor::parallel_for`, `OutputFile::commit`), so that nothing is kept of what
 /// was made from zeros.

@@ -36,7 +36,7 @@ inline double acos(double x) {
 inline double atan2(double y, double x) {
   return Sleef_cinz_atan2d1_u10purec(y, x);
 }
-/// Infinity where it overflows, 0 where it underflows.
+/// Infinity if it overflows, 0 if it underflows.
 inline double exp(double x) {
   return Sleef_cinz_expd1_u10purec(x);
 }
@@ -72,7 +72,7 @@ inline SinCos sincos(double x) {
 
 namespace pointflight {
 
-/// Floor of |x| < 2^63, inline where std::floor is a call (CPUs before SSE4.1).
+/// Floor of |x| < 2^63, inline if std::floor is a call (CPUs before SSE4.1).
 inline std::int64_t floor_to_integer(double x) {
   const auto towards_zero = static_cast<std::int64_t>(x);
   return towards_zero - (x < static_cast<double>(towards_zero) ? 1 : 0);

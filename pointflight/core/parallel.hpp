@@ -26,7 +26,7 @@ class Executor {
 
   /// Calls `body(begin, end)` for the chunks [0, chunk), [chunk, 2 chunk), ... of [0, count), in
   /// any order and in parallel, and returns when all are done. An exception of a chunk is rethrown;
-  /// InputError where a mapped file was cut short (core/mapped_file.hpp).
+  /// InputError if a mapped file was cut short (core/mapped_file.hpp).
   void parallel_for(std::size_t count,
                     std::size_t chunk,
                     const std::function<void(std::size_t begin, std::size_t end)>& body) const;

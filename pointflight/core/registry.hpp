@@ -19,7 +19,7 @@ class Registry {
   Registry(std::initializer_list<Row> rows) : rows_(rows) {}
 
   /// One more row, from one thread, before any other uses the table. Throws std::invalid_argument
-  /// where there is one of its name, or it has none.
+  /// if there is one of its name, or it has none.
   const Row& add(Row row) {
     if (row.name.empty()) throw std::invalid_argument("a row of a table needs a name");
     if (find(row.name) != nullptr)
@@ -27,7 +27,7 @@ class Registry {
     return rows_.emplace_back(std::move(row));
   }
 
-  /// Null where there is none of that name.
+  /// Null if there is none of that name.
   [[nodiscard]] const Row* find(std::string_view name) const {
     for (const Row& row : rows_) {
       if (row.name == name) return &row;

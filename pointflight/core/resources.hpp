@@ -7,7 +7,7 @@ namespace pointflight {
 
 /// The folder with the shipped `lidars/`, `vehicles/` and `ros_profiles/`: `$POINTFLIGHT_DATA` if
 /// set, else the first that is there of `../share/pointflight` beside the program, what
-/// `add_data_folder` named, where the package was to be installed, and the source tree that it was
+/// `add_data_folder` named, if the package was to be installed, and the source tree that it was
 /// built from.
 std::string data_folder();
 
@@ -16,7 +16,7 @@ std::string data_folder();
 bool add_data_folder(const std::string& folder);
 
 /// True for what `find_model` takes as a path: it contains '/' or ends in ".yaml", or in ".json" or
-/// ".csv" as makers' files of sensors do.
+/// ".csv" as vendors' files of sensors do.
 bool is_model_path(const std::string& name_or_path);
 
 /// The path of a model given by its name ("mid360" -> "<data>/lidars/mid360.yaml") or by a path
@@ -33,7 +33,7 @@ std::string find_table(const std::string& kind,
                        const std::string& name_or_path,
                        const std::string& base);
 
-/// Names of the shipped models of a kind ("lidars", "vehicles"), sorted. Throws InputError where
+/// Names of the shipped models of a kind ("lidars", "vehicles"), sorted. Throws InputError if
 /// there are none: it says where it looked and what to do.
 std::vector<std::string> model_names(const std::string& kind);
 

@@ -31,7 +31,7 @@ std::string folder_or_default(std::string folder) {
   return folder.empty() ? std::filesystem::temp_directory_path().string() : std::move(folder);
 }
 
-/// -1 where there is none; errno says why.
+/// -1 if there is none; errno says why.
 int open_nameless(const std::string& folder) {
   const int file = ::open(folder.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, 0600);
   if (file >= 0) return file;

@@ -48,7 +48,7 @@ class Scratch {
 class ScratchBlock {
  public:
   ScratchBlock() = default;
-  /// Throws InputError where the folder has no room.
+  /// Throws InputError if the folder has no room.
   ScratchBlock(Scratch& scratch, std::size_t bytes);
   ~ScratchBlock();
   /// The other one is empty then.
@@ -77,7 +77,7 @@ class ScratchArray {
 
  public:
   ScratchArray() = default;
-  /// Throws InputError where the folder has no room.
+  /// Throws InputError if the folder has no room.
   ScratchArray(Scratch& scratch, std::size_t size)
       : block_(scratch, size * sizeof(T)), size_(size) {}
   /// The other one is empty then.
@@ -92,7 +92,7 @@ class ScratchArray {
 
   /// Values, not bytes.
   [[nodiscard]] std::size_t size() const { return size_; }
-  /// Null where empty. Constness is the array's, not the values'.
+  /// Null if empty. Constness is the array's, not the values'.
   [[nodiscard]] T* data() const { return reinterpret_cast<T*>(block_.data()); }
   /// Not checked.
   [[nodiscard]] T& operator[](std::size_t i) const { return data()[i]; }

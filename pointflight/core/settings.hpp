@@ -52,7 +52,7 @@ class SettingsVisitor {
  public:
   virtual ~SettingsVisitor() = default;
 
-  /// One key: readers set `value` where the file has it, writers and tables print it as it is.
+  /// One key: readers set `value` if the file has it, writers and tables print it as it is.
   ///@{
   virtual void value(const Key& key, double& value) = 0;
   virtual void value(const Key& key, std::int64_t& value) = 0;
@@ -141,7 +141,7 @@ class SettingsVisitor {
  protected:
   /// Returns false to skip the keys.
   virtual bool enter_condition(bool holds, std::string_view condition) = 0;
-  /// Ends what `enter_condition` has begun; called only where that returned true.
+  /// Ends what `enter_condition` has begun; called only if that returned true.
   virtual void leave_condition() {}
   /// Returns false to skip the section (absent from the file: its defaults stay).
   virtual bool enter(const Key& key) = 0;
@@ -162,7 +162,7 @@ class SettingsVisitor {
 /// unit written behind them throw InputError with file, line and what would do.
 class SettingsReader : public SettingsVisitor {
  public:
-  /// Opens a file. Throws InputError where it cannot be read or is no YAML.
+  /// Opens a file. Throws InputError if it cannot be read or is no YAML.
   explicit SettingsReader(const std::string& path);
   /// From text; `name` stands for the path in messages.
   SettingsReader(std::string_view text, const std::string& name);

@@ -119,7 +119,7 @@ struct SettingsReader::Document {
     levels.push_back({node, path, {}});
   }
 
-  /// The value under `key`, or nothing where the file does not have it (an error if required).
+  /// The value under `key`, or nothing if the file does not have it (an error if required).
   std::optional<YAML::Node> find(const Key& key) {
     Level& level = levels.back();
     level.asked.insert(std::string(key.name));
@@ -227,7 +227,7 @@ void SettingsReader::leave() {
 
 bool SettingsReader::enter_condition(bool holds, std::string_view condition) {
   document_->conditions.push_back({holds, std::string(condition)});
-  return true;  // also where it does not hold: what stands there is refused
+  return true;  // also if it does not hold: what stands there is refused
 }
 
 void SettingsReader::leave_condition() {

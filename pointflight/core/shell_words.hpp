@@ -4,7 +4,7 @@
 
 namespace pointflight {
 
-/// A word as a POSIX shell takes it for one: in quotes where it needs them.
+/// A word as a POSIX shell takes it for one: in quotes if it needs them.
 inline std::string shell_word(const std::string& word) {
   constexpr const char* kPlain =
       "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_./=:,+@%";

@@ -185,7 +185,7 @@ ErrorCollector ScanPlanes::compare(std::size_t scan, const Executor& executor) c
   constexpr double kFlat = 0.01;      // least over middle variance
   const RealScan& own = scans_[scan];
   const std::size_t count = (own.rays.size() + kStride - 1) / kStride;
-  // NaN where there is no plane
+  // NaN if there is no plane
   std::vector<double> ranges(count, std::numeric_limits<double>::quiet_NaN());
   executor.parallel_for(count, 256, [&](std::size_t begin, std::size_t end) {
     PointsWithin near(kSupportRadius);

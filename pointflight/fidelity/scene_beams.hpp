@@ -19,7 +19,7 @@ struct BeamPlan {
   std::vector<Vector3f> directions_sensor;
   float range_max = 40.0f;          ///< m
   std::vector<Pose> places;         ///< T_world_sensor; empty: the scene's own.
-  std::size_t poses = 8;            ///< Random ones where the scene has none of its own.
+  std::size_t poses = 8;            ///< Random ones if the scene has none of its own.
   std::size_t aimed_beams = 20000;  ///< A pose, without directions.
   std::uint64_t seed = 1;           ///< Of poses and aimed directions.
 };
@@ -29,14 +29,14 @@ struct BeamPlan {
 /// (1,800 x 32, -25 to 15 degrees, 100 m). Nothing for another name.
 std::optional<BeamPlan> table_beams(const std::string& name);
 
-/// A beam and what it meets in truth.
+/// A beam and what it hits in truth.
 struct TrueBeam {
   Ray ray;                     ///< World; ends at the plan's range_max.
-  float range = -1.0f;         ///< m; negative where it meets nothing within its range.
-  float range_beside = -1.0f;  ///< m; what a beam 0.1 degrees beside it meets; negative: nothing.
+  float range = -1.0f;         ///< m; negative if it hits nothing within its range.
+  float range_beside = -1.0f;  ///< m; what a beam 0.1 degrees beside it hits; negative: nothing.
   float cos_incidence = 0.0f;  ///< |cos| of the angle to the surface normal.
-  Vector3f normal_world = Vector3f::Zero();  ///< Of the surface met, towards the sensor.
-  std::uint16_t tag = 0;                     ///< Of the shape met.
+  Vector3f normal_world = Vector3f::Zero();  ///< Of the surface hit, towards the sensor.
+  std::uint16_t tag = 0;                     ///< Of the shape hit.
   bool silhouette = false;                   ///< A range jump lies within 0.2 degrees.
 };
 
@@ -53,8 +53,8 @@ struct SceneBeams {
 };
 
 /// Casts the beams into the exact shapes. A silhouette is where one of sixteen rays 0.1 and
-/// 0.2 degrees around the beam ends more than 0.1 m off the plane that the beam meets. Throws
-/// InputError where no free place for a sensor is found.
+/// 0.2 degrees around the beam ends more than 0.1 m off the plane that the beam hits. Throws
+/// InputError if no free place for a sensor is found.
 SceneBeams cast_exactly(const ExactScene& scene,
                         const BeamPlan& plan,
                         const Executor& executor,
@@ -74,11 +74,11 @@ struct FidelityReport {
   std::vector<FidelityRow> by_tag;        ///< Of each tag of the scene.
   std::vector<FidelityRow> by_incidence;  ///< 0 is face on.
   std::vector<FidelityRow> by_range;      ///< By the true range.
-  std::vector<float> rendered;            ///< Of each beam, m; negative where nothing was met.
+  std::vector<float> rendered;            ///< Of each beam, m; negative if nothing was hit.
 };
 
-/// Renders all beams, each pose as one batch, and sorts them into classes. Rays that meet nothing
-/// in truth count as false returns where one is rendered, and are in none of the last three lists.
+/// Renders all beams, each pose as one batch, and sorts them into classes. Rays that hit nothing
+/// in truth count as false returns if one is rendered, and are in none of the last three lists.
 FidelityReport measure_fidelity(const ExactScene& scene,
                                 const SceneBeams& beams,
                                 const Renderer& renderer,

@@ -28,7 +28,7 @@ SceneTree::SceneTree(const ExactScene& scene) : scene_(scene), tree_(scene.geome
   for (const std::string& tag : scene.tags) is_glass_.push_back(tag == "glass");
 }
 
-std::optional<ShapeTree::Met> SceneTree::intersect(const Vector3d& origin,
+std::optional<ShapeTree::Hit> SceneTree::intersect(const Vector3d& origin,
                                                    const Vector3d& direction) const {
   constexpr int kPanes = 64;
   double passed = 0.0;

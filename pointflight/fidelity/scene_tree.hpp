@@ -8,7 +8,7 @@
 
 namespace pointflight {
 
-/// What a LiDAR's beams meet in a scene. Shapes with the tag "glass" send a beam back within 15
+/// What a LiDAR's beams hit in a scene. Shapes with the tag "glass" send a beam back within 15
 /// degrees of their normal and are not there for any other: what a pane does to 905 nm.
 class SceneTree {
  public:
@@ -16,7 +16,7 @@ class SceneTree {
   explicit SceneTree(const ExactScene& scene);
 
   /// First shape that sends a beam (unit `direction`) back.
-  [[nodiscard]] std::optional<ShapeTree::Met> intersect(const Vector3d& origin,
+  [[nodiscard]] std::optional<ShapeTree::Hit> intersect(const Vector3d& origin,
                                                         const Vector3d& direction) const;
 
   /// True if no shape, glass included, is nearer than `radius`, as seen along `looks` directions.

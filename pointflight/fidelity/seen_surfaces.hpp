@@ -16,7 +16,7 @@ class SeenSurfaces {
 
   /// Adds a return; rays without one show no surface.
   void add(const SurveyRay& ray);
-  /// True where a return lies within `kNear` of the point whose ray met the side that the unit
+  /// True if a return lies within `kNear` of the point whose ray hit the side that the unit
   /// normal points away from. Of returns in the same 5 cm from about the same direction the first
   /// stands for all.
   [[nodiscard]] bool has(const Vector3d& point_world, const Vector3f& normal_world) const;

@@ -52,7 +52,7 @@ std::size_t bin_of(const Limits& limits, double value) {
   return static_cast<std::size_t>(above - limits.begin());
 }
 
-/// The share that a hit belongs to; null where it counts for none.
+/// The share that a hit belongs to; null if it counts for none.
 ReturnShare* share_of(SensorComparison& made, const Hit& hit) {
   if (!hit.is_return() || static_cast<double>(hit.range) < made.least_range + kMargin) {
     return nullptr;
@@ -220,7 +220,7 @@ class Counter {
     }
   }
 
-  /// Whether lines around each direction meet something off the plane that others meet.
+  /// Whether lines around each direction hit something off the plane that others hit.
   [[nodiscard]] std::vector<bool> at_edges(const Pose& pose,
                                            const RealBeams& real,
                                            std::span<const Hit> middles) const {

@@ -17,14 +17,14 @@
 namespace pointflight {
 
 /// What is compared: reality, the sensor's model, and beams without one: lines that come back from
-/// whatever they meet within the sensor's range, with its Gaussian noise.
+/// whatever they hit within the sensor's range, with its Gaussian noise.
 struct Sides {
   double real = 0.0;      ///< Of the real scans.
   double modelled = 0.0;  ///< Of the model.
   double plain = 0.0;     ///< Without it.
 };
 
-/// Beams that meet the map within one range and one incidence.
+/// Beams that hit the map within one range and one incidence.
 struct ReturnShare {
   double beams = 0.0;  ///< That the sensor fires there, in all scans.
   Sides returns;       ///< How many came back.
@@ -54,7 +54,7 @@ struct SensorComparison {
   double least_range = 0.0;   ///< m: nothing is reported from nearer.
   std::uint64_t returns = 0;  ///< Of the real scans.
 
-  /// True where a bin counts.
+  /// True if a bin counts.
   static bool counts(const ReturnShare& share) { return share.beams >= kLeastBeams; }
   /// Mean difference from the real share of returns, 0 to 1, over the beams of bins that count.
   /// `real`: 0.
@@ -65,8 +65,8 @@ struct SensorComparison {
 };
 
 /// Fires the sensor's beams from the pose of each real scan and counts what comes back beside what
-/// really did, and sends beams along the real returns that lie at edges: where a line within the
-/// beam's width meets something more than 0.3 m off the plane that others meet. Real scans must be
+/// really did, and sends beams along the real returns that lie at edges: if a line within the
+/// beam's width hits something more than 0.3 m off the plane that others hit. Real scans must be
 /// whole and of that sensor: beams without a return are those of the pattern that the scan lacks.
 /// Directions in which next to nothing comes back over all scans (what carries the sensor) are left
 /// out, ranges below the real scans' least as well. The pattern is of a sensor that stands still,

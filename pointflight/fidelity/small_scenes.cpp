@@ -112,7 +112,7 @@ ExactScene grazing_floor() {
 ExactScene thinning_wall() {
   ExactScene scene;
   double y = 0.0;
-  // points per cell where the rest of a cloud would have 8
+  // points per cell if the rest of a cloud would have 8
   for (const char* points : {"16", "8", "4", "2.5", "1.3", "0.6", "0.2"}) {
     const std::size_t first = scene.geometry.shapes.size();
     scene.geometry.add_rectangle({0, y, 0}, {0, 4, 0}, {0, 0, 3});

@@ -15,12 +15,12 @@ constexpr double kPatch = 2.0 * kDegree;  // of the distributions of ranges
 
 using Cell = std::array<std::int64_t, 3>;
 
-/// Ranges within one patch, negative where there was no return.
+/// Ranges within one patch, negative if there was no return.
 struct Patch {
   std::vector<float> truth;
   std::vector<float> rendered;
   std::vector<float> beside;  ///< In truth, of other beams.
-  std::size_t foliage = 0;    ///< Beams that meet some.
+  std::size_t foliage = 0;    ///< Beams that hit some.
 };
 
 using Patches = std::map<Cell, Patch>;

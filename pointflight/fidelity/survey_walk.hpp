@@ -31,14 +31,14 @@ inline constexpr std::uint32_t kNoise = 3;   ///< Of the first scan; one more fo
 
 /// A walk at chest height (1.2 to 1.8 m above what is below) along straight legs, 0.4 m from
 /// everything: T_world_sensor every `scan_period`, one pose more than there are scans. Throws
-/// InputError where the scene has no such way.
+/// InputError if the scene has no such way.
 std::vector<TimedPose> make_walk(const ExactScene& scene,
                                  const SceneTree& tree,
                                  const SurveyOptions& options,
                                  Duration scan_period);
 
 /// Free places near a walk: 0.5 to 1.5 m beside it, up to 0.5 m above or below, 0.3 m from
-/// everything, level, with any heading. Throws InputError where there are not as many.
+/// everything, level, with any heading. Throws InputError if there are not as many.
 std::vector<Pose> places_near(const ExactScene& scene,
                               const SceneTree& tree,
                               const std::vector<TimedPose>& walk,

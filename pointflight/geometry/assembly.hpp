@@ -17,7 +17,7 @@ struct AssemblyPart {
 };
 
 /// A propeller: flat rectangular blades that turn about an axis along z at a steady speed. A ray
-/// meets a blade where it stands at the ray's time, so the disc lets most rays through.
+/// hits a blade where it stands at the ray's time, so the disc lets most rays through.
 struct Propeller {
   Vector3d center = Vector3d::Zero();  ///< The assembly's frame, m.
   double radius = 0.0;                 ///< Tip of a blade, m.

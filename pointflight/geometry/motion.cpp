@@ -81,7 +81,7 @@ Pose StraightMotion::at(SimTime time) const {
   return {Quaterniond::Identity(), walls.empty() ? p : folded(p, walls)};
 }
 
-Pose RoundMotion::at(SimTime time) const {
+Pose LoopMotion::at(SimTime time) const {
   if (!legs) return {};
   const Duration within = (time.time_since_epoch() % round + round) % round;
   const auto after = std::upper_bound(
@@ -99,7 +99,7 @@ double speed_max(const Motion& motion) {
     return track->speed_max(SimTime::min(), SimTime::max());
   }
   if (const auto* straight = std::get_if<StraightMotion>(&motion)) return straight->velocity.norm();
-  return std::get<RoundMotion>(motion).speed;
+  return std::get<LoopMotion>(motion).speed;
 }
 
 }  // namespace pointflight

@@ -61,7 +61,7 @@ struct StraightMotion {
 };
 
 /// A closed loop of straight legs at constant speed, each with a heading of its own.
-struct RoundMotion {
+struct LoopMotion {
   /// From one corner to the next.
   struct Leg {
     Duration start;                                 ///< Since the round's.
@@ -76,7 +76,7 @@ struct RoundMotion {
 };
 
 /// Any of them.
-using Motion = std::variant<PoseTrack, StraightMotion, RoundMotion>;
+using Motion = std::variant<PoseTrack, StraightMotion, LoopMotion>;
 
 /// T_world_body at an instant. Callable from several threads.
 [[nodiscard]] Pose pose_at(const Motion& motion, SimTime time);

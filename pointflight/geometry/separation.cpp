@@ -127,7 +127,7 @@ Vector3d normal_of(const Corner& p, const Corner& q, const Corner& r) {
   return (q.w - p.w).cross(r.w - p.w);
 }
 
-/// Point of a tetrahedron nearest to the origin; four corners where it lies inside.
+/// Point of a tetrahedron nearest to the origin; four corners if it lies inside.
 Simplex reduced(const Corner& a, const Corner& b, const Corner& c, const Corner& d) {
   const Simplex best = nearer(nearer(reduced(a, b, c), reduced(a, c, d)),
                               nearer(reduced(a, d, b), reduced(b, d, c)));
@@ -166,7 +166,7 @@ Simplex reduced(const Simplex& s) {
   }
 }
 
-/// Nearest points of two cores, in the frame of the first; nothing where they overlap.
+/// Nearest points of two cores, in the frame of the first; nothing if they overlap.
 struct NearestPair {
   Vector3d a, b;
 };

@@ -29,7 +29,7 @@ struct Disc {
   Vector3d normal;  ///< Unit vector, of either side.
   double radius;    ///< m
 };
-/// The surface of a ball; rays that start inside meet it too.
+/// The surface of a ball; rays that start inside hit it too.
 struct Sphere {
   Vector3d center;  ///< m
   double radius;    ///< m
@@ -38,7 +38,8 @@ struct Sphere {
 /// Shapes with exact ranges: what tests and generated maps are made of.
 using Shape = std::variant<Triangle, Cone, Disc, Sphere>;
 
-/// Distance along the unit `direction` to the first meeting with the shape beyond `t_min`, if any.
+/// Distance along the unit `direction` to the first intersection with the shape beyond `t_min`, if
+/// any.
 std::optional<double> intersect(const Shape& shape,
                                 const Vector3d& origin,
                                 const Vector3d& direction,
@@ -71,7 +72,7 @@ void sample_shape(const Shape& shape,
 struct ShapeScene {
   std::vector<Shape> shapes;  ///< In the order of their numbers.
 
-  /// First meeting of the ray with any shape.
+  /// First intersection of the ray with any shape.
   [[nodiscard]] std::optional<double> intersect(const Vector3d& origin,
                                                 const Vector3d& direction) const;
 
@@ -92,7 +93,7 @@ struct ShapeScene {
 struct ForestOptions {
   double size_x = 60.0;              ///< m
   double size_y = 60.0;              ///< m
-  double trees_per_hectare = 600.0;  ///< Fewer where the spacing leaves no room.
+  double trees_per_hectare = 600.0;  ///< Fewer if the spacing leaves no room.
   double trunk_radius_min = 0.08;    ///< At the foot, m.
   double trunk_radius_max = 0.25;    ///< At the foot, m.
   double height_min = 6.0;           ///< Of a trunk, m.

@@ -36,7 +36,7 @@ void cut_slab(Inside& inside, int axis, double half, const Vector3d& o, const Ve
     if (std::abs(o[axis]) > half) inside.cut_all();
     return;
   }
-  const double side = d[axis] > 0.0 ? -1.0 : 1.0;  // of the plane that is met first
+  const double side = d[axis] > 0.0 ? -1.0 : 1.0;  // of the plane that is hit first
   inside.cut((side * half - o[axis]) / d[axis],
              (-side * half - o[axis]) / d[axis],
              side * Vector3d::Unit(axis));

@@ -35,8 +35,8 @@ struct SolidHit {
   Vector3d normal;  ///< Outward unit normal, the solid's frame.
 };
 
-/// First meeting of a ray (the solid's frame, unit `direction`) with the solid's surface. A ray
-/// that starts inside meets nothing: a sensor does not see the hull it sits in.
+/// First intersection of a ray (the solid's frame, unit `direction`) with the solid's surface. A
+/// ray that starts inside hits nothing: a sensor does not see the hull it sits in.
 std::optional<SolidHit> intersect(const Solid& solid,
                                   const Vector3d& origin,
                                   const Vector3d& direction);
@@ -49,13 +49,13 @@ Vector3d half_extent(const Solid& solid);
 
 /// How far two solids are apart.
 struct Separation {
-  /// m; where they overlap, minus the shortest way that takes them apart (with a cylinder against
+  /// m; if they overlap, minus the shortest way that takes them apart (with a cylinder against
   /// anything but a ball: at most a little longer than the shortest).
   double distance;
   Vector3d place;  ///< A point of the second solid nearest to the first one.
 };
 
-/// Distance between solids a and b at their poses: closed form where one is a ball, else the
+/// Distance between solids a and b at their poses: closed form if one is a ball, else the
 /// algorithm of Gilbert, Johnson and Keerthi (1988) between their cores; to 1e-9 m.
 Separation separation(const Solid& a, const Pose& T_world_a, const Solid& b, const Pose& T_world_b);
 

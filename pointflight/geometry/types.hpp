@@ -46,7 +46,7 @@ struct Aabb {
   }
   /// True until a point was added; a box of a single point is not empty.
   [[nodiscard]] bool empty() const { return min.x() > max.x(); }
-  /// Length of its sides, m; -infinity where it is empty.
+  /// Length of its sides, m; -infinity if it is empty.
   [[nodiscard]] Vector3d size() const { return max - min; }
 };
 

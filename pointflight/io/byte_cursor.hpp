@@ -76,7 +76,7 @@ inline std::string_view take_word(std::string_view& line) {
   return word;
 }
 
-/// Parses a number; "nan", "inf" and a leading '+' are numbers too. False where `word` is not one.
+/// Parses a number; "nan", "inf" and a leading '+' are numbers too. False if `word` is not one.
 bool parse_number(std::string_view word, double& value);
 
 /// A file's bytes as text.

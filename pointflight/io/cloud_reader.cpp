@@ -91,7 +91,7 @@ const Refusal* find_refusal(const std::string& extension) {
   return found == std::end(kRefusals) ? nullptr : found;
 }
 
-/// The format of bytes that came without a name; throws InputError where they are none that is
+/// The format of bytes that came without a name; throws InputError if they are none that is
 /// read.
 std::string format_by_content(const MappedFile& file) {
   const std::string_view text = as_text(file.bytes());
@@ -193,6 +193,11 @@ std::unique_ptr<CloudReader> CloudSource::open(const MeshSampling& sampling,
 
 std::unique_ptr<CloudReader> open_cloud(const std::string& path, const MeshSampling& sampling) {
   return CloudSource(path).open(sampling);
+}
+
+bool has_cloud_extension(const std::string& path) {
+  const Format* format = find_format(extension_of(path));
+  return format != nullptr && format->open != nullptr;
 }
 
 bool is_mesh(const std::string& path) {

@@ -17,8 +17,8 @@ namespace pointflight {
 /// One point of a cloud, in the file's own coordinates.
 struct CloudPoint {
   Vector3d position = Vector3d::Zero();  ///< Metres, after `MeshSampling` and before --scale, --up.
-  float intensity = 0.0f;                ///< The file's own scale; 0 where the file has none.
-  std::array<std::uint8_t, 3> color{};   ///< Red, green, blue; 0 where the file has none.
+  float intensity = 0.0f;                ///< The file's own scale; 0 if the file has none.
+  std::array<std::uint8_t, 3> color{};   ///< Red, green, blue; 0 if the file has none.
 };
 
 /// Brightness of a point's colour as the eye has it, 0 to 255 (ITU-R BT.601).
@@ -30,7 +30,7 @@ inline float luminance(const CloudPoint& point) {
 /// The unit of length that a file names for its coordinates.
 struct FileUnit {
   std::string name;     ///< "foot"
-  double metres = 1.0;  ///< Of one unit; 0 where the coordinates are angles.
+  double metres = 1.0;  ///< Of one unit; 0 if the coordinates are angles.
 };
 
 /// Reads a cloud front to back in batches: the whole cloud is never in memory (but for
@@ -41,7 +41,7 @@ class CloudReader {
 
   /// Replaces `batch` with the next points (at most about 65,536). False when there are none left.
   /// NaN and infinite coordinates are passed on: the caller counts and drops them. Throws
-  /// InputError with file and line or byte where the file is not what its header says.
+  /// InputError with file and line or byte if the file is not what its header says.
   virtual bool read(std::vector<CloudPoint>& batch) = 0;
 
   /// True if the points carry an intensity.
@@ -50,15 +50,15 @@ class CloudReader {
   /// True if the points carry a colour.
   [[nodiscard]] virtual bool has_color() const { return false; }
 
-  /// When the points of the last batch were measured, s, in their order; empty where the file does
+  /// When the points of the last batch were measured, s, in their order; empty if the file does
   /// not say. By the field's own zero: the scan's start, or the epoch.
   [[nodiscard]] virtual std::span<const double> times() const { return {}; }
 
-  /// Numbers of the channels that measured the points of the last batch; empty where the file does
+  /// Numbers of the channels that measured the points of the last batch; empty if the file does
   /// not say.
   [[nodiscard]] virtual std::span<const std::int32_t> rings() const { return {}; }
 
-  /// The unit that the file's header or its first comments name; nothing where they name none.
+  /// The unit that the file's header or its first comments name; nothing if they name none.
   [[nodiscard]] virtual std::optional<FileUnit> unit() const { return std::nullopt; }
 
   /// Share of the file that was read, 0 to 1.
@@ -117,6 +117,9 @@ std::unique_ptr<CloudReader> open_cloud(const std::string& path, const MeshSampl
 
 /// Extensions that are read, for help texts.
 std::string known_cloud_formats();
+
+/// True if the path ends as clouds' files do, that are no meshes: ".pcd", ".LAS", ...
+bool has_cloud_extension(const std::string& path);
 
 /// True if the path names a mesh (by extension, or a PLY with faces).
 bool is_mesh(const std::string& path);

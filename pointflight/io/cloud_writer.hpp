@@ -31,7 +31,7 @@ struct CloudRow {
 
 /// Writes a cloud row by row, never held; it appears under its name with `commit`.
 ///
-/// PCD and PLY are binary with coordinates as float32, or float64 where the first batch lies beyond
+/// PCD and PLY are binary with coordinates as float32, or float64 if the first batch lies beyond
 /// 4 km; LAS is 1.2 with steps of 0.1 mm.
 class CloudWriter {
  public:
@@ -48,7 +48,7 @@ class CloudWriter {
   /// Rows written so far.
   [[nodiscard]] std::uint64_t count() const { return count_; }
 
-  /// What the format could not hold, for a warning; empty where nothing was lost.
+  /// What the format could not hold, for a warning; empty if nothing was lost.
   [[nodiscard]] virtual std::string loss() const { return {}; }
 
  protected:
@@ -69,10 +69,10 @@ class CloudWriter {
 };
 
 /// Opens a cloud for writing by the extension of the file's path: .pcd, .ply, .las. Throws
-/// InputError where it is another one, or cannot hold the columns.
+/// InputError if it is another one, or cannot hold the columns.
 std::unique_ptr<CloudWriter> write_cloud(OutputFile file, const CloudColumns& columns);
 
-/// Throws InputError where `path` has no extension that is written; says so before hours of work.
+/// Throws InputError if `path` has no extension that is written; says so before hours of work.
 void require_writable_cloud(const std::string& path);
 
 }  // namespace pointflight

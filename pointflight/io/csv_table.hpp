@@ -26,10 +26,10 @@ class CsvTable {
   /// -1.
   [[nodiscard]] int find(std::string_view prefix) const;
 
-  /// As `find`, but throws InputError where there is no such column.
+  /// As `find`, but throws InputError if there is no such column.
   [[nodiscard]] int require(std::string_view prefix) const;
 
-  /// "file:line" of a row, for messages. Throws std::out_of_range where there is no such row.
+  /// "file:line" of a row, for messages. Throws std::out_of_range if there is no such row.
   [[nodiscard]] std::string place(std::size_t row) const;
 
   /// NaN for an empty cell. `row` below rows(), `column` as `find` or `require` gave it and not -1:

@@ -10,7 +10,7 @@
 namespace pointflight {
 
 /// The unit that a comment of a header names: "units: mm", "File units = millimeters". Nothing
-/// where it names none.
+/// if it names none.
 std::optional<FileUnit> unit_in_comment(std::string_view comment);
 
 /// The unit of a LAS file's coordinates, from the variable-length records of its header: GeoTIFF

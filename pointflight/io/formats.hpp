@@ -8,7 +8,7 @@
 #include "pointflight/io/cloud_reader.hpp"
 
 /// @file
-/// One function per format; each takes a mapped file and throws InputError where it is not valid.
+/// One function per format; each takes a mapped file and throws InputError if it is not valid.
 namespace pointflight {
 
 /// PCD 0.7: ascii, binary, binary_compressed; any order and type of fields that include x, y, z.
@@ -20,7 +20,7 @@ std::unique_ptr<CloudReader> open_ply(MappedFile file);
 /// True if the PLY header promises faces (or triangle strips): a mesh, not a cloud.
 bool ply_has_faces(const MappedFile& file);
 
-/// Walks over all rows of a PLY. Throws InputError where the file ends before them.
+/// Walks over all rows of a PLY. Throws InputError if the file ends before them.
 void check_ply_rows(MappedFile file);
 
 /// Text: x y z [intensity ...] a line; blanks, commas or semicolons between; an optional line of
@@ -39,7 +39,7 @@ struct MeshLimits {
 MeshLimits mesh_limits(std::size_t file_bytes);
 
 /// Triangles of any format that assimp reads, sampled evenly by area. The file is read in a child
-/// process: where assimp crashes there, that is an InputError here. Throws InputError where the
+/// process: if assimp crashes there, that is an InputError here. Throws InputError if the
 /// program was built without assimp.
 std::unique_ptr<CloudReader> open_mesh(const std::string& path,
                                        const MeshSampling& sampling,

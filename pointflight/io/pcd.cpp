@@ -180,7 +180,7 @@ class PcdReader : public CloudReader {
     return time_->type != 'F' || std::abs(value) > kSecondsEnd ? 1e-9 * value : value;
   }
 
-  /// -1 where it is none.
+  /// -1 if it is none.
   static std::int32_t ring_of(double value) {
     return value >= 0.0 && value < 65536.0 ? static_cast<std::int32_t>(value) : -1;
   }

@@ -13,7 +13,7 @@ namespace pointflight {
 struct TumPose {
   double time = 0.0;    ///< The file's own number: a time, or an index.
   Pose T_world_sensor;  ///< In the world that the file's map has.
-  std::string file;     ///< Ninth column; empty where there is none.
+  std::string file;     ///< Ninth column; empty if there is none.
 };
 
 /// Reads a TUM trajectory; lines that start with # are comments. Quaternions are normalised. Throws
@@ -24,7 +24,7 @@ std::vector<TumPose> read_tum(const std::string& path);
 /// with # are comments. Throws InputError with file and line.
 std::vector<Pose> read_kitti(const std::string& path);
 
-/// True where the file's first row has twelve words: KITTI's.
+/// True if the file's first row has twelve words: KITTI's.
 bool is_kitti(const std::string& path);
 
 /// Writes a TUM trajectory, with a head line.

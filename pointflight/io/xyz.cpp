@@ -158,7 +158,7 @@ class XyzReader : public CloudReader {
     return names;
   }
 
-  /// False where x, y or z is missing.
+  /// False if x, y or z is missing.
   bool use_names(const std::vector<std::string>& names) {
     std::array<std::size_t, 3> position{};
     for (std::size_t axis = 0; axis < 3; ++axis) {

@@ -17,7 +17,7 @@ struct Beam {
   Vector3f origin_sensor = Vector3f::Zero();      ///< Where it leaves: not zero for Ouster, HDL-64.
   Vector3f direction_sensor = Vector3f::UnitX();  ///< Unit vector.
   Duration time_offset{0};                        ///< Firing time after the start of the scan.
-  /// As the maker's driver numbers it: Velodyne's channels from below, Ouster's rows from above,
+  /// As the vendor's driver numbers it: Velodyne's channels from below, Ouster's rows from above,
   /// Livox' lines.
   std::uint16_t ring = 0;
 };
@@ -58,7 +58,7 @@ struct ShotTrain {
     std::int64_t end = 0;    ///< One past its last shot.
     SimTime scan_start;      ///< k / scan_rate, rounded to a nanosecond.
   };
-  /// Every shot belongs to exactly one scan, also where the rates do not divide.
+  /// Every shot belongs to exactly one scan, also if the rates do not divide.
   [[nodiscard]] Range in_scan(std::uint64_t scan_index) const;
 
  private:

@@ -125,7 +125,7 @@ double DetectionModel::rated_reflectivity(double range) const {
   return math::exp(on_line(log_ranges_, log_reflectivities_, math::log(range)));
 }
 
-double DetectionModel::near_share(double range) const {
+double DetectionModel::near_gain(double range) const {
   if (near_ranges_.empty() || range >= near_ranges_.back()) return 1.0;
   if (range <= near_ranges_.front()) return near_shares_.front();
   return on_line(near_ranges_, near_shares_, range);
@@ -136,7 +136,7 @@ double DetectionModel::margin_at(double probability) const {
 }
 
 double DetectionModel::margin(double reflectivity, double range) const {
-  return reflectivity * near_share(range) / rated_reflectivity(range);
+  return reflectivity * near_gain(range) / rated_reflectivity(range);
 }
 
 double DetectionModel::probability(double margin) const {

@@ -32,7 +32,7 @@ enum class ReturnMode {
   kStrongest,  ///< One: the strongest.
   kFirst,      ///< One: the nearest.
   kLast,       ///< One: the farthest.
-  kDual,       ///< The strongest and the last; where these are one, the second strongest.
+  kDual,       ///< The strongest and the last; if these are one, the second strongest.
   kTriple,     ///< The three strongest.
 };
 
@@ -43,7 +43,7 @@ std::span<const Named<ReturnMode>> return_modes();
 
 /// The `detection` section of a sensor file.
 struct DetectionSettings {
-  std::vector<RatedRange> rated;  ///< None: whatever a beam meets comes back.
+  std::vector<RatedRange> rated;  ///< None: whatever a beam hits comes back.
   double probability = 0.5;       ///< Of a return at the rated ranges.
   double false_alarm = 1e-4;      ///< Share of beams that report what is not there.
   /// By ascending range; straight lines between, the first one's share below, all beyond.
@@ -61,8 +61,8 @@ void describe(SettingsVisitor& visitor, DetectionSettings& settings);
 ///
 /// The signal counts by its *margin*: how many times stronger it is than one from a target that the
 /// sensor is rated for. By the link budget the margin of a diffuse surface is
-/// (rho cos(incidence) / 0.1) (R10 / R)^(1 / gamma), with gamma = 0.5 where the sun does not matter
-/// and less where sheets say so (0.25 for an Avia at 100 klx). Here the law is the sheet's own:
+/// (rho cos(incidence) / 0.1) (R10 / R)^(1 / gamma), with gamma = 0.5 if the sun does not matter
+/// and less if sheets say so (0.25 for an Avia at 100 klx). Here the law is the sheet's own:
 /// rated ranges are met exactly, and lie on a straight line in (log reflectivity, log range)
 /// between and beyond. With one rated range gamma is 0.5. Light changes the ranges in proportion
 /// between the levels that are rated, and keeps the nearest level's beyond. Signals from within
@@ -72,7 +72,7 @@ class DetectionModel {
   /// `settings` as `describe` admits; `sun_klx`: background light, 0 at night, 100 in full sun.
   DetectionModel(const DetectionSettings& settings, double sun_klx);
 
-  /// True if every beam that meets something comes back.
+  /// True if every beam that hits something comes back.
   [[nodiscard]] bool is_ideal() const { return log_ranges_.empty(); }
   /// Rated range of a diffuse target of this reflectivity (> 0), face on, m.
   [[nodiscard]] double rated_range(double reflectivity) const;
@@ -80,7 +80,7 @@ class DetectionModel {
   /// target reaches.
   [[nodiscard]] double rated_reflectivity(double range) const;
   /// Share of the signal that is seen from `range` (m), by `near`.
-  [[nodiscard]] double near_share(double range) const;
+  [[nodiscard]] double near_gain(double range) const;
   /// Margin of a signal that comes back so often, 0 to 1, both exclusive: `probability`, inverted.
   [[nodiscard]] double margin_at(double probability) const;
   /// Of the signal from `range` (> 0, m); `reflectivity` is the surface's times the cosine of the
@@ -93,7 +93,7 @@ class DetectionModel {
   /// z = Phi^-1(probability at m = 1).
   [[nodiscard]] double probability(double margin) const;
   /// No diffuse target comes back from farther than this with a probability above 0.001, m;
-  /// `range_limit` where that is less.
+  /// `range_limit` if that is less.
   [[nodiscard]] double reach() const;
 
  private:

@@ -1,4 +1,4 @@
-// Where the light of a beam comes back from: a beam is wide, and parts of it may meet different
+// Where the light of a beam comes back from: a beam is wide, and parts of it may hit different
 // things.
 #pragma once
 
@@ -12,14 +12,14 @@
 
 namespace pointflight {
 
-/// Which sub-ray gave the most light of a return, and what it met: no sensor knows.
+/// Which sub-ray gave the most light of a return, and what it hit: no sensor knows.
 struct Origin {
   float cos_incidence = 0.0f;        ///< `Hit::cos_incidence`
   std::uint32_t surfel = kNoSurfel;  ///< `Hit::surfel`
   std::uint16_t sub_ray = 0;         ///< Its number; the spread of numbers is `Footprint`'s.
 };
 
-/// What part of a beam met.
+/// What part of a beam hit.
 struct BeamPart {
   float range = -1.0f;        ///< m; negative: nothing.
   float share = 1.0f;         ///< Of the beam's light.
@@ -27,7 +27,7 @@ struct BeamPart {
   float intensity = 0.0f;     ///< The map's.
   Label label = kMapLabel;    ///< What it is of.
   Origin origin{};            ///< Of itself.
-  /// It met something.
+  /// It hit something.
   [[nodiscard]] bool is_return() const { return range >= 0.0f; }
 };
 

@@ -25,7 +25,7 @@ constexpr std::size_t kFew = 8;
 constexpr std::size_t kEnough = 32;
 constexpr float kOffPlane = 0.2f;  // m
 constexpr float kDeep = 0.4f;      // m: of such an echo eight sub-rays give no mean range
-constexpr float kBefore = 0.3f;    // m, nearer than what sub-rays met
+constexpr float kBefore = 0.3f;    // m, nearer than what sub-rays hit
 
 float nearest_of(std::span<const BeamPart> parts) {
   float nearest = std::numeric_limits<float>::infinity();
@@ -46,7 +46,7 @@ BeamPart part_of(const Hit& hit, float share, std::size_t sub_ray, const ReturnM
           .origin = {hit.cos_incidence, hit.surfel, static_cast<std::uint16_t>(sub_ray)}};
 }
 
-/// Parts that met one plane: there the inverse of the range is linear across the beam.
+/// Parts that hit one plane: there the inverse of the range is linear across the beam.
 template <class SubRays>
 bool lie_in_plane(std::span<const BeamPart> parts, const SubRays& sub_rays) {
   float mean = 0.0f;
@@ -85,10 +85,10 @@ double least_energy(const Echo& echo) {
 /// True if whether an echo is detected hangs on how many of the sub-rays are its own.
 bool depends_on_sub_rays(const Echo& echo, const ReturnModel& returns) {
   const double chance = uncertainty_of(echo);
-  return returns.may_go_either_way(echo, std::max(0.0, 1.0 - chance), 1.0 + chance);
+  return returns.is_marginal(echo, std::max(0.0, 1.0 - chance), 1.0 + chance);
 }
 
-/// The energy below which an echo is not reported, whatever its sub-rays: where one counts, the
+/// The energy below which an echo is not reported, whatever its sub-rays: if one counts, the
 /// strongest.
 double energy_that_counts(const Echoes& echoes, const ReturnModel& returns) {
   double least = 0.0;
@@ -110,8 +110,8 @@ bool is_in_doubt(const Echoes& echoes, const ReturnModel& returns) {
   return candidates > 1;
 }
 
-/// True if more sub-rays may find another number of echoes that are reported: few met one of them,
-/// or what fewer had met between them is gone.
+/// True if more sub-rays may find another number of echoes that are reported: few hit one of them,
+/// or what fewer had hit between them is gone.
 bool may_lack(const Echoes& before, const Echoes& echoes, const ReturnModel& returns) {
   constexpr double kLeft = 0.2;  // of the light that one sub-ray of few stood for
   const double counts = energy_that_counts(echoes, returns);
@@ -123,12 +123,12 @@ bool may_lack(const Echoes& before, const Echoes& echoes, const ReturnModel& ret
   if (before.count <= echoes.count) return false;
   const auto is_missed = [&](const Echo& echo) {
     const double left = kLeft / static_cast<double>(echo.parts);
-    return left * energy_of(echo) >= counts && returns.may_go_either_way(echo, 0.0, left);
+    return left * energy_of(echo) >= counts && returns.is_marginal(echo, 0.0, left);
   };
   return std::any_of(before.span().begin(), before.span().end(), is_missed);
 }
 
-/// True if a surface at a range may be reported that no sub-ray met.
+/// True if a surface at a range may be reported that no sub-ray hit.
 bool may_count(float range, const Echoes& echoes, const ReturnModel& returns) {
   constexpr double kUnmet = 0.3;  // of the light at most, of a white surface
   const auto r = static_cast<double>(range);
@@ -177,7 +177,7 @@ std::vector<Footprint::SubRay> Footprint::rim() {
 }
 
 /// So many, evenly over the cross-section (a sunflower's seeds), with the Gaussian's shares: what
-/// is on the rim is met as surely as what is in the middle. Eight that follow each other lie in one
+/// is on the rim is hit as surely as what is in the middle. Eight that follow each other lie in one
 /// sector, as far as possible.
 std::vector<Footprint::SubRay> Footprint::spread(std::size_t count) {
   struct Seed {
@@ -222,7 +222,7 @@ void Footprint::aim(const WideBeams& beams,
   }
 }
 
-/// Makes one beam's echoes of what its sub-rays met. `known`: the nearest that reaches between
+/// Makes one beam's echoes of what its sub-rays hit. `known`: the nearest that reaches between
 /// them, m. True if the beam needs more of them.
 bool Footprint::judge(std::size_t level,
                       std::span<BeamPart> parts,
@@ -241,7 +241,7 @@ bool Footprint::judge(std::size_t level,
     echoes = echoes_of(parts, merge_);
     in_doubt = level == 0 ? is_in_doubt(echoes, returns) : may_lack(before, echoes, returns);
   }
-  // what so many have not met by then is no surface, only surfels
+  // what so many have not hit by then is no surface, only surfels
   const bool has_more = parts.size() <= kEnough && known < met - kBefore;
   return in_doubt || (has_more && may_count(known, echoes, returns));
 }

@@ -1,4 +1,4 @@
-// A beam as wide as the sensor's is: sub-rays over its cross-section, and what they meet.
+// A beam as wide as the sensor's is: sub-rays over its cross-section, and what they hit.
 #pragma once
 
 #include <array>
@@ -26,11 +26,11 @@ struct WideBeams {
 /// the centre's (2 sigma; sigma = full angle at half maximum / 2.3548), which optics calls the
 /// beam's radius.
 ///
-/// Eight sub-rays tell whether a beam meets one surface: its middle and a heptagon around its rim.
+/// Eight sub-rays tell whether a beam hits one surface: its middle and a heptagon around its rim.
 /// Where they do, they are the beam. Where they do not (ranges off a plane by more than 0.2 m, some
-/// meet nothing, or the renderer knows of a surface between them that is nearer) and what is
+/// hit nothing, or the renderer knows of a surface between them that is nearer) and what is
 /// reported hangs on the shares of light, 32 sub-rays spread over the cross-section are taken
-/// instead; then 96 and 288, while it hangs on an echo that at most eight of them met. Each beam's
+/// instead; then 96 and 288, while it hangs on an echo that at most eight of them hit. Each beam's
 /// are turned by an angle of its own, so that errors of neighbours differ. With `optics.sub_rays`
 /// from 2 to 8 the eight are all; above it there are so many, spread, for every beam.
 class Footprint {
@@ -69,7 +69,7 @@ class Footprint {
   std::int64_t sub_rays_;
   float sigma_across_, sigma_up_;               ///< rad
   float merge_;                                 ///< m, of `echoes_of`.
-  std::vector<std::vector<SubRay>> levels_;     ///< The next where one is not enough.
+  std::vector<std::vector<SubRay>> levels_;     ///< The next if one is not enough.
   std::array<std::array<float, 2>, 64> turns_;  ///< Cosine and sine.
 };
 

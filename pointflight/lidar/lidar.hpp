@@ -36,7 +36,7 @@ class Lidar {
  public:
   /// `sensor` numbers it within the run: the entity of its random streams. LiDARs of the same
   /// settings may share their beams; null: it has its own. With `surroundings` returns are modelled
-  /// (`ReturnModel`, `Footprint`, directions with noise); without, whatever a beam meets within the
+  /// (`ReturnModel`, `Footprint`, directions with noise); without, whatever a beam hits within the
   /// sensor's range comes back with the map's intensity and Gaussian noise of the range.
   Lidar(const LidarSettings& settings,
         std::uint32_t sensor,

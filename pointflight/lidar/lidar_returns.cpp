@@ -14,7 +14,7 @@ namespace {
 constexpr std::size_t kReturnsPerChunk = 2048;  // beams
 
 /// Standard normals for the beams of a scan. Two neighbours share a draw of two: half the price
-/// where a scan's beams are asked for one after the other.
+/// if a scan's beams are asked for one after the other.
 class BeamNormals {
  public:
   BeamNormals(const RandomStream& random, std::uint64_t scan) : random_(random), scan_(scan) {}
@@ -33,7 +33,7 @@ class BeamNormals {
   std::array<double, 2> normals_{};
 };
 
-/// Range (of a depth camera: depth) with the sensor's Gaussian noise, where returns are not
+/// Range (of a depth camera: depth) with the sensor's Gaussian noise, if returns are not
 /// modelled.
 float with_noise(float range,
                  const RangeNoiseSettings& noise,
@@ -65,7 +65,7 @@ void mark_unknown(const KnownSpace& known,
 }
 
 /// `Scan::truth` of its points. `returns`: those of all beams, `most` places each.
-void tell_truth(std::span<const Return> returns, const PoseTrack& T_world_sensor, Scan& scan) {
+void add_truth(std::span<const Return> returns, const PoseTrack& T_world_sensor, Scan& scan) {
   scan.marks.truth = true;
   scan.truth.reserve(scan.points.size());
   const Pose T_start_world = T_world_sensor.at(scan.start).inverse();
@@ -93,7 +93,7 @@ void tell_truth(std::span<const Return> returns, const PoseTrack& T_world_sensor
 
 }  // namespace
 
-/// What the sensor reports of each beam's echoes; a negative range where it reports nothing.
+/// What the sensor reports of each beam's echoes; a negative range if it reports nothing.
 Lidar::Received Lidar::received(const Aimed& aimed,
                                 std::span<const Echoes> echoes,
                                 const Executor& executor) const {
@@ -196,7 +196,7 @@ Lidar::Received Lidar::received_as_stereo(const Aimed& aimed,
 }
 
 /// What a camera's imager sees by the sun and by its own light, which falls off with the square of
-/// the depth; exposed so that the mean of what it meets is a third of the brightest.
+/// the depth; exposed so that the mean of what it hits is a third of the brightest.
 std::vector<std::uint8_t> Lidar::infrared_of(std::span<const Beam> beams,
                                              std::span<const Hit> hits) const {
   constexpr double kMean = 85.0;
@@ -274,7 +274,7 @@ Scan Lidar::written(const Aimed& aimed,
     scan.points.back().echo = static_cast<std::uint8_t>(i % received.most);
     if (request.known != nullptr) true_ranges.push_back(made.true_range);
   }
-  if (request.truth) tell_truth(received.returns, T_world_sensor, scan);
+  if (request.truth) add_truth(received.returns, T_world_sensor, scan);
   if (request.known != nullptr) {
     mark_unknown(*request.known, aimed.rays, true_ranges, scan, executor);
   }

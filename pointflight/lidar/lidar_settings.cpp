@@ -8,7 +8,7 @@
 
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/core/resources.hpp"
-#include "pointflight/lidar/maker_files.hpp"
+#include "pointflight/lidar/vendor_files.hpp"
 
 namespace pointflight {
 namespace {
@@ -187,7 +187,7 @@ LidarSettings read(SettingsReader& reader, const std::string& path) {
 }  // namespace
 
 void describe(SettingsVisitor& v, LidarSettings& s) {
-  v.value({"title", "", "maker and model"}, s.title);
+  v.value({"title", "", "vendor and model"}, s.title);
   v.value({"source", "", "where the figures come from"}, s.source);
   v.value({"rate", "Hz", "scans per second", 0.01, 10000}, s.rate);
   v.value({"range_min",

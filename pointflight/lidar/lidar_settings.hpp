@@ -56,7 +56,7 @@ struct WedgeSettings {
   double index = 1.51;      ///< Refractive.
   double rate = 0.0;        ///< Turns a second; the sign is the sense.
   double phase_deg = 0.0;   ///< At time zero.
-  bool flat_first = false;  ///< Light meets the flat face first ("out"), else the inclined one.
+  bool flat_first = false;  ///< Light hits the flat face first ("out"), else the inclined one.
 };
 
 /// Livox Avia, Mid-40, Mid-70: wedges on one axis.
@@ -77,12 +77,11 @@ struct RingsSettings {
   double elevation_min_deg = -15.0;         ///< Of evenly spaced channels: the lowest.
   double elevation_max_deg = 15.0;          ///< The highest.
   RingConvention convention = RingConvention::kVelodyne;  ///< How a turn is fired.
-  double cycle_us = 55.296;  ///< not ouster: from one firing of all channels to the next.
-  double channel_interval_us =
-      0.0;                          ///< not ouster: between channels, where the table has no times.
-  std::int64_t columns = 1024;      ///< ouster: a turn.
-  double beam_origin_radius = 0.0;  ///< ouster: distance of the beams' origin from the axis, m.
-  double origin_z = 0.0;            ///< ouster: height of the beams' origin in the sensor frame, m.
+  double cycle_us = 55.296;          ///< not ouster: from one firing of all channels to the next.
+  double channel_interval_us = 0.0;  ///< not ouster: between channels, if the table has no times.
+  std::int64_t columns = 1024;       ///< ouster: a turn.
+  double beam_origin_radius = 0.0;   ///< ouster: distance of the beams' origin from the axis, m.
+  double origin_z = 0.0;  ///< ouster: height of the beams' origin in the sensor frame, m.
 };
 
 /// A stereo pair of which a pinhole grid is the left imager (`StereoCamera`).
@@ -120,7 +119,7 @@ struct CsvSettings {
 };
 
 /// Standard deviation of the range: sqrt(range_sigma^2 + (range_sigma_per_m2 R^2)^2 +
-/// (range_sigma_at_limit / margin)^2), the last one where returns are modelled (`ReturnModel`): the
+/// (range_sigma_at_limit / margin)^2), the last one if returns are modelled (`ReturnModel`): the
 /// jitter of a threshold's crossing goes with rise time over signal.
 struct RangeNoiseSettings {
   double range_sigma = 0.0;           ///< m
@@ -149,7 +148,7 @@ struct LidarSettings {
   std::string source;      ///< Where the figures come from.
   double rate = 10.0;      ///< Scans a second.
   double range_min = 0.1;  ///< m; nearer returns are lost (a depth camera's: depth).
-  /// m; farther returns are lost (a depth camera's: depth), where `detection` does not say more.
+  /// m; farther returns are lost (a depth camera's: depth), if `detection` does not say more.
   double range_max = 100.0;
   double image_resolution_deg = 0.2;          ///< theta_res of the `paper` renderer.
   RangeNoiseSettings noise;                   ///< Of every return.
@@ -186,8 +185,8 @@ std::string lidar_reference();
 void check(const LidarSettings& settings);
 
 /// Reads a sensor by name ("mid360") or path; relative paths are taken from `base`. Beside sensor
-/// files (.yaml) it reads those of makers (`maker_files.hpp`): Ouster's metadata (.json) and tables
-/// of directions (.csv).
+/// files (.yaml) it reads those of vendors (`vendor_files.hpp`): Ouster's metadata (.json) and
+/// tables of directions (.csv).
 LidarSettings load_lidar(const std::string& name_or_path, const std::string& base = {});
 
 /// The files that a sensor's settings name beside its own, as paths that can be opened; each in

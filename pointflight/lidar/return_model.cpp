@@ -15,8 +15,8 @@ namespace {
 constexpr double kDarkest = 1e-3;                   // reflectivity of anything
 constexpr double kNearest = 0.01;                   // m, of signals
 constexpr double kShortestPulse = 0.1;              // ns
-constexpr double kBrightest = 255.0;                // a byte, in every maker's packets
-constexpr double kUsualDivergence = 0.2 * kDegree;  // rad, where a sensor file gives none
+constexpr double kBrightest = 255.0;                // a byte, in every vendor's packets
+constexpr double kUsualDivergence = 0.2 * kDegree;  // rad, if a sensor file gives none
 
 constexpr std::size_t kTexture = 4096;  // reflectivities that unknown surfels have
 
@@ -108,7 +108,7 @@ Echo ReturnModel::echo_of(const Hit& hit) const {
           .origin = {hit.cos_incidence, hit.surfel}};
 }
 
-bool ReturnModel::may_go_either_way(const Echo& echo, double less, double more) const {
+bool ReturnModel::is_marginal(const Echo& echo, double less, double more) const {
   if (detection_.is_ideal()) return false;
   const auto range = static_cast<double>(echo.range);
   const double margin =

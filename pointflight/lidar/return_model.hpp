@@ -1,4 +1,4 @@
-// What a beam that met something brings back to the sensor.
+// What a beam that hit something brings back to the sensor.
 #pragma once
 
 #include <functional>
@@ -33,7 +33,7 @@ struct Surroundings {
 /// Their keys.
 void describe(SettingsVisitor& visitor, Surroundings& surroundings);
 
-/// The same with the map's own scale of reflectivities where they give none.
+/// The same with the map's own scale of reflectivities if they give none.
 Surroundings surroundings_in(const SurfelMap& map, Surroundings surroundings);
 
 /// The random part of one beam.
@@ -51,7 +51,7 @@ using ChanceOf = std::function<BeamChance(std::size_t echo)>;
 /// One return as the sensor reports it.
 struct Return {
   float range = -1.0f;       ///< m; of a depth camera: depth. Negative: no return.
-  float intensity = 0.0f;    ///< In the sensor's own unit, or the map's where it has none.
+  float intensity = 0.0f;    ///< In the sensor's own unit, or the map's if it has none.
   Label label = kMapLabel;   ///< Of a false one, `kFalseReturn`: nothing, fog, dust or a drop.
   float true_range = -1.0f;  ///< m, without noise and rounding.
   double strength = 0.0;     ///< Of the signal, in the unit of `Weather::target`.
@@ -68,7 +68,7 @@ class ReturnModel {
   /// Of a sensor file.
   ReturnModel(const LidarSettings& lidar, const Surroundings& surroundings);
 
-  /// True where draws for the air count.
+  /// True if draws for the air count.
   [[nodiscard]] bool has_weather() const { return !weather_.is_clear(); }
   /// How far beams have to be followed, m (a depth camera's: depth).
   [[nodiscard]] double reach() const { return reach_; }
@@ -76,19 +76,19 @@ class ReturnModel {
   [[nodiscard]] double sun_klx() const { return surroundings_.sun_klx; }
   /// Which echoes are reported.
   [[nodiscard]] ReturnMode mode() const { return mode_; }
-  /// Standard deviation of the range at a range (m) and a margin (`DetectionModel`; infinity where
+  /// Standard deviation of the range at a range (m) and a margin (`DetectionModel`; infinity if
   /// the sensor has no rated ranges), m.
   [[nodiscard]] double range_sigma(double range, double margin) const;
-  /// Of a surface that a beam met: what the map or the surroundings say, times the cosine
+  /// Of a surface that a beam hit: what the map or the surroundings say, times the cosine
   /// of the incidence.
   [[nodiscard]] double reflectivity(const Hit& hit) const;
   /// The one echo of a beam that is a line.
   [[nodiscard]] Echo echo_of(const Hit& hit) const;
   /// True if scaling the echo's energy by `less` or `more` changes its probability of detection by
   /// more than 0.05.
-  [[nodiscard]] bool may_go_either_way(const Echo& echo, double less, double more) const;
+  [[nodiscard]] bool is_marginal(const Echo& echo, double less, double more) const;
   /// What the sensor reports of a beam's echoes, the nearest first, whose ranges are what it
-  /// measures: at most `most_returns`, the strongest first. None where nothing comes back, or from
+  /// measures: at most `most_returns`, the strongest first. None if nothing comes back, or from
   /// nearer than the sensor's least range. A beam whose draw lies below the false alarms' share
   /// reports a range anywhere. What is in the air before the last echo counts as one more, if it is
   /// stronger than the surface behind it. Returns how many.

@@ -17,15 +17,15 @@ namespace pointflight {
 struct ScanPoint {
   Vector3f position_sensor;  ///< In the sensor frame at the point's own firing time, m.
   float range = 0.0f;        ///< Measured, noise included, m.
-  float intensity = 0.0f;    ///< Of the map, in its cloud's scale; 0 where it had none.
+  float intensity = 0.0f;    ///< Of the map, in its cloud's scale; 0 if it had none.
   Duration time_offset{0};   ///< After the scan's start.
-  std::uint16_t ring = 0;    ///< As the maker's driver numbers it.
+  std::uint16_t ring = 0;    ///< As the vendor's driver numbers it.
   std::uint32_t beam = 0;    ///< Index of the beam in the scan's pattern.
   Label label = kMapLabel;   ///< What it is of: the map, a vehicle, an obstacle.
   /// Its beam came through space that no survey saw: something may stand there in the real place.
-  /// Told only where the scan's `marks.unknown`.
+  /// Told only if the scan's `marks.unknown`.
   bool is_unknown = false;
-  /// Which of its beam's returns, in the order of `ReturnMode`. Told only where `marks.echoes`.
+  /// Which of its beam's returns, in the order of `ReturnMode`. Told only if `marks.echoes`.
   std::uint8_t echo = 0;
 };
 
@@ -42,7 +42,7 @@ struct PointTruth {
   /// The point in the sensor's frame at the scan's start, m: what exact deskewing makes of it.
   Vector3f deskewed = Vector3f::Zero();
   std::uint32_t surfel = kNoSurfel;  ///< What gave most of the light: `Hit::surfel`.
-  std::uint16_t sub_ray = 0;         ///< Which sub-ray of the beam met it.
+  std::uint16_t sub_ray = 0;         ///< Which sub-ray of the beam hit it.
   std::uint16_t sub_rays = 0;        ///< How many sub-rays are in the pulse; 0: a false return.
 };
 
@@ -65,8 +65,8 @@ struct Scan {
   SimTime middle;                 ///< Between first and last beam (a camera's: its start).
   ScanMarks marks;                ///< What points say besides.
   std::vector<ScanPoint> points;  ///< In firing order; beams without a return have none.
-  /// Of a depth camera where returns are modelled: the brightness of each beam's pixel, 0 where it
-  /// meets nothing; else empty.
+  /// Of a depth camera if returns are modelled: the brightness of each beam's pixel, 0 if it
+  /// hits nothing; else empty.
   std::vector<std::uint8_t> infrared;
   std::vector<PointTruth> truth;  ///< Of each point, where `marks.truth`; else empty.
 
@@ -84,7 +84,7 @@ void write_scan_pcd(const std::string& path, const Scan& scan);
 
 /// Fills in the points of such a file, and their truth, of a scan taken with `beams` whose `marks`
 /// are set: the file has what they say. Times and numbers of the points are those of the beams, to
-/// the nanosecond. Throws InputError, also where the points are not those of the beams.
+/// the nanosecond. Throws InputError, also if the points are not those of the beams.
 void read_scan_points(const std::string& path, std::span<const Beam> beams, Scan& scan);
 
 }  // namespace pointflight

@@ -35,7 +35,7 @@ StereoCamera::StereoCamera(const LidarSettings& lidar)
       nodes_(columns_ / static_cast<std::size_t>(stereo_.window) + 2) {}
 
 /// Largest disparity that each column of the right image sees, of the left's in a row; `kNothing`
-/// where it sees none of these surfaces.
+/// if it sees none of these surfaces.
 std::vector<double> StereoCamera::nearest_in_right(std::span<const double> disparities) const {
   std::vector<double> nearest(columns_, kNothing);
   const auto put = [&](std::int64_t column, double disparity) {

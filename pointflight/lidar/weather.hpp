@@ -20,7 +20,7 @@ enum class WeatherKind {
 /// The `weather` section of a scenario's surroundings.
 struct WeatherSettings {
   WeatherKind kind = WeatherKind::kClear;  ///< Which of the figures below counts.
-  /// Meteorological optical range, m: where 5 % of light is left.
+  /// Meteorological optical range, m: at which 5 % of the light is left.
   double visibility = 200.0;
   double rate = 10.0;  ///< Precipitation, mm of water per hour.
 };
@@ -69,7 +69,7 @@ class Weather {
     double strength = 0.0;  ///< As of `target`.
   };
   /// The strongest one before `range` m, by two uniforms in [0, 1): for fog they are where within
-  /// its peak, for drops how strong the strongest is and where. None where nothing comes back.
+  /// its peak, for drops how strong the strongest is and where. None if nothing comes back.
   [[nodiscard]] std::optional<Soft> soft(double range, double first, double second) const;
 
  private:

@@ -11,7 +11,7 @@
 
 namespace pointflight {
 
-/// What was seen or met: 0 the map, from 1 on the vehicles, from `kFirstObstacle` on the obstacles.
+/// What was seen or hit: 0 the map, from 1 on the vehicles, from `kFirstObstacle` on the obstacles.
 using Label = std::uint32_t;
 inline constexpr Label kMapLabel = 0;      ///< The map.
 inline constexpr Label kFirstVehicle = 1;  ///< Label of vehicle 0.

@@ -62,7 +62,7 @@ struct TreeInput {
 /// Builds the hierarchy over surfels sorted by Morton code: a node starts with its range and splits
 /// the child with the most surfels at its highest differing key bit until it has eight children;
 /// eight surfels or fewer within 13 voxels make a leaf. `kHigh` does so down to about 100,000
-/// surfels, and below opens the child with the largest box and splits where the surface area
+/// surfels, and below opens the child with the largest box and splits if the surface area
 /// heuristic says. Does not depend on threads.
 Bvh8 build_bvh8(const TreeInput& input,
                 TreeQuality quality,

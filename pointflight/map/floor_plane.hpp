@@ -24,7 +24,7 @@ struct FloorPlane {
   [[nodiscard]] Pose levelling() const;
 };
 
-/// Nothing where no such surface stands out. Does not depend on threads.
+/// Nothing if no such surface stands out. Does not depend on threads.
 std::optional<FloorPlane> find_floor(std::span<const SurfelWord> words,
                                      const Vector3d& origin_world,
                                      double resolution);

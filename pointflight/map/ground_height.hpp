@@ -22,10 +22,10 @@ class GroundHeight {
   /// Adds a finite point of the world, m.
   void add(const Vector3d& point);
 
-  /// To be called once, when all points are there. Throws InputError where there were none.
+  /// To be called once, when all points are there. Throws InputError if there were none.
   void finish();
 
-  /// Height of the ground under a place; that of the nearest column where the place has none.
+  /// Height of the ground under a place; that of the nearest column if the place has none.
   [[nodiscard]] double at(double x, double y) const;
 
  private:

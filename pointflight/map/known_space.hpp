@@ -38,16 +38,16 @@ class KnownSpace {
   /// A view of a section's bytes, which must outlive it; nullopt if they are malformed.
   static std::optional<KnownSpace> from_section(std::span<const std::byte> section);
 
-  /// True where the survey saw the point's cell; false outside the grid.
+  /// True if the survey saw the point's cell; false outside the grid.
   [[nodiscard]] bool known(const Vector3d& point_world) const;
 
-  /// How far a ray goes until it enters a cell that is not known, m; `range` where it does not
+  /// How far a ray goes until it enters a cell that is not known, m; `range` if it does not
   /// before. `direction_world` is a unit vector.
   [[nodiscard]] double known_along(const Vector3d& origin_world,
                                    const Vector3d& direction_world,
                                    double range) const;
 
-  /// True where a beam reached a surface at `range` through what is known. The last cell's width
+  /// True if a beam reached a surface at `range` through what is known. The last cell's width
   /// does not count: a surface lies in cells that rays ended in, and beside others.
   [[nodiscard]] bool is_seen_through(const Vector3d& origin_world,
                                      const Vector3d& direction_world,

@@ -115,7 +115,7 @@ Layout lay_out(const Bvh8& tree, const MapDescription& d) {
   return layout;
 }
 
-/// The table of sections of a file whose header is whole. Empty where it has more than fit.
+/// The table of sections of a file whose header is whole. Empty if it has more than fit.
 std::vector<MapSection> table_of(std::span<const std::byte> bytes, const MapHeader& header) {
   std::vector<MapSection> table;
   const std::byte* at = bytes.data() + sizeof header;
@@ -167,7 +167,7 @@ class OwnedSurfelMap : public SurfelMap {
   std::vector<Line> storage_;
 };
 
-/// `fail(byte, what)` where sections are named twice, or lie elsewhere than in the file.
+/// `fail(byte, what)` if sections are named twice, or lie elsewhere than in the file.
 template <class Fail>
 void check_sections(std::span<const MapSection> sections,
                     std::span<const std::byte> bytes,
@@ -195,7 +195,7 @@ void check_sections(std::span<const MapSection> sections,
   }
 }
 
-/// False where a parameter is none.
+/// False if a parameter is none.
 bool is_sane(const MapHeader& header) {
   bool finite = std::isfinite(header.intensity_offset) && std::isfinite(header.intensity_step);
   for (int axis = 0; axis < 3; ++axis) finite = finite && std::isfinite(header.origin[axis]);

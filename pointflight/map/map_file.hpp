@@ -37,7 +37,7 @@ inline constexpr double kMaxResolution = 1e6;          ///< m
 /// A MapSection of version 1: nodes, words, intensity, metadata.
 struct MapSectionV1 {
   std::uint64_t offset;    ///< As above.
-  std::uint64_t size;      ///< Bytes; zero where there is none.
+  std::uint64_t size;      ///< Bytes; zero if there is none.
   std::uint64_t checksum;  ///< As above.
 };
 /// The sections of version 1, in their order.

@@ -90,10 +90,10 @@ class SurfelMap {
   /// A section of the file by its name, empty without one: for what this class does not know.
   [[nodiscard]] std::span<const std::byte> section(std::string_view name) const;
 
-  /// What space the survey saw that the map was fitted to; null where the file does not say.
+  /// What space the survey saw that the map was fitted to; null if the file does not say.
   [[nodiscard]] const KnownSpace* known_space() const { return known_ ? &*known_ : nullptr; }
 
-  /// Reflectivity of its surfaces per unit of intensity; 0 where it does not say.
+  /// Reflectivity of its surfaces per unit of intensity; 0 if it does not say.
   [[nodiscard]] double reflectivity_per_intensity() const { return reflectivity_; }
 
   /// How the map was made, as JSON text.
@@ -127,7 +127,7 @@ class SurfelMap {
   }
 
   /// The nearest surfel within `max_distance` of a point: distance to its oriented box with half
-  /// sides sqrt(3) s_k (r / 2 for a filled cell). Nothing where all are farther, or where the point
+  /// sides sqrt(3) s_k (r / 2 for a filled cell). Nothing if all are farther, or if the point
   /// or the distance is NaN.
   [[nodiscard]] std::optional<Nearest> nearest(const Vector3d& point_world,
                                                double max_distance) const;
@@ -172,7 +172,7 @@ class SurfelMap {
   double reflectivity_ = 0.0;
 };
 
-/// What space the map's survey saw. Throws InputError where the map does not say.
+/// What space the map's survey saw. Throws InputError if the map does not say.
 const KnownSpace& known_space_of(const SurfelMap& map);
 
 }  // namespace pointflight

@@ -18,10 +18,10 @@ struct FilmOptions {
 
 /// Films a finished run: the map, vehicles with their arms and propellers, obstacles, the last scan
 /// and the flown way, from behind and above a vehicle, rendered as scans are. Returns how many
-/// pictures. Throws InputError, also where the run has no such vehicle.
+/// pictures. Throws InputError, also if the run has no such vehicle.
 std::size_t film_run(RecordedRun& run, const FilmOptions& options, const Progress& progress);
 
-/// Makes a video of such a folder's pictures by ffmpeg. Throws InputError, also where that is not
+/// Makes a video of such a folder's pictures by ffmpeg. Throws InputError, also if that is not
 /// installed.
 void make_video(const FilmOptions& options, const std::string& path);
 

@@ -14,7 +14,7 @@ class MapLayers {
   /// Looks at all surfels of the map once.
   explicit MapLayers(const SurfelMap& map);
 
-  /// True where something level hangs over most of the area.
+  /// True if something level hangs over most of the area.
   [[nodiscard]] bool has_ceiling() const { return has_ceiling_; }
 
   /// True for what belongs to the ceiling, or hangs from it.

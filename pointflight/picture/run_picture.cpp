@@ -77,7 +77,7 @@ void RunPicture::add_scan(const ScanSample& sample) {
 }
 
 void RunFigures::add_closest(std::optional<double> distance) {
-  // what was met is at zero, however deep
+  // what was hit is at zero, however deep
   if (distance) closest = std::max(0.0, std::min(closest.value_or(*distance), *distance));
 }
 

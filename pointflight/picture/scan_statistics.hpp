@@ -25,7 +25,7 @@ struct ScanStatistics {
   ///@}
   double along_ring = 0.0;  ///< Between successive beams of a ring or line, median.
   double nearest = 0.0;     ///< From a beam to its nearest neighbour, median.
-  /// Between neighbouring rings, least and greatest; only where each has one elevation.
+  /// Between neighbouring rings, least and greatest; only if each has one elevation.
   std::optional<std::pair<double, double>> between_rings;
 };
 

@@ -40,7 +40,7 @@ double middle_of(std::size_t range) {
   return 0.5 * (SensorComparison::kRanges[range] + SensorComparison::kRanges[range + 1]);
 }
 
-/// Of a class of incidences by range; nothing where too few beams tell.
+/// Of a class of incidences by range; nothing if too few beams tell.
 Points shares_of(const SensorComparison& comparison,
                  const IncidenceClass& of,
                  double Sides::*side,

@@ -31,7 +31,7 @@ class Reading {
     }
   }
 
-  /// The record at `at`, which moves on; false where there is no whole one, and after the footer.
+  /// The record at `at`, which moves on; false if there is no whole one, and after the footer.
   bool step(std::span<const std::byte> bytes, std::size_t& at, bool in_chunk) {
     if (ended_ || bytes.size() - at < mcap::kRecordHead) return false;
     const auto opcode = static_cast<Opcode>(bytes[at]);

@@ -22,7 +22,7 @@ struct RecordedMessage {
 
 /// Reads all messages of an MCAP file in the order in which they lie there, from its chunks: of a
 /// file that was cut anywhere, all whole chunks. Chunks with a wrong checksum are left out.
-/// Throws InputError where it is no MCAP file.
+/// Throws InputError if it is no MCAP file.
 RecordingInfo read_mcap(const std::string& path,
                         const std::function<void(const RecordedMessage&)>& on_message = {});
 
@@ -32,10 +32,10 @@ RecordingInfo read_mcap_bytes(std::span<const std::byte> bytes,
                               const std::function<void(const RecordedMessage&)>& on_message = {});
 
 /// The same messages one after the other, of several files as one: rosbag2 splits what is long.
-/// Throws InputError where one is no MCAP file.
+/// Throws InputError if one is no MCAP file.
 std::unique_ptr<MessageReader> open_mcap(const std::vector<std::string>& paths);
 
-/// The data of an attachment of a file. Throws InputError where there is none of this name.
+/// The data of an attachment of a file. Throws InputError if there is none of this name.
 std::string read_mcap_attachment(const std::string& path, const std::string& attachment);
 
 }  // namespace pointflight

@@ -88,7 +88,7 @@ struct Piece {
 /// What is known of a file without its messages.
 class Outline {
  public:
-  /// Throws InputError where its types are too long to be true.
+  /// Throws InputError if its types are too long to be true.
   Outline(std::span<const std::byte> bytes, const std::string& name, const Progress& progress)
       : name_(name) {
     each_record(bytes, [&](Opcode opcode, std::span<const std::byte> content) {
@@ -287,7 +287,7 @@ class McapTimeline : public TimedRecording {
     };
     std::map<std::size_t, Last> last;
     for (std::size_t i = pieces.size(); i-- > 0 && !wanted.empty();) {
-      // pieces overlap: one is the last where none that is left comes up to it
+      // pieces overlap: one is the last if none that is left comes up to it
       std::erase_if(wanted, [&](std::size_t channel) {
         const auto found = last.find(channel);
         return found != last.end() && found->second.message.time > reach[i];
@@ -337,7 +337,7 @@ class McapTimeline : public TimedRecording {
     });
   }
 
-  /// Null where there is nothing to unpack, or it does not.
+  /// Null if there is nothing to unpack, or it does not.
   Unpacked unpack(const Piece& piece) {
     if (!piece.chunk) return nullptr;
     auto bytes = mcap::unpack(*piece.chunk);
@@ -369,7 +369,7 @@ class McapTimeline : public TimedRecording {
     });
   }
 
-  std::unique_ptr<MappedFile> file_;  ///< None where the bytes are somebody else's.
+  std::unique_ptr<MappedFile> file_;  ///< None if the bytes are somebody else's.
   Outline outline_;
   std::pair<std::int64_t, std::int64_t> range_;
   std::int64_t from_ = std::numeric_limits<std::int64_t>::min();

@@ -22,7 +22,7 @@ struct McapOptions {
 /// The same messages give the same bytes.
 class McapWriter : public Outlet {
  public:
-  /// Throws InputError where the file cannot be written.
+  /// Throws InputError if the file cannot be written.
   explicit McapWriter(const std::string& path, const McapOptions& options = {});
   ~McapWriter() override;
 

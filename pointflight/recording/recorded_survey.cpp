@@ -23,7 +23,7 @@ constexpr double kAbsoluteFrom = 1e3;   // s: smaller times of points are after 
 constexpr std::size_t kBatch = 100000;  // points
 constexpr std::size_t kLongest = 255;   // characters of a name in ROS
 
-/// A message of a type, whatever wire it came over. Throws InputError where it is none.
+/// A message of a type, whatever wire it came over. Throws InputError if it is none.
 template <class M>
 M decoded(Wire wire, const Recorded& message, const std::string& recording, bool is_head = false) {
   const std::span bytes(message.data, message.size);
@@ -116,7 +116,7 @@ struct RecordingContents {
   };
   struct Poses {
     std::string fixed_frame;
-    std::string frame;  ///< Of what moves; empty where the messages do not say.
+    std::string frame;  ///< Of what moves; empty if the messages do not say.
     std::vector<TimedPose> poses;
   };
   std::map<std::string, Clouds> clouds;        ///< By topic.
@@ -175,7 +175,7 @@ void RecordingContents::add(Wire wire, const Recorded& message, const std::strin
   }
 }
 
-/// T_from_to by /tf_static; nothing where they are not joined there.
+/// T_from_to by /tf_static; nothing if they are not joined there.
 std::optional<Pose> RecordingContents::between(const std::string& from,
                                                const std::string& to) const {
   const auto climb = [&](std::string frame) {

@@ -24,7 +24,7 @@ struct RecordedSurveyOptions {
   std::string cloud_topic;  ///< PointCloud2 or CustomMsg; empty: the only one.
   std::string pose_topic;   ///< Odometry or PoseStamped; empty: the only one.
   std::string poses;        ///< A file of poses of the sensor instead; empty: the pose topic.
-  /// Where the sensor is in the frame that the poses are of. Nothing: by /tf_static where the
+  /// Where the sensor is in the frame that the poses are of. Nothing: by /tf_static if the
   /// clouds' frame is another than the poses'.
   std::optional<Pose> T_pose_sensor;
   bool is_deskewed = false;  ///< Times of points are left aside.

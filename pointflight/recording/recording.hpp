@@ -14,7 +14,7 @@ struct RecordingRequest {
   bool overwrite = false;  ///< What is there already, complete or cut short.
 };
 
-/// Throws InputError where a recording cannot be made: the path is a folder or no regular file, or
+/// Throws InputError if a recording cannot be made: the path is a folder or no regular file, or
 /// something is there and shall not be overwritten.
 void check_recording(const RecordingRequest& request);
 

@@ -23,7 +23,7 @@ struct Scene {
 /// The rays of one scan and what a renderer that makes images needs to lay them out.
 struct RayBatch {
   std::span<const Ray> rays;  ///< World; those of a snapshot may differ in origin.
-  /// The rays' `direction_order`, or empty: the renderer finds it where it needs one. For patterns
+  /// The rays' `direction_order`, or empty: the renderer finds it if it needs one. For patterns
   /// that repeat.
   std::span<const std::uint32_t> order;
   /// Where the sensor is and how it is turned: middle of the scan for a moving one. Renderers that
@@ -44,22 +44,22 @@ struct RayBatch {
   }
 };
 
-/// Rays that stand for one beam where `RenderJob::nearest` is asked for.
+/// Rays that stand for one beam if `RenderJob::nearest` is asked for.
 inline constexpr std::size_t kSubRays = 8;
 
 /// No surfel of the map.
 inline constexpr std::uint32_t kNoSurfel = 0xffffffffu;
 
-/// What a ray met.
+/// What a ray hit.
 struct Hit {
-  float range = -1.0f;         ///< Metres along the ray; negative where it met nothing.
+  float range = -1.0f;         ///< Metres along the ray; negative if it hit nothing.
   float cos_incidence = 0.0f;  ///< |cos| of the angle between the ray and the surface normal.
-  float intensity = 0.0f;      ///< The cloud's own scale; 0 where it had none.
+  float intensity = 0.0f;      ///< The cloud's own scale; 0 if it had none.
   Label label = kMapLabel;     ///< What it is of.
   /// Of the map, which gave most of the return: its index in `SurfelMap::words()`; `kNoSurfel` of
   /// bodies and where the renderer does not say.
   std::uint32_t surfel = kNoSurfel;
-  /// False: it met nothing within its range.
+  /// False: it hit nothing within its range.
   [[nodiscard]] bool is_return() const { return range >= 0.0f; }
 };
 
@@ -128,7 +128,7 @@ struct RendererKind {
 };
 
 /// Makes a renderer by name ("beam", "paper") for a scene. Throws InputError that lists the names,
-/// and std::invalid_argument where the scene has no map.
+/// and std::invalid_argument if the scene has no map.
 std::unique_ptr<Renderer> make_renderer(const std::string& name, const Scene& scene);
 
 }  // namespace pointflight

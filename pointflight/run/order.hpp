@@ -35,7 +35,7 @@ struct SkipOrder {
   SimTime to;  ///< Of the run; later than it is.
 };
 /// Of a shared run that lags a little: from now on every instant is due earlier by `by`.
-struct HurryOrder {
+struct ShiftPaceOrder {
   Duration by{0};  ///< Of the wall clock.
 };
 
@@ -49,6 +49,6 @@ using Order = std::variant<VehicleOrder,
                            RateOrder,
                            SeekOrder,
                            SkipOrder,
-                           HurryOrder>;
+                           ShiftPaceOrder>;
 
 }  // namespace pointflight

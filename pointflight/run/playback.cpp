@@ -58,7 +58,7 @@ class Player {
   }
 
   [[nodiscard]] bool is_over() const {
-    return (options_.interrupted && options_.interrupted()) || is_deserted(links_);
+    return (options_.interrupted && options_.interrupted()) || nobody_listens(links_);
   }
 
   void take_orders() {

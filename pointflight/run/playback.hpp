@@ -27,7 +27,7 @@ struct PlaybackOptions {
   std::function<bool()> interrupted;  ///< True once the user wants it to end.
   /// Pause, step, rate and seek are obeyed, and at its end it stands still until it is interrupted.
   bool controlled = false;
-  /// Called when it starts, stands still, goes on, jumps; where it is controlled.
+  /// Called when it starts, stands still, goes on, jumps; if it is controlled.
   std::function<void(const PlaybackStatus&)> on_status;
 };
 

@@ -97,7 +97,7 @@ struct RecordedRun::Files {
     add_scans(v, folder);
   }
 
-  /// Null where the run wrote no such file, or nothing but its columns' names.
+  /// Null if the run wrote no such file, or nothing but its columns' names.
   const CsvTable* table(const fs::path& path, std::size_t columns) {
     if (!has_rows(path)) return nullptr;
     const CsvTable& t = tables.emplace_back(path.string());

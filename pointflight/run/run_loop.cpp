@@ -95,7 +95,7 @@ void RunLoop::add(Link& link) {
   links_.push_back(&link);
 }
 
-bool is_deserted(std::span<Link* const> links) {
+bool nobody_listens(std::span<Link* const> links) {
   const bool used = std::any_of(links.begin(), links.end(), [](Link* l) { return l->is_in_use(); });
   return (!links.empty() && !used) ||
          std::any_of(links.begin(), links.end(), [](Link* l) { return l->is_over(); });
@@ -107,7 +107,7 @@ bool wait_until_ready(std::span<Link* const> links,
   for (;;) {
     const bool ready =
         std::all_of(links.begin(), links.end(), [](Link* l) { return l->is_ready(); });
-    if (is_deserted(links)) return false;
+    if (nobody_listens(links)) return false;
     if (ready) return true;  // an interrupt now ends a run that has begun
     if (is_over()) return false;
     for (Link* link : links) link->on_wait(now, Waiting::kForLinks);
@@ -176,7 +176,7 @@ std::uint64_t RunLoop::dropped() const {
 }
 
 bool RunLoop::is_over() const {
-  return ended_ || (options_.interrupted && options_.interrupted()) || is_deserted(links_);
+  return ended_ || (options_.interrupted && options_.interrupted()) || nobody_listens(links_);
 }
 
 void RunLoop::after_step(double took) {
@@ -242,7 +242,7 @@ void RunLoop::obey(Link& link, const Order& order) {
   } else if (const auto* skip = std::get_if<SkipOrder>(&order)) {
     simulation_.skip_to(skip->to);
     pace_.restart_at(skip->to);
-  } else if (const auto* hurry = std::get_if<HurryOrder>(&order)) {
+  } else if (const auto* hurry = std::get_if<ShiftPaceOrder>(&order)) {
     pace_.hurry(hurry->by);
   }
 }

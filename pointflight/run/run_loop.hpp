@@ -23,9 +23,9 @@ class Pace {
 
   /// From here on: at the start, after a pause.
   void restart_at(SimTime time);
-  /// How long ago an instant was due, s; nothing where the run is not held back.
+  /// How long ago an instant was due, s; nothing if the run is not held back.
   [[nodiscard]] std::optional<double> late(SimTime time) const;
-  /// The instant that is due at a time of the wall clock; nothing where the run is not held back.
+  /// The instant that is due at a time of the wall clock; nothing if the run is not held back.
   [[nodiscard]] std::optional<SimTime> due_at(std::chrono::steady_clock::time_point wall) const;
   /// From here on each instant is due so much earlier.
   void hurry(Duration by) { start_ -= by; }
@@ -95,14 +95,14 @@ class RunLoop {
   /// before the first step it closes none. Throws what links and simulation throw.
   RunEnd run();
 
-  /// False where it was interrupted before its first step.
+  /// False if it was interrupted before its first step.
   [[nodiscard]] bool has_started() const { return has_started_; }
   /// Since the first step by the wall clock, s.
   [[nodiscard]] double wall_time() const;
   /// Where the run should be at a time of the wall clock; nothing before its first step, and where
   /// it is not held to the wall clock. From the loop's thread.
   [[nodiscard]] std::optional<SimTime> due_at(std::chrono::steady_clock::time_point wall) const;
-  /// From a scan's end until it was handed over, where the run is held to the wall clock.
+  /// From a scan's end until it was handed over, if the run is held to the wall clock.
   [[nodiscard]] const ScanDelays& scan_delays() const { return delays_; }
   /// How often lockstep waited in vain for an answer.
   [[nodiscard]] std::uint64_t unanswered() const { return unanswered_; }
@@ -146,10 +146,10 @@ class RunLoop {
   bool said_rejected_ = false;
 };
 
-/// True where nobody gets anything of a run, or a link ends it.
-[[nodiscard]] bool is_deserted(std::span<Link* const> links);
+/// True if nobody gets anything of a run, or a link ends it.
+[[nodiscard]] bool nobody_listens(std::span<Link* const> links);
 
-/// Waits for links that were opened, at time `now` of the run. False where the run is over before
+/// Waits for links that were opened, at time `now` of the run. False if the run is over before
 /// its first step: deserted, or `is_over` while somebody was not ready.
 [[nodiscard]] bool wait_until_ready(std::span<Link* const> links,
                                     SimTime now,

@@ -70,7 +70,7 @@ std::uint64_t ThreadedLink::dropped() const {
 }
 
 /// Steps without samples between them, looks while the run waits: the later one says it all, but
-/// for the scans of the earlier. False where both have to stay.
+/// for the scans of the earlier. False if both have to stay.
 bool ThreadedLink::merge(const Event& earlier, Event& later) {
   if (earlier.index() != later.index()) return false;
   if (auto* step = std::get_if<StepDone>(&later)) {

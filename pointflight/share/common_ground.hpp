@@ -13,16 +13,16 @@ namespace pointflight {
 /// Names and places of files do not matter, nor does what a process writes and how long it flies.
 std::vector<share_msg::Part> common_ground(const Simulation& simulation, double rate);
 
-/// True where a run of `earlier`, as its folder has it (`write_scenario_copy`), was one of this
+/// True if a run of `earlier`, as its folder has it (`write_scenario_copy`), was one of this
 /// simulation's scenario and map; models of the same name count as the same.
 bool was_run_of(const Scenario& earlier, const Simulation& simulation);
 
-/// True where two have the same names in the same order.
+/// True if two have the same names in the same order.
 bool describes_alike(const std::vector<share_msg::Part>& theirs,
                      const std::vector<share_msg::Part>& ours);
 
 /// How two that describe alike differ, in words: "another map (4f0c there, 77ab here)"; nothing
-/// where they do not.
+/// if they do not.
 std::optional<std::string> difference(const std::vector<share_msg::Part>& theirs,
                                       const std::vector<share_msg::Part>& ours);
 

@@ -83,7 +83,7 @@ void FleetShare::introduce(Phase phase) {
   intro.stops = simulation_.end() == RunEnd::kCollision;
   intro.ends_at = to_ns(now_);
   introduced_at_ = options_.steady();
-  transport_.send(ShareChannel::kCrew, bytes_of(intro));
+  transport_.send(ShareChannel::kMembers, bytes_of(intro));
 }
 
 /// While joining: whoever could not take this process at first may have changed its mind.
@@ -259,7 +259,7 @@ void FleetShare::refuse_or_warn(Peer& peer, const std::string& what, bool refuse
 }
 
 /// A process is gone: who could not be taken beside it may fit now.
-void FleetShare::look_again_at_the_rest() {
+void FleetShare::recheck_other_peers() {
   for (auto& [id, peer] : peers_) {
     if (peer.fits || peer.gone || peer.intro.phase == Phase::kLeft) continue;
     check(peer);

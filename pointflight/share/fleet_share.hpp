@@ -10,7 +10,7 @@
 
 #include "pointflight/share/clock_estimate.hpp"
 #include "pointflight/share/messages.hpp"
-#include "pointflight/share/other_track.hpp"
+#include "pointflight/share/remote_track.hpp"
 #include "pointflight/share/share_setup.hpp"
 #include "pointflight/share/share_transport.hpp"
 #include "pointflight/share/shared_step.hpp"
@@ -47,9 +47,9 @@ class FleetShare : public EndingAgreement {
   /// the others.
   void take_part(Simulation& simulation);
   /// Before the run: introduces itself and looks for others; true once it may start. Throws
-  /// InputError where another process flies one of its vehicles, or in another world.
+  /// InputError if another process flies one of its vehicles, or in another world.
   bool is_ready();
-  /// While it is ready: where the others' clocks are; the start of time where nobody flies yet.
+  /// While it is ready: where the others' clocks are; the start of time if nobody flies yet.
   [[nodiscard]] SimTime time_of_others() const;
   /// What has to be done to be where the others are.
   struct Adjustment {
@@ -110,7 +110,7 @@ class FleetShare : public EndingAgreement {
   };
   /// A vehicle of another process.
   struct Other {
-    OtherTrack track;
+    RemoteTrack track;
     std::uint64_t process = 0;  ///< Who flies it.
     std::uint32_t flags = 0;
     bool seen = false;   ///< It has been there.
@@ -151,7 +151,7 @@ class FleetShare : public EndingAgreement {
   void refuse_or_warn(Peer& peer, const std::string& what, bool refuses);
   [[nodiscard]] bool is_older(const Peer& peer) const;
   [[nodiscard]] Peer* peer_of(std::uint64_t process, std::uint64_t writer);
-  void look_again_at_the_rest();
+  void recheck_other_peers();
   void keep_introducing();
   [[nodiscard]] bool has_sane_shape(const share_msg::Introduction& intro) const;
   [[nodiscard]] std::vector<std::string> missing_vehicles() const;
@@ -186,7 +186,7 @@ class FleetShare : public EndingAgreement {
   void send_past(Peer& peer);
   void look_back_if_asked(Peer& peer);
   void look_back(Peer& peer);
-  void find_missed(std::uint32_t number, const OtherTrack& track);
+  void find_missed(std::uint32_t number, const RemoteTrack& track);
   void give_up_past();
 
   const Simulation& simulation_;

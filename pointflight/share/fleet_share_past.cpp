@@ -14,7 +14,7 @@ using share_msg::Kind;
 
 constexpr Duration kPastPatience = std::chrono::seconds(2);
 constexpr std::size_t kPastMost = 24'000;                         // states in one message
-constexpr Duration kPastSpacing = std::chrono::milliseconds(50);  // at most, where there are more
+constexpr Duration kPastSpacing = std::chrono::milliseconds(50);  // at most, if there are more
 
 }  // namespace
 
@@ -67,7 +67,7 @@ void FleetShare::look_back_if_asked(Peer& peer) {
 
 /// What a process says of its past, of those of its vehicles that were lost and are back.
 void FleetShare::look_back(Peer& peer) {
-  std::map<std::uint32_t, OtherTrack> tracks;
+  std::map<std::uint32_t, RemoteTrack> tracks;
   for (const share_msg::PastState& state : peer.past->states) {
     const auto& its = peer.intro.vehicles;
     const RigidBodyState body = body_of(state.state);
@@ -83,7 +83,7 @@ void FleetShare::look_back(Peer& peer) {
 }
 
 /// Contacts of own vehicles with one that was not heard of.
-void FleetShare::find_missed(std::uint32_t number, const OtherTrack& track) {
+void FleetShare::find_missed(std::uint32_t number, const RemoteTrack& track) {
   Other& other = others_[number];
   // what is forgotten by now may have had contacts in it
   const SimTime known_from = std::max(past_.front().time, track.oldest());

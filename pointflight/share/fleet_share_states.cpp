@@ -63,7 +63,7 @@ void FleetShare::lose(Peer& peer, const char* kind, const std::string& words) {
     if (!left) ++other.report.losses;
     note(v, kind, fmt::format("{} {}{}", peer.intro.name, words, then));
   }
-  look_again_at_the_rest();
+  recheck_other_peers();
 }
 
 void FleetShare::watch_silence() {

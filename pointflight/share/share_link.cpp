@@ -18,7 +18,7 @@ bool ShareLink::is_ready() {
 std::vector<Order> ShareLink::take_orders() {
   const FleetShare::Adjustment adjustment = share_.keep_time();
   if (adjustment.skip > Duration{0}) return {SkipOrder{simulation_.time() + adjustment.skip}};
-  if (adjustment.hurry > Duration{0}) return {HurryOrder{adjustment.hurry}};
+  if (adjustment.hurry > Duration{0}) return {ShiftPaceOrder{adjustment.hurry}};
   return {};
 }
 

@@ -35,7 +35,7 @@ struct ShareSetup {
 /// The keys of `share`.
 void describe(SettingsVisitor& visitor, ShareSetup& setup);
 
-/// What a scenario says of sharing; the defaults where it says nothing.
+/// What a scenario says of sharing; the defaults if it says nothing.
 const ShareSetup& share_setup_of(const Scenario& scenario);
 
 }  // namespace pointflight

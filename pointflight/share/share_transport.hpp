@@ -12,20 +12,20 @@ namespace pointflight {
 
 /// What goes between processes that share a run, by how it has to arrive.
 enum class ShareChannel : std::uint8_t {
-  kCrew,    ///< Introductions: reliable; the last one is kept for late joiners.
-  kStates,  ///< States: the newest counts; in lockstep reliably and all.
-  kClock,   ///< Clocks: late is useless.
-  kPast,    ///< Pasts: reliably.
+  kMembers,  ///< Introductions: reliable; the last one is kept for late joiners.
+  kStates,   ///< States: the newest counts; in lockstep reliably and all.
+  kClock,    ///< Clocks: late is useless.
+  kPast,     ///< Pasts: reliably.
 };
 /// How many there are.
 inline constexpr std::size_t kShareChannels = 4;
 
 /// Something that came from another process.
 struct ShareArrival {
-  ShareChannel channel = ShareChannel::kCrew;  ///< Which topic.
-  std::vector<std::byte> bytes;                ///< Empty: `writer` is lost, its lease has run out.
-  std::uint64_t writer = 0;  ///< Who wrote it, on whatever channel: not what the bytes say.
-  std::int64_t at = 0;       ///< When it came, ns of the steady clock.
+  ShareChannel channel = ShareChannel::kMembers;  ///< Which topic.
+  std::vector<std::byte> bytes;  ///< Empty: `writer` is lost, its lease has run out.
+  std::uint64_t writer = 0;      ///< Who wrote it, on whatever channel: not what the bytes say.
+  std::int64_t at = 0;           ///< When it came, ns of the steady clock.
 };
 
 /// Messages between processes, by DDS or in memory. `take` and `wait` from one thread.

@@ -46,7 +46,7 @@ std::string_view to_string(FaultKind kind);
 /// The keys of one entry of `faults`.
 void describe(SettingsVisitor& visitor, FaultSettings& settings);
 
-/// Calls `fail` with the key and what is wrong where values make no sense together.
+/// Calls `fail` with the key and what is wrong if values make no sense together.
 void check(const FaultSettings& settings,
            const std::function<void(const char* key, const std::string& what)>& fail);
 

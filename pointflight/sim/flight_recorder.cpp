@@ -6,7 +6,7 @@
 #include <fstream>
 
 #include "pointflight/core/input_error.hpp"
-#include "pointflight/sim/ended_run.hpp"
+#include "pointflight/sim/interrupted_run.hpp"
 #include "pointflight/sim/run_summary.hpp"
 #include "pointflight/sim/scenario_copy.hpp"
 

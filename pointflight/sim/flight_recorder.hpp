@@ -12,7 +12,7 @@
 
 namespace pointflight {
 
-/// Writes a run into a folder. For each vehicle, in the folder itself where there is only one and
+/// Writes a run into a folder. For each vehicle, in the folder itself if there is only one and
 /// in one of its name else: trajectory.csv, trajectory.tum, imu.csv, odometry.csv, `<kind>.csv` of
 /// own sensors, scans.csv and `scans/<lidar>_<number>.pcd`. For all: scenario.yaml with what it
 /// needs (scenario_copy.hpp), events.csv, obstacles.csv and at last summary.json. Files appear when

@@ -57,7 +57,7 @@ class MountedLidar : public IntervalSensor {
 
   /// `mount` of the scenario; `site.sensor`: its number among the vehicle's LiDARs, of which
   /// `lidar` has been told. Map and faults
-  /// must outlive it. Throws InputError where it is to mark what the map does not say.
+  /// must outlive it. Throws InputError if it is to mark what the map does not say.
   MountedLidar(const LidarMount& mount,
                Lidar lidar,
                const SensorSite& site,
@@ -74,7 +74,7 @@ class MountedLidar : public IntervalSensor {
   /// From the sensor's axes to the body's.
   [[nodiscard]] const Pose& T_body_sensor() const { return T_body_sensor_; }
 
-  /// True where all beams of a scan leave from one pose.
+  /// True if all beams of a scan leave from one pose.
   [[nodiscard]] bool takes_snapshots() const { return snapshot_ || renderer_->is_snapshot(); }
 
   /// What its points say besides.

@@ -19,7 +19,7 @@ constexpr const char* kStaging = ".partial";
 constexpr const char* kKilled = ".killed";
 constexpr const char* kLast = "summary.json";
 
-/// Makes a folder; true where it was not there.
+/// Makes a folder; true if it was not there.
 bool make_folder(const std::string& folder) {
   std::error_code error;
   if (fs::exists(folder, error) && !fs::is_directory(folder, error)) {
@@ -96,7 +96,7 @@ RunFolder::RunFolder(std::string path, Existing existing) : path_(std::move(path
   earlier_ = earlier_run_in(*folder_);
   require_owned(*folder_, kStaging);
   require_owned(*folder_, kKilled);
-  // where something is set aside already, the run that did it had no time to begin
+  // if something is set aside already, the run that did it had no time to begin
   if (folder_->entry(kKilled) == Entry::kNothing) {
     static_cast<void>(folder_->rename(kStaging, *folder_, kKilled));
   }

@@ -9,7 +9,7 @@
 
 namespace pointflight {
 
-/// What to do where an output is there already.
+/// What to do if an output is there already.
 enum class Existing { kRefuse, kReplace };
 
 /// Where the files of a run are until it is whole: a folder within the run's.
@@ -38,17 +38,17 @@ bool remove_run(const Folder& parent, const std::string& name);
 /// or `commit`: a process that is to go on from it may end before it has begun.
 class RunFolder : public OutputFolder {
  public:
-  /// Makes the folder. Throws InputError where it cannot be written, where another run is being
-  /// written there, with `kRefuse` where it holds anything, and where `.partial`, `.killed` or
+  /// Makes the folder. Throws InputError if it cannot be written, where another run is being
+  /// written there, with `kRefuse` if it holds anything, and where `.partial`, `.killed` or
   /// `files.txt` in it are not ours.
   explicit RunFolder(std::string path, Existing existing = Existing::kRefuse);
   ~RunFolder() override;
   RunFolder(const RunFolder&) = delete;
   RunFolder& operator=(const RunFolder&) = delete;
 
-  /// As it was given: where the files lie after `commit()`.
+  /// As it was given: if the files lie after `commit()`.
   [[nodiscard]] const std::string& path() const { return path_; }
-  /// The path to write a file of the run to until `commit()`. Throws InputError, also where a file
+  /// The path to write a file of the run to until `commit()`. Throws InputError, also if a file
   /// that no run wrote has its name.
   std::string file(const std::string& name) override;
   std::string link(const std::string& name) override;
@@ -58,7 +58,7 @@ class RunFolder : public OutputFolder {
 
   /// Removes what a killed run left.
   void forget_killed();
-  /// Throws InputError where a file cannot be moved.
+  /// Throws InputError if a file cannot be moved.
   void commit();
 
  private:

@@ -4,8 +4,8 @@
 #include <nlohmann/json.hpp>
 
 #include "pointflight/core/version.hpp"
-#include "pointflight/sim/ended_run.hpp"
 #include "pointflight/sim/flight_recorder.hpp"
+#include "pointflight/sim/interrupted_run.hpp"
 
 namespace pointflight {
 namespace {

@@ -57,14 +57,14 @@ struct Measurement {
   std::vector<double> values;  ///< As the kind's columns say.
 };
 
-/// A vehicle's hull met something, or left it again; said in the step in which it did.
+/// A vehicle's hull hit something, or left it again; said in the step in which it did.
 struct CollisionEvent {
   std::uint32_t vehicle = 0;  ///< Number in the fleet, from 0.
-  Label partner = kMapLabel;  ///< What it met: the map, another vehicle or an obstacle.
-  SimTime time;               ///< Within the step, where it was found.
+  Label partner = kMapLabel;  ///< What it hit: the map, another vehicle or an obstacle.
+  SimTime time;               ///< Within the step, if it was found.
   bool entered = true;        ///< False: it came free again.
   Vector3d vehicle_world = Vector3d::Zero();  ///< The body's origin, m.
-  Vector3d place_world = Vector3d::Zero();    ///< Where it met.
+  Vector3d place_world = Vector3d::Zero();    ///< Where it hit.
   double penetration = 0.0;                   ///< At the end of the step, m.
 };
 
@@ -78,7 +78,7 @@ struct VehicleEvent {
   std::string words;                          ///< One line for users.
   Vector3d vehicle_world = Vector3d::Zero();  ///< The body's origin, m.
   std::optional<Label> partner;               ///< What it is about besides the vehicle.
-  double penetration = 0.0;                   ///< m, with a partner that was met.
+  double penetration = 0.0;                   ///< m, with a partner that was hit.
 };
 
 /// An obstacle at an instant.
@@ -109,7 +109,7 @@ struct StatusSample {
   std::uint64_t collisions = 0;     ///< So far.
   std::uint64_t scans = 0;          ///< Delivered so far.
   std::uint64_t rejected = 0;       ///< Commands that it did not take.
-  std::string last_rejection;       ///< Why; empty where it took all.
+  std::string last_rejection;       ///< Why; empty if it took all.
   std::uint64_t timeouts = 0;       ///< Times that commands stopped coming.
 };
 

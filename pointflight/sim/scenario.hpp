@@ -46,7 +46,7 @@ struct LimitSetup {
   double body_rate_max = 0.0;           ///< rad/s
 };
 
-/// What a vehicle does that met something.
+/// What a vehicle does that hit something.
 enum class CollisionReaction {
   kReport,  ///< Flies on; it is said.
   kStop,    ///< Ends the run.
@@ -85,7 +85,7 @@ struct VehicleSetup {
   EstimateSettings odometry;                                      ///< How its odometry errs.
   ControllerInput controller_input = ControllerInput::kTruth;     ///< Where it takes itself to be.
   LimitSetup limits;                                ///< Tightened or widened for this vehicle.
-  std::vector<LidarMount> lidars = {LidarMount{}};  ///< One is mounted where the file says nothing.
+  std::vector<LidarMount> lidars = {LidarMount{}};  ///< One is mounted if the file says nothing.
   std::vector<SensorSetup> sensors;                 ///< Besides LiDARs, odometry and IMU.
   MissionSettings mission;                          ///< Without waypoints it hovers at its start.
   std::vector<CommandSettings> commands;            ///< By time; the mission comes first, at 0 s.
@@ -150,7 +150,7 @@ struct Scenario {
     return at_key(place(key), key, action);
   }
 
-  /// Opens the map. Throws InputError where it is another than `map_hash` says.
+  /// Opens the map. Throws InputError if it is another than `map_hash` says.
   [[nodiscard]] std::shared_ptr<const SurfelMap> open_map() const;
 };
 

@@ -38,7 +38,7 @@ class Inputs {
     if (is_model_path(setting)) take(setting);
   }
 
-  /// A sensor's file names tables beside it; one of a maker's becomes a sensor file.
+  /// A sensor's file names tables beside it; one of a vendor's becomes a sensor file.
   void take_lidar(std::string& setting) {
     if (!is_model_path(setting)) return;
     const std::string path = resolve_path(setting, from_);

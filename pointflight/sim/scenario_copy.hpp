@@ -13,7 +13,7 @@ namespace pointflight {
 /// profiles, obstacles' clouds, keyframes and trajectories that are given by path; and, under its
 /// own name, a link to the map, whose hash the scenario then demands.
 ///
-/// `final_folder`: where the folder's files will lie in the end; the link is relative to it. The
+/// `final_folder`: if the folder's files will lie in the end; the link is relative to it. The
 /// text depends on the scenario and its files, not on where they or the folder lie. Throws
 /// InputError.
 void write_scenario_copy(const Scenario& scenario,

@@ -27,7 +27,7 @@ std::string box_text(const Aabb& box) {
   return fmt::format("{} and {}", point_text(box.min, 1), point_text(box.max, 1));
 }
 
-Scenario make_scenario(const ScenarioWish& wish, const Executor& executor) {
+Scenario make_scenario(const ScenarioRequest& wish, const Executor& executor) {
   const auto map = SurfelMap::open(wish.map_path);
   const VehicleSettings airframe = load_vehicle(wish.vehicle);
   load_lidar(wish.lidar);  // an unknown sensor is said before the search

@@ -9,21 +9,21 @@
 namespace pointflight {
 
 /// What a scenario is made up from.
-struct ScenarioWish {
+struct ScenarioRequest {
   std::string map_path;              ///< Is opened.
   std::string map_key;               ///< What the scenario says.
   std::string lidar = "mid360";      ///< Name or path of a sensor file.
   std::string vehicle = "quad_330";  ///< Name or path of a vehicle file.
-  double length = 60.0;              ///< Of the mission, where the map allows, m.
+  double length = 60.0;              ///< Of the mission, if the map allows, m.
   double speed = 2.0;                ///< m/s
   std::optional<Vector3d> start;     ///< World, m; else a free place.
   std::optional<Aabb> bounds;        ///< World, m: start and waypoints lie inside.
-  bool mission = true;               ///< Else nothing is looked for where there is a start.
+  bool mission = true;               ///< Else nothing is looked for if there is a start.
 };
 
 /// A scenario for a map: a free start, waypoints and a heading along the first leg. Throws
-/// InputError where no free place is found.
-Scenario make_scenario(const ScenarioWish& wish, const Executor& executor);
+/// InputError if no free place is found.
+Scenario make_scenario(const ScenarioRequest& wish, const Executor& executor);
 
 /// "1.0, 2.0, 3.0 and 4.0, 5.0, 6.0": the corners of a box, for messages.
 std::string box_text(const Aabb& box);

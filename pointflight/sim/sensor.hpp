@@ -55,7 +55,7 @@ class InstantSensor : public Sensor {
   /// a whole.
   [[nodiscard]] virtual std::any memory_at_start() const { return {}; }
 
-  /// True where a measurement comes to nothing: it is not made.
+  /// True if a measurement comes to nothing: it is not made.
   [[nodiscard]] virtual bool loses(std::int64_t /*index*/) const { return false; }
 
   /// One measurement; asked for each number once and in order, but for those that are lost. It may
@@ -100,9 +100,9 @@ class IntervalSensor : public Sensor {
   using Sensor::Sensor;
   /// How far from the body's origin it can see anything, m.
   [[nodiscard]] virtual double reach() const = 0;
-  /// True where the bodies of its input include the vehicle that carries it.
+  /// True if the bodies of its input include the vehicle that carries it.
   [[nodiscard]] virtual bool sees_own_vehicle() const { return false; }
-  /// True where a measurement comes to nothing: it is not made.
+  /// True if a measurement comes to nothing: it is not made.
   [[nodiscard]] virtual bool loses(std::int64_t /*index*/) const { return false; }
   /// What renders its rays; null: it has none.
   [[nodiscard]] virtual const Renderer* renderer() const { return nullptr; }

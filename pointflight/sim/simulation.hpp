@@ -43,7 +43,7 @@ class Simulation {
   /// Of `StatusSample`s, Hz.
   static constexpr double kStatusRate = 10.0;
 
-  /// Throws InputError where the scenario cannot be flown (unknown models, start inside the map,
+  /// Throws InputError if the scenario cannot be flown (unknown models, start inside the map,
   /// far outside of it or in each other, obstacles without room), std::invalid_argument without a
   /// map. The executor must outlive it.
   Simulation(const Scenario& scenario,
@@ -98,7 +98,7 @@ class Simulation {
   /// All that changes, to be copied and kept for `restore`.
   [[nodiscard]] const SimulationState& state() const { return state_; }
   /// Goes on from a state of this simulation or a copy of it: the same bytes as the first time.
-  /// Throws std::invalid_argument where it is of another fleet.
+  /// Throws std::invalid_argument if it is of another fleet.
   void restore(const SimulationState& state);
 
   /// Of the states that `status` has: the start of the next step.

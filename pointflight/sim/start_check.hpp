@@ -17,9 +17,9 @@ void check_names(const Scenario& scenario, const std::vector<VehicleSetup>& flee
 /// Copies stay where numbers in files are taken, too. Throws InputError.
 void check_reach(const Scenario& scenario, const std::vector<VehicleSetup>& fleet);
 
-/// A vehicle where it starts.
+/// A vehicle if it starts.
 struct StartingVehicle {
-  const VehicleAgent* agent = nullptr;  ///< Never null where it is checked.
+  const VehicleAgent* agent = nullptr;  ///< Never null if it is checked.
   Pose T_world_body;                    ///< Its pose at time zero.
 };
 
@@ -27,7 +27,7 @@ struct StartingVehicle {
 /// below, 500 m above. A run ends there.
 bool is_lost(const SurfelMap& map, const Vector3d& p_world);
 
-/// Throws InputError where a vehicle starts inside the map, another vehicle or an obstacle (which
+/// Throws InputError if a vehicle starts inside the map, another vehicle or an obstacle (which
 /// stand where they are at time zero), or lost.
 void check_start_is_free(const Scenario& scenario,
                          const SurfelMap& map,
@@ -37,7 +37,7 @@ void check_start_is_free(const Scenario& scenario,
                          const Executor& executor);
 
 /// What is odd about where vehicles start, in words for the user with file and line: below the
-/// floor, or landed where there is no ground.
+/// floor, or landed if there is no ground.
 std::vector<std::string> start_warnings(const Simulation& simulation, const Executor& executor);
 
 }  // namespace pointflight

@@ -197,7 +197,7 @@ void VehicleAgent::watch_battery(VehicleStatus& status, SimTime now) const {
   note(status, now, "battery_empty", "the battery gives nothing more: its rotors are off");
 }
 
-/// True where something below is as good as touched by a vehicle that is meant to land, or that has
+/// True if something below is as good as touched by a vehicle that is meant to land, or that has
 /// its rotors off.
 bool VehicleAgent::touches_down(const VehicleStatus& status) const {
   const auto& nearest = status.proximity.nearest;

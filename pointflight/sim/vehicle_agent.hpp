@@ -91,8 +91,8 @@ struct VehicleStatus {
 struct MountedSensor {
   const SensorKind* kind;                ///< Null for odometry, IMU and LiDARs.
   std::unique_ptr<const Sensor> sensor;  ///< Never null.
-  const InstantSensor* instant;          ///< The same, where it measures at instants.
-  const IntervalSensor* interval;        ///< The same, where it takes time.
+  const InstantSensor* instant;          ///< The same, if it measures at instants.
+  const IntervalSensor* interval;        ///< The same, if it takes time.
 };
 
 /// One vehicle of a run: everything that does not change, and how its status advances.
@@ -130,7 +130,7 @@ class VehicleAgent {
   /// The state a part of the step later.
   [[nodiscard]] VehicleState state_after(const VehicleStatus& status, double dt) const;
 
-  /// Advances by a step; false where the dynamics diverged.
+  /// Advances by a step; false if the dynamics diverged.
   bool integrate(VehicleStatus& status, double dt) const;
 
   /// As if it had come to a state at `time` with what the scenario told it until then.
@@ -140,7 +140,7 @@ class VehicleAgent {
   /// lost.
   void move_schedules_to(VehicleStatus& status, SimTime time) const;
 
-  /// Its hull met something: what the scenario says happens.
+  /// Its hull hit something: what the scenario says happens.
   void crash(VehicleStatus& status) const;
 
   /// What scans and collisions call it.
@@ -179,7 +179,7 @@ class VehicleAgent {
   /// How long its mission and commands take, s; 0: nothing to do.
   [[nodiscard]] double busy_time() const { return busy_time_; }
 
-  /// What a ray meets on the map; obstacles and vehicles are not looked for.
+  /// What a ray hits on the map; obstacles and vehicles are not looked for.
   [[nodiscard]] Hit look(const Ray& ray) const { return view_->trace(ray); }
 
  private:

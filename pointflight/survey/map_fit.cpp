@@ -18,7 +18,7 @@
 #include "pointflight/map/known_space.hpp"
 #include "pointflight/map/map_file.hpp"
 #include "pointflight/survey/surfel_evidence.hpp"
-#include "pointflight/survey/survey_meetings.hpp"
+#include "pointflight/survey/survey_hits.hpp"
 
 namespace pointflight {
 namespace {
@@ -67,7 +67,7 @@ class FateCounts {
 
 /// A surfel with its standard deviations scaled, its place as it was.
 SurfelWord resized(SurfelWord word, const std::array<double, 3>& factors) {
-  if (factors == std::array{1.0, 1.0, 1.0}) return word;  // axes are rounded where it is encoded
+  if (factors == std::array{1.0, 1.0, 1.0}) return word;  // axes are rounded if it is encoded
   Surfel surfel = decode(word);
   for (int k = 0; k < 3; ++k) {
     surfel.s[k] *= static_cast<float>(factors[static_cast<std::size_t>(k)]);
@@ -118,9 +118,9 @@ EditedMap shrink_by_passes(const SurfelMap& map,
   SurfelEvidence evidence(map.words().size(), 2);
   FateCounts fates;
   const auto right = static_cast<float>(fit.right);
-  const auto visit = [&](const SurveyRay& ray, const RayMeetings& way) {
+  const auto visit = [&](const SurveyRay& ray, const RayHits& way) {
     fates.add(ray, fate_of(ray, way.range, right));
-    for (const MetSurfel& met : way.met) {
+    for (const SurfelHit& met : way.hits) {
       if (!ray.is_return || met.t < ray.range - right) {
         evidence.add(met.word, kPassed, met.weight);
       } else if (met.t <= ray.range + right) {
@@ -167,7 +167,7 @@ class WeightSlopes {
     });
   }
 
-  [[nodiscard]] std::array<double, 3> at(const SurveyRay& ray, const MetSurfel& met) const {
+  [[nodiscard]] std::array<double, 3> at(const SurveyRay& ray, const SurfelHit& met) const {
     const Surfel surfel = decode(map_.words()[met.word]);
     const LeafHeader leaf = decode_leaf(map_.words()[met.word - headers_[met.word]]);
     const Vector3d nearest = ray.origin_world +
@@ -199,7 +199,7 @@ constexpr std::size_t kind_of(std::size_t axis, Fate fate) {
 constexpr std::size_t kEarlyRays = 9;
 constexpr std::size_t kBlameKinds = 10;
 
-/// New sizes of one surfel, or nothing where it is to go.
+/// New sizes of one surfel, or nothing if it is to go.
 std::optional<std::array<double, 3>> factors_of(const SurfelEvidence& evidence,
                                                 std::size_t word,
                                                 const FitOptions& fit) {
@@ -222,7 +222,7 @@ std::optional<std::array<double, 3>> factors_of(const SurfelEvidence& evidence,
   return factors;
 }
 
-/// Reads a survey and keeps where its rays began.
+/// Reads a survey and keeps if its rays began.
 class OriginKeeper : public SurveyReader {
  public:
   OriginKeeper(std::unique_ptr<SurveyReader> survey, Aabb& origins)
@@ -255,7 +255,7 @@ EditedMap correct_by_blame(const SurfelMap& map,
   const WeightSlopes slopes(map);
   const auto right = static_cast<float>(fit.right);
   const float window = kernel_map_of(map).window;
-  const auto visit = [&](const SurveyRay& ray, const RayMeetings& way) {
+  const auto visit = [&](const SurveyRay& ray, const RayHits& way) {
     if (known != nullptr) {
       known->cross(
           ray.origin_world, ray.direction_world.cast<double>(), static_cast<double>(ray.range));
@@ -263,7 +263,7 @@ EditedMap correct_by_blame(const SurfelMap& map,
     const Fate fate = fate_of(ray, way.range, right);
     fates.add(ray, fate);
     if (fate == Fate::kFree) return;
-    for (const MetSurfel& met : way.met) {
+    for (const SurfelHit& met : way.hits) {
       const bool is_concerned = fate == Fate::kLeak
                                     ? std::abs(met.t - ray.range) <= right
                                     : met.t >= way.first && met.t <= way.first + window;
@@ -335,7 +335,7 @@ OwnRays measure_rays(const SurfelMap& map,
                 executor,
                 "rendering survey rays",
                 progress,
-                [&](const SurveyRay& ray, const RayMeetings& way) {
+                [&](const SurveyRay& ray, const RayHits& way) {
                   if (counts && !counts(ray)) return;
                   fates.add(ray, fate_of(ray, way.range, static_cast<float>(right)));
                 });

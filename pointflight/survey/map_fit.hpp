@@ -52,10 +52,10 @@ struct FitReport {
   std::uint64_t rays = 0;        ///< Of the survey.
   OwnRays before;                ///< In the map as it was.
   OwnRays between;               ///< After pass 1.
-  std::uint64_t unseen = 0;      ///< Surfels that no ray met, left as they were.
+  std::uint64_t unseen = 0;      ///< Surfels that no ray hit, left as they were.
   std::uint64_t blamed = 0;      ///< Removed by pass 2.
   std::vector<Vector3d> ghosts;  ///< Centres of the surfels of what moved, removed by pass 1.
-  /// How often a ray met more surfels than fit in its list, and was ended there.
+  /// How often a ray hit more surfels than fit in its list, and was ended there.
   std::uint64_t overflows = 0;
 };
 

@@ -63,7 +63,7 @@ struct SurveyFiles {
 /// A survey in a folder. Which pose is which scan's: by the file's ninth column; else as many poses
 /// as there are clouds in the folder, in the order of their names (numbers by size); else the names
 /// of the clouds are their times (s or ns) and the poses a trajectory. Points with times of their
-/// own get poses between: offsets from the scan's time, or, where they are large, times of the
+/// own get poses between: offsets from the scan's time, or, if they are large, times of the
 /// trajectory.
 class SurveyFolder : public PosedScans {
  public:

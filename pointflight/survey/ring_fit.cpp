@@ -83,7 +83,7 @@ void refine(Pace& pace, const std::vector<RingPoints>& scans) {
   }
 }
 
-/// How azimuths go on with time within a ring; nothing where they do not do so evenly.
+/// How azimuths go on with time within a ring; nothing if they do not do so evenly.
 std::optional<Pace> pace_of(const std::vector<RingPoints>& scans) {
   constexpr std::size_t kApart = 10;  // so that directions' noise is little of what was turned
   std::vector<double> slopes;
@@ -130,7 +130,7 @@ struct RingSamples {
   std::size_t points = 0;
 };
 
-/// When a point's ring fires after the other's, within half a cycle either way; nothing where the
+/// When a point's ring fires after the other's, within half a cycle either way; nothing if the
 /// other has no point about then.
 std::optional<double> lag_of(const RecordedPoint& point,
                              const std::vector<const RecordedPoint*>& others,

@@ -29,7 +29,7 @@ struct TurnFit {
   std::vector<RingFit> rings;  ///< By ascending number.
 };
 
-/// Of scans whose points have rings and times; nothing where azimuths do not go on evenly with
+/// Of scans whose points have rings and times; nothing if azimuths do not go on evenly with
 /// time, or rings are not level. A cycle begins after its longest pause; range offsets are left at
 /// 0.
 std::optional<TurnFit> fit_turn(std::span<const RecordedScan> scans);

@@ -3,8 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
-#include <cctype>
 #include <cmath>
 #include <filesystem>
 #include <optional>
@@ -40,18 +38,14 @@ void sort_names(std::vector<std::string>& names) {
 }  // namespace
 
 std::vector<std::string> scan_files_in(const std::string& folder, const std::string& except) {
-  constexpr std::array kExtensions = {".pcd", ".ply", ".las", ".xyz", ".csv", ".asc", ".pts"};
   std::vector<std::string> names;
   std::error_code error;
   for (fs::directory_iterator at(folder, error); !error && at != fs::directory_iterator();
        at.increment(error)) {
     std::error_code ignored;
-    std::string extension = at->path().extension().string();
-    std::transform(extension.begin(), extension.end(), extension.begin(), [](unsigned char c) {
-      return static_cast<char>(std::tolower(c));
-    });
+    // .txt: rather poses or notes
     const bool is_cloud =
-        std::find(kExtensions.begin(), kExtensions.end(), extension) != kExtensions.end();
+        has_cloud_extension(at->path().string()) && at->path().extension() != ".txt";
     if (!is_cloud || !at->is_regular_file(ignored)) continue;
     if (fs::equivalent(at->path(), except, ignored)) continue;
     names.push_back(at->path().filename().string());

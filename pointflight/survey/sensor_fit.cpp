@@ -286,7 +286,7 @@ double step_of(std::span<const Sight> sights) {
       squares += off * off;
       count += 1.0;
     }
-    // 0.29 where they are not
+    // 0.29 if they are not
     if (count > 1000.0 && std::sqrt(squares / count) < 0.05) return step;
   }
   return 0.0;

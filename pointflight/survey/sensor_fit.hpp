@@ -51,7 +51,7 @@ struct SensorFit {
 /// across it (n·d / D). Its deviation s of ranges about the plane, at range R and incidence i, is
 /// s^2 = sigma_r^2 + (R tan i sigma_a)^2, from which both follow by weighted least squares; patches
 /// that deviate much more are not flat and count no further. What is uneven of a wall counts as
-/// noise, as does each ring's own offset. Throws InputError where too little of what was seen is
+/// noise, as does each ring's own offset. Throws InputError if too little of what was seen is
 /// flat.
 SensorFit fit_sensor(std::span<const RecordedScan> scans,
                      const Executor& executor,

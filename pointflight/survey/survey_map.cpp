@@ -16,7 +16,7 @@ namespace pointflight {
 namespace {
 
 constexpr std::size_t kLeftOut = 10;  // one scan of so many judges
-constexpr double kCoarsest = 0.1;     // m: coarser ones are tried only where points are far apart
+constexpr double kCoarsest = 0.1;     // m: coarser ones are tried only if points are far apart
 
 EditOptions edit_options_of(const ImportOptions& options) {
   EditOptions edit;
@@ -154,7 +154,7 @@ SurveyMap map_survey(const SurveySource& survey,
   }
   ImportedMap imported = import_points(points, all, nullptr, chosen, executor, progress);
   made.imported = imported.report;
-  // by the spacing, where no scans were left out to judge
+  // by the spacing, if no scans were left out to judge
   made.imported.resolution_was_chosen = !options.resolution && made.tried.empty();
   made.imported.warnings =
       import_warnings(made.imported, options, imported.description.bounds_world);

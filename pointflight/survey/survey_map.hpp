@@ -23,7 +23,7 @@ struct SurveyMap {
   std::vector<CloudPoint> outliers;    ///< Of the import.
   FitReport fit;                       ///< The fit.
   OwnRays after;                       ///< The survey's rays in the fitted map.
-  std::vector<TriedResolution> tried;  ///< In ascending order; empty where one was given.
+  std::vector<TriedResolution> tried;  ///< In ascending order; empty if one was given.
 };
 
 /// Scans that can be opened as often as wanted, all or those that a function accepts.
@@ -37,7 +37,7 @@ struct SurveyPoints {
 };
 
 /// Tries resolutions a factor of the square root of two apart, from 1.4 spacings of the points to
-/// 4, or to 0.1 m where these lie closer: maps of the points beside which nine tenths of the scans
+/// 4, or to 0.1 m if these lie closer: maps of the points beside which nine tenths of the scans
 /// saw something, fitted to these, judged by the rays of the others: those that end where the nine
 /// tenths saw something and those without a return. Coarser maps close gaps that a survey left, so
 /// that they may win without being truer: hence the limit. Without `points` the returns of the nine

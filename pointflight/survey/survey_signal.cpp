@@ -11,7 +11,7 @@
 #include "pointflight/core/scratch.hpp"
 #include "pointflight/map/map_file.hpp"
 #include "pointflight/survey/surfel_evidence.hpp"
-#include "pointflight/survey/survey_meetings.hpp"
+#include "pointflight/survey/survey_hits.hpp"
 
 namespace pointflight {
 namespace {
@@ -109,14 +109,14 @@ void paint_reflectivity(EditedMap& edited,
   SurfelEvidence evidence(map->words().size(), 2);
   const auto right = static_cast<float>(signal.right);
   const float window = kernel_map_of(*map).window;
-  const auto visit = [&](const SurveyRay& ray, const RayMeetings& way) {
+  const auto visit = [&](const SurveyRay& ray, const RayHits& way) {
     if (!ray.is_return || !(ray.intensity > 0.0f)) return;
     if (way.range < 0.0f || std::abs(way.range - ray.range) > right) return;
     const auto range = static_cast<double>(ray.range);
-    const double near = sensor.near_share(range);
+    const double near = sensor.near_gain(range);
     const double facing = margin_of_one * static_cast<double>(ray.intensity) *
                           sensor.rated_reflectivity(range) / near;
-    for (const MetSurfel& met : way.met) {
+    for (const SurfelHit& met : way.hits) {
       if (met.weight <= 0 || met.t < way.first || met.t > way.first + window) continue;
       const Vector3f normal = decode(map->words()[met.word]).axes.col(0);
       const auto cos = static_cast<double>(std::abs(normal.dot(ray.direction_world)));

@@ -27,7 +27,7 @@ struct SignalOptions {
 struct SignalReport {
   double limit = 0.0;                      ///< As above: given, or found.
   std::uint64_t returns = 0;               ///< Of the survey that carry a signal.
-  std::uint64_t unseen = 0;                ///< Surfels that none of them met.
+  std::uint64_t unseen = 0;                ///< Surfels that none of them hit.
   std::array<double, 3> reflectivities{};  ///< 5, 50 and 95 % quantile over the surfels that were.
 };
 
@@ -37,11 +37,11 @@ struct SignalReport {
 /// The scans' intensity must be in proportion to the received signal (Ouster's "signal"; not a
 /// calibrated reflectivity, for which `set_reflectivity` is). A return of margin m
 /// (`DetectionModel`) from range R at the incidence a is of reflectivity
-/// m rated_reflectivity(R) / (near_share(R) cos a), cos a from 0.15 on. The margin is that of the
+/// m rated_reflectivity(R) / (near_gain(R) cos a), cos a from 0.15 on. The margin is that of the
 /// weakest signal, which is taken to come back three times in twenty, times the signal over it. A
 /// surfel gets the geometric mean over the returns that it was part of, by its weights there and
-/// the square of near_share. One that no return met is as dark as the darkest twentieth: that is
-/// why it was not seen. Throws InputError where the scans carry no intensity or the sensor has no
+/// the square of near_gain. One that no return hit is as dark as the darkest twentieth: that is
+/// why it was not seen. Throws InputError if the scans carry no intensity or the sensor has no
 /// rated ranges.
 void paint_reflectivity(EditedMap& map,
                         const SurveyOpener& survey,

@@ -93,7 +93,7 @@ struct VibrationSettings {
   double rotor_gyro = 0.0;   ///< Amplitude of rates by each rotor's imbalance, rad/s.
   std::int64_t blades = 2;   ///< Of each propeller.
 
-  /// True where there is none.
+  /// True if there is none.
   [[nodiscard]] bool is_off() const {
     return rotor_accel == 0.0 && blade_accel == 0.0 && rotor_gyro == 0.0;
   }

@@ -37,7 +37,7 @@ constexpr double kLargest =
 
 constexpr int kLooks = 64;  // at a trajectory
 
-/// False where a number of the command is not finite or out of range.
+/// False if a number of the command is not finite or out of range.
 struct Finite {
   static bool all(const Vector3d& v) {
     return v.allFinite() && v.cwiseAbs().maxCoeff() <= kLargest;

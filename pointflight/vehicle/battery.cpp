@@ -18,7 +18,7 @@ double Battery::step(BatteryState& state, double shaft_power, double dt) const {
   assert(b.capacity > 0.0 && b.cells > 0.0);
   const double power = shaft_power / b.efficiency;
   const double open = b.cells * (kEmptyCell + charge(state) * (kFullCell - kEmptyCell));
-  // V = V_open - R P / V; where it cannot give the power, what it can give at most
+  // V = V_open - R P / V; if it cannot give the power, what it can give at most
   state.voltage = 0.5 * (open + std::sqrt(std::max(0.0, open * open - 4.0 * b.resistance * power)));
   state.current = power / state.voltage;
   state.used = std::min(b.capacity, state.used + state.current * dt / kHour);

@@ -28,7 +28,7 @@ class ActiveSet {
     }
   }
 
-  /// One round; false where nothing gets better.
+  /// One round; false if nothing gets better.
   bool improve() {
     const Eigen::VectorXd step = best_step();
     const Eigen::Index blocks = go(step);
@@ -78,7 +78,7 @@ class ActiveSet {
     return blocks;
   }
 
-  /// Frees the one that its bound holds back most from doing better; false where there is none.
+  /// Frees the one that its bound holds back most from doing better; false if there is none.
   bool release() {
     const Eigen::VectorXd pull = a_.transpose() * (b_ - a_ * x_);
     double worst = -kRounding;

@@ -55,7 +55,7 @@ class Controller {
                                                    ControllerMemory& memory) const = 0;
 };
 
-/// By name ("cascade", "geometric") or row of `ControllerKind::table`. Throws InputError where the
+/// By name ("cascade", "geometric") or row of `ControllerKind::table`. Throws InputError if the
 /// settings are wrong.
 std::unique_ptr<Controller> make_controller(const Choice<ControllerKind>& kind,
                                             const VehicleSettings& settings);

@@ -75,7 +75,7 @@ class Estimator {
   [[nodiscard]] EstimateError error(std::int64_t index, Memory& memory) const;
   /// Of the report that `memory` is of.
   [[nodiscard]] EstimateVariance variance(const Memory& memory) const;
-  /// True where a report is lost.
+  /// True if a report is lost.
   [[nodiscard]] bool loses(std::int64_t index) const;
   /// As given.
   [[nodiscard]] const EstimateSettings& settings() const { return settings_; }

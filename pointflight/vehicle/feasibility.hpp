@@ -27,11 +27,11 @@ struct MotionDemand {
   Peak thrust;              ///< N
 };
 
-/// Looks at 20,000 instants at most, a hundredth of a second apart where the trajectory is short.
+/// Looks at 20,000 instants at most, a hundredth of a second apart if the trajectory is short.
 MotionDemand demand_of(const Trajectory& trajectory, const VehicleSettings& vehicle);
 
 /// In words, what of a trajectory is beyond a vehicle, and where: limits of its controller, thrust,
-/// a start that is not where and as fast as it is (`from`; null: anywhere). Nothing where it can be
+/// a start that is not where and as fast as it is (`from`; null: anywhere). Nothing if it can be
 /// flown.
 std::optional<std::string> beyond_limits(const Trajectory& trajectory,
                                          const VehicleSettings& vehicle,

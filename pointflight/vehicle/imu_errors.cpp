@@ -50,7 +50,7 @@ void describe_beyond_noise(SettingsVisitor& v, ImuErrors& e) {
 }
 
 void describe(SettingsVisitor& v, ImuPart& p) {
-  v.value({"title", "", "maker and model"}, p.title);
+  v.value({"title", "", "vendor and model"}, p.title);
   v.value({"source", "", "where the figures come from"}, p.source);
   describe_noise(v, p.errors);
   describe_beyond_noise(v, p.errors);

@@ -29,7 +29,7 @@ struct ImuErrors {
   double clock_offset = 0.0;  ///< Time stamps are late by this, s.
   double clock_jitter = 0.0;  ///< Deviation of each time stamp, s.
 
-  /// True where time stamps are not the times of the samples.
+  /// True if time stamps are not the times of the samples.
   [[nodiscard]] bool clock_errs() const { return clock_offset != 0.0 || clock_jitter > 0.0; }
 };
 

@@ -25,7 +25,7 @@ struct MotionLimits {
 class SmoothMove {
  public:
   SmoothMove() = default;
-  /// `distance` >= 0; the limits must be positive. Peak speed shrinks where the distance is short.
+  /// `distance` >= 0; the limits must be positive. Peak speed shrinks if the distance is short.
   SmoothMove(double distance, const MotionLimits& limits);
 
   /// A place on the move, along it.

@@ -29,7 +29,7 @@ double feasible_share(const Eigen::VectorXd& base,
   return std::max(0.0, share);
 }
 
-// What gives way to what, where not all can be had: squared, these weigh shares of the weight, and
+// What gives way to what, if not all can be had: squared, these weigh shares of the weight, and
 // of the torques that it makes at the arms and by the rotors' drag.
 constexpr double kThrustWeight = 30.0;
 constexpr double kTiltWeight = 300.0;
@@ -133,9 +133,9 @@ Eigen::VectorXd Mixer::thrusts_of_what_is_left(const Wrench& wrench,
   return even * bounded_least_squares(a, b, low, high);
 }
 
-std::vector<double> Mixer::speeds_of_what_is_left(const Wrench& wrench,
-                                                  const AirMotion& motion,
-                                                  std::span<const double> shares) const {
+std::vector<double> Mixer::speeds_with_failed_rotors(const Wrench& wrench,
+                                                     const AirMotion& motion,
+                                                     std::span<const double> shares) const {
   const Eigen::VectorXd thrusts = thrusts_of_what_is_left(wrench, shares);
   std::vector<double> speeds(shares.size());
   for (std::size_t i = 0; i < speeds.size(); ++i) {

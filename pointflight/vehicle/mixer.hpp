@@ -26,20 +26,20 @@ struct AirMotion {
 /// and pitch can be kept, then those shrink.
 class Mixer {
  public:
-  /// Throws InputError where the layout cannot make roll, pitch and yaw.
+  /// Throws InputError if the layout cannot make roll, pitch and yaw.
   explicit Mixer(const VehicleSettings& settings);
 
   /// Rotor speeds, rad/s, within the rotors' limits. Rotors that climb turn faster for the same
-  /// thrust, where the vehicle file says how thrust falls with the advance ratio.
+  /// thrust, if the vehicle file says how thrust falls with the advance ratio.
   [[nodiscard]] std::vector<double> speeds(const Wrench& wrench,
                                            const AirMotion& motion = {}) const;
 
-  /// The same where rotors turn at a share of what they are told (0 to 1, one each): those that are
+  /// The same if rotors turn at a share of what they are told (0 to 1, one each): those that are
   /// left make roll and pitch before thrust, and yaw last, as nearly as they can.
-  [[nodiscard]] std::vector<double> speeds_of_what_is_left(const Wrench& wrench,
-                                                           const AirMotion& motion,
-                                                           std::span<const double> shares) const;
-  /// True where these can hover without spinning.
+  [[nodiscard]] std::vector<double> speeds_with_failed_rotors(const Wrench& wrench,
+                                                              const AirMotion& motion,
+                                                              std::span<const double> shares) const;
+  /// True if these can hover without spinning.
   [[nodiscard]] bool holds_heading(std::span<const double> shares) const;
 
   /// Wrench of given speeds (without drag and lag): the inverse of `speeds` inside the limits.

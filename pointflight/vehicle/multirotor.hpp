@@ -33,7 +33,7 @@ struct FlightConditions {
 /// ARC R&M 3021, 1955).
 class Multirotor {
  public:
-  /// Throws InputError where a figure is not finite or beyond what a vehicle file may say.
+  /// Throws InputError if a figure is not finite or beyond what a vehicle file may say.
   explicit Multirotor(const VehicleSettings& settings);
 
   /// At rest at a pose, rotors at hover speed.

@@ -16,7 +16,7 @@ struct RigidBodyState {
 
   /// Takes points of the body to the world.
   [[nodiscard]] Pose T_world_body() const { return {q_world_body, p_world}; }
-  /// False where any figure is NaN or infinite: the dynamics diverged, or a source sent nonsense.
+  /// False if any figure is NaN or infinite: the dynamics diverged, or a source sent nonsense.
   [[nodiscard]] bool is_finite() const {
     return p_world.allFinite() && v_world.allFinite() && q_world_body.coeffs().allFinite() &&
            omega_body.allFinite();

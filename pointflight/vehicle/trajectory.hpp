@@ -28,7 +28,7 @@ class Trajectory {
  public:
   virtual ~Trajectory() = default;
 
-  /// `t` seconds after its start; at rest where it begins before, where it ends after.
+  /// `t` seconds after its start; at rest if it begins before, if it ends after.
   [[nodiscard]] virtual PositionCommand at(double t) const = 0;
 
   /// Seconds.
@@ -45,7 +45,7 @@ class PolynomialTrajectory : public Trajectory {
     std::array<std::vector<double>, 4> coefficients;
   };
 
-  /// Throws InputError where a piece has no duration or a coefficient is not finite.
+  /// Throws InputError if a piece has no duration or a coefficient is not finite.
   explicit PolynomialTrajectory(std::vector<Piece> pieces);
 
   /// CSV as uav_trajectories and Crazyswarm write it: a row a piece with the columns duration, x^0

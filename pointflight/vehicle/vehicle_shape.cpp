@@ -16,7 +16,7 @@ constexpr double kChord = 0.18;        // of the propeller's radius
 constexpr double kHub = 0.1;           // of the same
 constexpr double kMotorRadius = 0.15;  // of the same
 constexpr double kMotorHeight = 0.2;   // of the same
-constexpr double kBareMotor = 0.1;     // of the arm's length, where no propeller is known
+constexpr double kBareMotor = 0.1;     // of the arm's length, if no propeller is known
 
 /// Of rotors in the order of the file: no two alike.
 constexpr double kPhaseStep = 2.399963;  // rad

@@ -44,7 +44,7 @@ struct ServerInfo {
   std::string session;                    ///< Another one: clients forget what they had.
   std::vector<std::string> capabilities;  ///< "time", "clientPublish", "services", ...
   std::vector<std::string> encodings;     ///< Of what clients publish.
-  /// First and last time of what can be played back, ns; none where it is live.
+  /// First and last time of what can be played back, ns; none if it is live.
   std::optional<std::pair<std::int64_t, std::int64_t>> range;
 };
 

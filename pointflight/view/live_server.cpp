@@ -107,7 +107,7 @@ void LiveServer::Impl::greet(Client& client) {
   }
 }
 
-void LiveServer::Impl::to_all(Frame frame) {
+void LiveServer::Impl::to_all(const Frame& frame) {
   for (const auto& client : clients_) client->send(frame);
 }
 

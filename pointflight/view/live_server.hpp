@@ -47,13 +47,13 @@ struct LiveServerOptions {
 /// the own page, the token in its address.
 class LiveServer {
  public:
-  /// Listens. Throws InputError where no port is free or the address is not this machine's.
+  /// Listens. Throws InputError if no port is free or the address is not this machine's.
   explicit LiveServer(LiveServerOptions options);
   ~LiveServer();
   LiveServer(const LiveServer&) = delete;
   LiveServer& operator=(const LiveServer&) = delete;
 
-  /// For a browser, with the token where clients may command.
+  /// For a browser, with the token if clients may command.
   [[nodiscard]] const std::string& address() const;
   /// That it listens on.
   [[nodiscard]] std::uint16_t port() const;
@@ -61,7 +61,7 @@ class LiveServer {
   /// Makes a channel known; its id is given here and returned. With `latched` those who come later
   /// get the last message.
   std::uint32_t add_channel(foxglove::Channel channel, bool latched);
-  /// True where a client has subscribed to it.
+  /// True if a client has subscribed to it.
   [[nodiscard]] bool has_subscribers(std::uint32_t channel) const;
   /// How many have.
   [[nodiscard]] int subscriber_count(std::uint32_t channel) const;

@@ -33,7 +33,7 @@ class MapBlocks {
 
   /// A block at a level: u32 surfels, low corner x, y, z (voxels from the origin); then for each
   /// u32 low, high half of the surfel's word, u16 x, y, z of its leaf from the low corner (voxels),
-  /// u16 intensity (a code). Empty where there is no such block or level.
+  /// u16 intensity (a code). Empty if there is no such block or level.
   [[nodiscard]] std::vector<std::byte> block(std::size_t number, int level) const;
 
   /// All blocks one after the other, thinned so that there are about `most` surfels, u32 1 / share

@@ -14,7 +14,7 @@ namespace pointflight {
 /// `/pointflight/order` (`page_order`), and playback controls of Foxglove's protocol.
 class OrderInbox {
  public:
-  /// From now on clients may publish; `motions`: how each vehicle flies to goals, none where there
+  /// From now on clients may publish; `motions`: how each vehicle flies to goals, none if there
   /// are no vehicles to command. Once for a server.
   void take_orders_of(LiveServer& server, const std::vector<MotionLimits>& motions);
   /// Playback controls become orders as well; `epoch`: what the run's first instant is stamped

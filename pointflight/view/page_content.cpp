@@ -30,7 +30,7 @@ WebContent content_of(std::vector<std::byte> bytes, std::string type) {
   return {std::move(type), std::make_shared<const std::vector<std::byte>>(std::move(bytes)), false};
 }
 
-/// A whole number at the front of `text`, which it is taken from; nothing where there is none.
+/// A whole number at the front of `text`, which it is taken from; nothing if there is none.
 std::optional<std::size_t> take_number(std::string& text) {
   const std::size_t end = std::min(text.find('/'), text.size());
   double value = 0.0;

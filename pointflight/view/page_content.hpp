@@ -16,7 +16,7 @@ namespace pointflight {
 std::function<std::optional<WebContent>(const std::string& path)> page_content(
     const std::string& folder, std::shared_ptr<const MapBlocks> map);
 
-/// Folder of the page as it was built or installed; empty where it was not built: that takes node
+/// Folder of the page as it was built or installed; empty if it was not built: that takes node
 /// and npm.
 std::string page_folder();
 

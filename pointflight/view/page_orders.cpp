@@ -41,7 +41,7 @@ bool flag_of(const json& value, const char* name) {
   return value.get<bool>();
 }
 
-/// About the run as a whole; nothing where it is another.
+/// About the run as a whole; nothing if it is another.
 std::optional<Order> run_order(const json& order) {
   if (order.contains("pause")) return PauseOrder{flag_of(order["pause"], "pause")};
   if (order.contains("step")) return StepOrder{};

@@ -62,7 +62,7 @@ std::string_view trimmed(std::string_view text) {
   return text;
 }
 
-/// True where a list with commas has the word.
+/// True if a list with commas has the word.
 bool lists(std::string_view list, std::string_view word) {
   while (!list.empty()) {
     const std::size_t comma = std::min(list.find(','), list.size());

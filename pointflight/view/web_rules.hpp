@@ -12,12 +12,12 @@ struct ByteRange {
   std::size_t from = 0;  ///< First.
   std::size_t to = 0;    ///< Last.
 };
-/// What a Range header asks for of so many bytes; nothing where it is malformed, several ranges, or
+/// What a Range header asks for of so many bytes; nothing if it is malformed, several ranges, or
 /// beyond the end.
 std::optional<ByteRange> range_of(std::string_view header, std::size_t size);
 
 /// The first subprotocol of the server's list (`foxglove::kSubprotocols`) that a client's
-/// Sec-WebSocket-Protocol offers; empty where it offers none.
+/// Sec-WebSocket-Protocol offers; empty if it offers none.
 std::string_view chosen_subprotocol(std::string_view offered);
 
 /// Who asks.

@@ -9,12 +9,12 @@ namespace pointflight {
 
 /// The nearest thing to a hull.
 struct Contact {
-  double distance = 0.0;                    ///< m; negative where they overlap: minus the depth.
+  double distance = 0.0;                    ///< m; negative if they overlap: minus the depth.
   Vector3d place_world = Vector3d::Zero();  ///< Of the thing, about where it is nearest.
   Label label = kMapLabel;                  ///< What the thing is.
 };
 
-/// Distance of a hull to the map within `reach`; nothing where all is farther. To the surfels'
+/// Distance of a hull to the map within `reach`; nothing if all is farther. To the surfels'
 /// boxes (map/internal/near_surfels.hpp), so that collisions and rays see the same surface. Where a
 /// ball's centre lies inside a box the distance is minus its radius.
 std::optional<Contact> contact_with_map(const SurfelMap& map,

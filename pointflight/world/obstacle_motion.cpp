@@ -15,12 +15,12 @@
 
 namespace pointflight {
 
-RoundMotion loop_through(const std::vector<Vector3d>& waypoints, double speed) {
+LoopMotion loop_through(const std::vector<Vector3d>& waypoints, double speed) {
   if (waypoints.empty() || !(speed > 0.0)) {
     throw InputError("a loop needs waypoints and a speed above 0");
   }
-  std::vector<RoundMotion::Leg> legs;
-  RoundMotion motion;
+  std::vector<LoopMotion::Leg> legs;
+  LoopMotion motion;
   motion.speed = speed;
   motion.round = Duration{0};
   Quaterniond heading = Quaterniond::Identity();
@@ -39,7 +39,7 @@ RoundMotion loop_through(const std::vector<Vector3d>& waypoints, double speed) {
     motion.speed = 0.0;
   }
   motion.round = std::max(motion.round, Duration{1});
-  motion.legs = std::make_shared<const std::vector<RoundMotion::Leg>>(std::move(legs));
+  motion.legs = std::make_shared<const std::vector<LoopMotion::Leg>>(std::move(legs));
   return motion;
 }
 

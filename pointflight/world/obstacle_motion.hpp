@@ -13,7 +13,7 @@ namespace pointflight {
 
 /// Along straight legs through waypoints (world, m) at constant speed (m/s), the x axis ahead
 /// (level), from the last back to the first and on. Throws InputError without waypoints or speed.
-RoundMotion loop_through(const std::vector<Vector3d>& waypoints_world, double speed);
+LoopMotion loop_through(const std::vector<Vector3d>& waypoints_world, double speed);
 
 /// Poses at given times from a CSV with the columns time, x, y, z (s, m) and, where it turns,
 /// roll_deg, pitch_deg, yaw_deg or qw, qx, qy, qz. Times ascend. With `repeat` it starts again

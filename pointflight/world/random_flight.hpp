@@ -12,7 +12,7 @@ namespace pointflight {
 /// "bounce" turns it back at the bounds instead.
 class RandomFlight : public Obstacle {
  public:
-  /// `settings` of the entry, `bounds` already decided. Throws InputError where no free place is
+  /// `settings` of the entry, `bounds` already decided. Throws InputError if no free place is
   /// found at the start; `place` says where the entry stands.
   RandomFlight(const ObstacleSettings& settings,
                std::shared_ptr<const SurfelMap> cloud,
@@ -32,7 +32,7 @@ class RandomFlight : public Obstacle {
     Vector3d start;
     Vector3d velocity;
   };
-  /// Life number n, which starts at `from`; `strict`: throws where no place is free.
+  /// Life number n, which starts at `from`; `strict`: throws if no place is free.
   [[nodiscard]] Life life(std::uint64_t n, SimTime from, bool strict) const;
   [[nodiscard]] Vector3d free_place(std::uint64_t n, double radius, bool strict) const;
 

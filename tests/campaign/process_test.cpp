@@ -45,7 +45,7 @@ TEST(Process, StartsWithTheSignalsOfAnyProgram) {
   const auto before = std::signal(SIGPIPE, SIG_IGN);  // as our own programs have it
   EXPECT_EQ(shell(folder, "kill -PIPE $$; exit 3").signal, SIGPIPE);
   std::signal(SIGPIPE, before);
-  // where somebody ignores the end of children, how they ended is not known; that it is over is
+  // if somebody ignores the end of children, how they ended is not known; that it is over is
   const auto child = std::signal(SIGCHLD, SIG_IGN);
   const ProcessResult ended = shell(folder, "exit 0");
   std::signal(SIGCHLD, child);

@@ -161,7 +161,7 @@ TEST(Settings, KeysUnderAConditionAreRefusedElsewhere) {
                   "engine.yaml:2: tank: has no effect here: it is for `fuel: petrol`; remove it or "
                   "set that");
   expect_contains(error("tank: 7\ncell: {charge: 4}\n"), "engine.yaml:2: cell: has no effect here");
-  // required where the condition holds, and only there
+  // required if the condition holds, and only there
   expect_contains(error("fuel: petrol\n"), "tank: missing");
   EXPECT_EQ(parse_engine("fuel: current\n").charge, 3.0);
 }

@@ -1,4 +1,4 @@
-// Any text as a sensor file, or as Ouster's metadata where it begins as JSON does: a sensor that
+// Any text as a sensor file, or as Ouster's metadata if it begins as JSON does: a sensor that
 // can fire its first scan, or an InputError of one line.
 #include <cstdint>
 #include <string>
@@ -7,7 +7,7 @@
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/lidar/beam_pattern.hpp"
 #include "pointflight/lidar/lidar_settings.hpp"
-#include "pointflight/lidar/maker_files.hpp"
+#include "pointflight/lidar/vendor_files.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::string_view text(reinterpret_cast<const char*>(data), size);

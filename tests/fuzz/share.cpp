@@ -106,7 +106,7 @@ void listen(std::span<const std::uint8_t> data) {
   intro.vehicles = {1};
   intro.parts = common_ground(simulation, setup.time == ShareTime::kFree ? 1.0 : 0.0);
   static_cast<void>(link.is_ready());
-  bus.shout(ShareChannel::kCrew, told(intro, share_msg::Kind::kIntroduction));
+  bus.shout(ShareChannel::kMembers, told(intro, share_msg::Kind::kIntroduction));
   share_msg::States states;
   states.vehicles.resize(1);
   states.vehicles[0].number = 1;

@@ -53,7 +53,7 @@ TEST(Motions, RepeatAndTurnBack) {
     EXPECT_LE(p.maxCoeff(), 4.0);
   }
   EXPECT_DOUBLE_EQ(speed_max(Motion{ball}), std::sqrt(5.0));
-  EXPECT_EQ(RoundMotion{}.at(at(7)).translation, Vector3d::Zero());
+  EXPECT_EQ(LoopMotion{}.at(at(7)).translation, Vector3d::Zero());
 }
 
 }  // namespace

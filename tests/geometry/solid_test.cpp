@@ -151,7 +151,7 @@ TEST(Separation, IsTheDistanceThatAlternatingProjectionsFind) {
       continue;
     }
     ++apart;
-    // they come from above and slowly where faces are nearly parallel
+    // they come from above and slowly if faces are nearly parallel
     EXPECT_LE(s.distance, expected + 1e-9);
     EXPECT_GT(s.distance, expected - 2e-4);
     worst = std::max(worst, expected - s.distance);

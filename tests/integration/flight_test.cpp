@@ -13,7 +13,7 @@
 #include "tests/paths.hpp"
 #include "tests/support.hpp"
 
-// Whole flights: the same bytes everywhere, and real maps where they are present.
+// Whole flights: the same bytes everywhere, and real maps if they are present.
 namespace pointflight {
 namespace {
 
@@ -79,7 +79,7 @@ TEST(Flight, Slow_TheSameBytesWhateverTheThreadsAndTheProcessor) {
   EXPECT_TRUE(read_file(map) == read_file(folder / "n.pfmap"));
 }
 
-/// Runs the program and returns its peak resident memory in MB; negative where it failed.
+/// Runs the program and returns its peak resident memory in MB; negative if it failed.
 double peak_memory_of(const std::string& arguments) {
   const std::string command =
       fmt::format("exec '{}' {} >/dev/null 2>&1", testing::kProgram, arguments);

@@ -335,7 +335,7 @@ TEST_F(Program, AnInterruptClosesTheFilesAndEnds130) {
   EXPECT_EQ(result.code, 130) << result.err;
   const auto summary = nlohmann::json::parse(read_file(folder / "run/summary.json"));
   EXPECT_EQ(summary["end"], "interrupted");
-  // two seconds at real time, less where the machine is slow
+  // two seconds at real time, less if the machine is slow
   EXPECT_GT(summary["simulated_time"].get<double>(), 0.0);
   EXPECT_LT(summary["simulated_time"].get<double>(), 2.5);
   EXPECT_FALSE(read_file(folder / "run/trajectory.csv").empty());

@@ -8,7 +8,7 @@
 #include "pointflight/core/resources.hpp"
 #include "tests/integration/program.hpp"
 
-/// What runs and recordings leave behind, also where things go wrong.
+/// What runs and recordings leave behind, also if things go wrong.
 namespace pointflight {
 namespace {
 

@@ -20,7 +20,7 @@ struct Result {
 /// Runs `pointflight ARGUMENTS`; `before` stands before the program's name on the command line.
 Result run(const std::string& arguments, const std::string& before = "");
 
-/// The program in a process of its own; killed where nobody ends it.
+/// The program in a process of its own; killed if nobody ends it.
 class Started {
  public:
   explicit Started(const std::string& arguments);
@@ -28,7 +28,7 @@ class Started {
   Started(const Started&) = delete;
   Started& operator=(const Started&) = delete;
 
-  /// Waits until a file is there; false where the program has ended without.
+  /// Waits until a file is there; false if the program has ended without.
   [[nodiscard]] bool waits_for(const std::string& path) const;
   /// Sends a signal (0: none) and waits for the end; the exit code.
   int end(int signal) const;

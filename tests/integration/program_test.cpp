@@ -43,7 +43,7 @@ TEST_F(Program, WrongFlagsAreWrongInput) {
   expect_user_error(run("fly x.yaml -o /tmp/x --rate fast"), "--rate: 'fast'");
   expect_user_error(run(fmt::format("map import {} -o /tmp/x --resolution -1", cloud())),
                     "resolution");
-  expect_user_error(run(fmt::format("scan {} --pose 1,2,3", map())), "3 numbers; 6 are wanted");
+  expect_user_error(run(fmt::format("scan {} --pose 1,2,3", map())), "expected 6 numbers, got 3");
   expect_user_error(run(fmt::format("scan {} --pose 1,2,3,4,5,x", map())), "'x' is no number");
   expect_user_error(run(fmt::format("scan {} --lidar mid36 --pose 1,2,3,0,0,0", map())),
                     "did you mean 'mid360'");
@@ -89,9 +89,10 @@ TEST_F(Program, Slow_ScansWithEverySensorAndBothRenderers) {
 }
 
 TEST_F(Program, SaysWhichCommandOrFlagWasMeant) {
-  expect_user_error(run("flyy x"), "'flyy' is no command, did you mean 'fly'?; see pointflight");
+  expect_user_error(run("flyy x"), "unknown command 'flyy', did you mean 'fly'?; see pointflight");
   expect_user_error(run("map improt a"), "did you mean 'import'?; see pointflight map --help");
-  expect_user_error(run("map zzz"), "'zzz' is no command, these are: import, info");
+  expect_user_error(run("map zzz"), "unknown command 'zzz', expected one of: import, info");
+  expect_user_error(run("info x.pfmap"), "did you mean 'map info' or 'bag info'?");
   expect_user_error(run("map"), "a command is missing, one of: import, info");
   expect_user_error(run("fly x -o y --bogus --zeta 1"), "not expected: --bogus --zeta 1;");
   expect_user_error(run("scan x --lidr avia --pose 0"), "--lidr avia, did you mean '--lidar'?");
@@ -100,6 +101,16 @@ TEST_F(Program, SaysWhichCommandOrFlagWasMeant) {
     EXPECT_EQ(help.code, 0);
     expect_contains(help.out, "Usage: pointflight");
   }
+  // the tour is the program's, each command has an example of its own
+  expect_contains(run("--help").out, "A first tour");
+  expect_contains(run("fly --help").out, "Example: pointflight fly");
+  EXPECT_EQ(run("fly --help").out.find("A first tour"), std::string::npos);
+  const TemporaryFolder folder;
+  write_file(folder / "hall.pcd", "");
+  expect_user_error(run(fmt::format("fly {}", folder / "hall.pcd")),
+                    "import it first: pointflight map import");
+  expect_user_error(run(fmt::format("picture {}", folder / "nosuch")),
+                    "nosuch: no such run folder");
   const Result version = run("--version");
   EXPECT_EQ(version.code, 0);
   for (const char* words : {"pointflight 0.", "(commit ", "meshes ", "ROS 1 ", "ROS 2 "}) {
@@ -154,7 +165,7 @@ TEST_F(Program, FliesWhatTheCommandLineSays) {
   EXPECT_EQ(again.code, 1) << again.err;
   expect_contains(read_file(folder / "again/scenario.yaml"), "model: mid360");
   expect_user_error(run(fmt::format("fly {} -o {} --mission 1,2", map(), folder / "no")),
-                    "--mission (x,y,z x,y,z ...): 2 numbers; 3 are wanted");
+                    "--mission (x,y,z x,y,z ...): expected 3 numbers, got 2");
   expect_user_error(run(fmt::format("fly {} -o {} --lockstep 1", map(), folder / "no")),
                     "--lockstep: has no effect without --ros1, --ros2 or --view");
   const Result check = run(fmt::format("scenario check {} --json", folder / "run/scenario.yaml"));

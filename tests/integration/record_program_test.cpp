@@ -28,7 +28,7 @@ using testing::run;
 using testing::TemporaryFolder;
 using testing::write_file;
 
-/// Where `./dev test` puts Foxglove's MCAP reader; "" where it could not.
+/// Where `./dev test` puts Foxglove's MCAP reader; "" if it could not.
 std::string node_folder() {
   const std::string folder = std::string(testing::kSource) + "/build/node";
   return std::filesystem::exists(folder + "/node_modules/@mcap/core") ? folder : "";

@@ -178,7 +178,7 @@ std::size_t points_in(const std::string& path) {
   return count;
 }
 
-/// False where the program was built without assimp.
+/// False if the program was built without assimp.
 bool reads_meshes() {
   static const bool reads = [] {
     const TemporaryFolder folder;

@@ -279,7 +279,7 @@ TEST(Lidar, Statistics_TruthIsWhatIsThereAndWhereExactDeskewingPutsThePoint) {
       const auto range = scene.intersect(T_world_sensor.translation, direction);
       ASSERT_TRUE(range);
       const Vector3d place = T_world_sensor.translation + *range * direction;
-      // the map rounds corners, and its beams go 0.1 degrees off where returns are modelled
+      // the map rounds corners, and its beams go 0.1 degrees off if returns are modelled
       const Vector3d q = (place - Vector3d(0, 0, 1)).cwiseAbs().cwiseQuotient(Vector3d(6, 6, 3));
       const Vector3d apart = (Vector3d::Ones() - q).cwiseProduct(Vector3d(6, 6, 3));
       int axis = 0;  // of the face

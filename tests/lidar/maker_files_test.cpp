@@ -1,9 +1,8 @@
-#include "pointflight/lidar/maker_files.hpp"
-
 #include <gtest/gtest.h>
 
 #include <string>
 
+#include "pointflight/lidar/vendor_files.hpp"
 #include "tests/lidar/scan_of.hpp"
 #include "tests/support.hpp"
 

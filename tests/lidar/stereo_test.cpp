@@ -206,7 +206,7 @@ TEST(StereoCamera, Statistics_ItsInfraredPictureIsLitByProjectorAndSun) {
   };
   EXPECT_NEAR(left_by_right(0.0), 4.0, 0.1);  // by the square of the depth
   EXPECT_NEAR(left_by_right(100.0), (100 + 5 / 4.0) / (100 + 5 / 16.0), 0.03);
-  // not where returns are not modelled, and not of LiDARs
+  // not if returns are not modelled, and not of LiDARs
   const Lidar ideal(load_lidar("d455"), 0);
   EXPECT_TRUE(ideal.take({}, PoseTrack(Pose{}), *renderer, Executor(2)).infrared.empty());
   const Lidar mid360(load_lidar("mid360"), 0, nullptr, Surroundings{});

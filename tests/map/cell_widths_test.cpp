@@ -1,4 +1,4 @@
-// Wide cells where points are thin, small ones where many lie on something that is not flat.
+// Wide cells if points are thin, small ones if many lie on something that is not flat.
 #include <gtest/gtest.h>
 
 #include <array>

@@ -223,7 +223,7 @@ TEST(MergeMaps, PosesAndWhatCannotBeJoined) {
                     merge_maps({{map, {}}, {coarse, {}}}, {}, executor);
                   }),
                   "resolutions of 0.1 m and 0.2 m");
-  // intensities keep their meaning where all mean the same
+  // intensities keep their meaning if all mean the same
   MapDescription told = description_of(*map);
   set_reflectivity(told, 0.01);
   const EditedMap same = transform_map(*map, {}, {}, executor);

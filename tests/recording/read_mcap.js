@@ -2,7 +2,7 @@
 // an independent reader for the tests. node read_mcap.js NODE_FOLDER FILE
 //
 // It reads the file twice: as a stream, checksums and all, and through its indices; both must give
-// the same messages. Exit code 1 with a reason where they do not.
+// the same messages. Exit code 1 with a reason if they do not.
 const { createRequire } = require("node:module");
 const fs = require("node:fs");
 

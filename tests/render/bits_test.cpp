@@ -1,6 +1,6 @@
 // The same bits from every build: maps and ten million beams a scene against recorded hashes. Where
 // a change of the import or of the measurement model is meant to change them, run the test and put
-// in what it prints; where it is not, the change has broken reproducibility.
+// in what it prints; if it is not, the change has broken reproducibility.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -138,22 +138,22 @@ TEST_P(Bits, Slow_AreThoseRecorded) {
 #if defined(__x86_64__)
   const Recorded& recorded = GetParam();
   EXPECT_EQ(map_hash_, recorded.map) << "the map is another";
-  EXPECT_EQ(hash_of(100000, 2, BeamGrouping::kAsSuits), recorded.beams_1e5);
+  EXPECT_EQ(hash_of(100000, 2, BeamGrouping::kAutomatic), recorded.beams_1e5);
   EXPECT_EQ(hash_of(100000, 1, BeamGrouping::kSingly), recorded.beams_1e5) << "singly";
   EXPECT_EQ(hash_of(100000, 1, BeamGrouping::kBundles), recorded.beams_1e5) << "bundles";
   if (kAll) {
-    EXPECT_EQ(hash_of(10000000, 2, BeamGrouping::kAsSuits), recorded.beams_1e7);
+    EXPECT_EQ(hash_of(10000000, 2, BeamGrouping::kAutomatic), recorded.beams_1e7);
   }
   const bool thorough = std::getenv("POINTFLIGHT_THOROUGH") != nullptr;  // by ./dev check
   for (const std::string& name : kernel_names()) {
     use_kernel(name);
     if (!kAll) {
-      EXPECT_EQ(hash_of(100000, 3, BeamGrouping::kAsSuits), recorded.beams_1e5) << name;
+      EXPECT_EQ(hash_of(100000, 3, BeamGrouping::kAutomatic), recorded.beams_1e5) << name;
       EXPECT_EQ(hash_of(100000, 3, BeamGrouping::kBundles), recorded.beams_1e5) << name;
     } else if (!thorough) {
-      EXPECT_EQ(hash_of(1000000, 3, BeamGrouping::kAsSuits), recorded.beams_1e6) << name;
+      EXPECT_EQ(hash_of(1000000, 3, BeamGrouping::kAutomatic), recorded.beams_1e6) << name;
     } else {
-      EXPECT_EQ(hash_of(10000000, 3, BeamGrouping::kAsSuits), recorded.beams_1e7) << name;
+      EXPECT_EQ(hash_of(10000000, 3, BeamGrouping::kAutomatic), recorded.beams_1e7) << name;
     }
   }
   use_kernel("");

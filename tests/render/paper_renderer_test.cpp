@@ -26,10 +26,10 @@ using testing::render;
 
 class PaperAgainstBeam : public ::testing::Test {
  protected:
-  /// Median difference where both return, and the shares of rays where only one does.
+  /// Median difference if both return, and the shares of rays if only one does.
   struct Agreement {
     double median;
-    double within;  ///< 0.1 m, of the rays where both return.
+    double within;  ///< 0.1 m, of the rays if both return.
     double only_beam;
     double only_paper;
   };

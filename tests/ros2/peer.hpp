@@ -96,7 +96,7 @@ class Peer {
   dds_entity_t participant_ = 0;
 };
 
-/// True where this machine is on a network whose nodes can be asked all at once.
+/// True if this machine is on a network whose nodes can be asked all at once.
 inline bool has_multicast() {
   ifaddrs* all = nullptr;
   if (getifaddrs(&all) != 0) return false;

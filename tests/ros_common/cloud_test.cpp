@@ -38,7 +38,7 @@ Scan scan_of_three() {
   return scan;
 }
 
-/// Value of a field of point i, by its name; NaN where there is no such field.
+/// Value of a field of point i, by its name; NaN if there is no such field.
 double value_of(const msg::PointCloud2& cloud, std::size_t i, const std::string& name) {
   for (const msg::PointField& field : cloud.point_fields) {
     if (field.name != name) continue;
@@ -101,7 +101,7 @@ TEST(PointLayouts, HoldTheScan) {
     EXPECT_EQ(cloud.row_step, 3 * cloud.point_step);
     EXPECT_EQ(cloud.data.size(), cloud.row_step);
     EXPECT_EQ(cloud.header.frame_id, "sensor");
-    // stamped with the first point, or with the scan's middle where points have no time
+    // stamped with the first point, or with the scan's middle if points have no time
     EXPECT_EQ(cloud.header.stamp.sec, 1'700'000'002) << layout.name;
     EXPECT_EQ(cloud.header.stamp.nanosec, layout.timed ? 500'000u : 50'000'000u) << layout.name;
     for (std::size_t i = 0; i < 3; ++i) {

@@ -17,7 +17,7 @@ class Bus {
   explicit Bus(std::function<std::int64_t()> now) : now_(std::move(now)) {}
 
   std::int64_t delay = 0;  ///< ns, of each message.
-  /// True where a message of one does not come to another.
+  /// True if a message of one does not come to another.
   std::function<bool(std::size_t from, std::size_t to, ShareChannel)> loses;
 
   class End : public ShareTransport {
@@ -53,7 +53,7 @@ class Bus {
   /// The lease of one has run out for another.
   void lose(std::size_t from, std::size_t to) {
     const std::lock_guard lock(mutex_);
-    inboxes_[to].push_back({from, now_(), {ShareChannel::kCrew, {}, from, now_()}});
+    inboxes_[to].push_back({from, now_(), {ShareChannel::kMembers, {}, from, now_()}});
     arrived_.notify_all();
   }
 
@@ -86,7 +86,7 @@ class Bus {
     if (from < sent_.size()) sent_[from] += bytes.size();
     const std::int64_t due = now_() + delay;
     const Message message{from, due, {channel, bytes, from, due}};
-    if (channel == ShareChannel::kCrew && from < sent_.size()) {
+    if (channel == ShareChannel::kMembers && from < sent_.size()) {
       std::erase_if(crew_, [&](const Message& m) { return m.from == from; });
       crew_.push_back(message);
     }

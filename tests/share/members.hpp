@@ -85,7 +85,7 @@ struct Member {
         simulation.skip_to(skip->to);
         from = skip->to;
         start = clock();
-      } else if (const auto* hurry = std::get_if<HurryOrder>(&order)) {
+      } else if (const auto* hurry = std::get_if<ShiftPaceOrder>(&order)) {
         start -= hurry->by.count();
       }
     }

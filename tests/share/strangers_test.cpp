@@ -43,7 +43,7 @@ TEST(FleetShare, StrangersChangeNothingAndAreSaidOnce) {
       intro.name = "another\nworld";
       intro.phase = share_msg::Phase::kFlying;
       intro.parts = {{"map", "x"}};
-      world.bus.shout(ShareChannel::kCrew, encode<Wire::kCdr>(intro));
+      world.bus.shout(ShareChannel::kMembers, encode<Wire::kCdr>(intro));
       // in the other's name, with what no vehicle does
       states.head.version = share_msg::Head::VERSION;
       states.head.process = 2;
@@ -70,7 +70,7 @@ TEST(FleetShare, WhoSpeaksInAnothersNameIsNotHeardAndNoNumberIsTooLarge) {
   left.phase = share_msg::Phase::kLeft;
   left.vehicles = {1};
   left.parts = common_ground(a.simulation, 1.0);
-  world.bus.shout(ShareChannel::kCrew, encode<Wire::kCdr>(left));
+  world.bus.shout(ShareChannel::kMembers, encode<Wire::kCdr>(left));
   share_msg::States states;
   states.head.kind = share_msg::Kind::kStates;
   states.head.process = 2;
@@ -87,7 +87,7 @@ TEST(FleetShare, WhoSpeaksInAnothersNameIsNotHeardAndNoNumberIsTooLarge) {
   left.phase = share_msg::Phase::kFlying;
   left.parts.clear();
   const std::uint64_t foreign = a.share->foreign();
-  world.bus.shout(ShareChannel::kCrew, encode<Wire::kCdr>(left), 1);
+  world.bus.shout(ShareChannel::kMembers, encode<Wire::kCdr>(left), 1);
   world.pass(0.1);
   EXPECT_EQ(a.share->foreign(), foreign + 1);
   EXPECT_TRUE(a.simulation.status(1).present);
@@ -107,7 +107,7 @@ TEST(FleetShare, WhoSpeaksInAnothersNameIsNotHeardAndNoNumberIsTooLarge) {
     world.bus.shout(ShareChannel::kClock, encode<Wire::kCdr>(clock), 1);
     left.ends_at = left.begins_at = left.waits_at = end;
     left.vehicles = {4000000000u};
-    world.bus.shout(ShareChannel::kCrew, encode<Wire::kCdr>(left), 1);
+    world.bus.shout(ShareChannel::kMembers, encode<Wire::kCdr>(left), 1);
     share_msg::Past past;
     past.head.kind = share_msg::Kind::kPast;
     past.head.process = 2;

@@ -101,7 +101,7 @@ TEST(Swarm, ARunIsSavedRestoredAndBranched) {
   }
   EXPECT_EQ(first.hash(), again.hash());
   EXPECT_EQ(simulation.end(), RunEnd::kMissionUnfinished);
-  // the branch knows nothing of it, and differs where it is told something else
+  // the branch knows nothing of it, and differs if it is told something else
   EXPECT_EQ(branch.time(), SimTime(std::chrono::milliseconds(333)));
   Simulation other = branch;
   other.command(0, VelocityCommand{{0, 0, 1}, 0.0, 0.0});

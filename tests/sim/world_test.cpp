@@ -264,7 +264,7 @@ TEST(Obstacles, KeyframesAndLoopsAreWhereTheirFilesSay) {
   expect_contains(error("time,x,y,z\n0,0,0,0\n1,5,0,0\n", true), "k.csv:3: repeats");
   expect_contains(error("time,x,y,z\n0,0,nan,0\n", false), "k.csv:2: ");
   expect_contains(error("time,x,y\n0,0,0\n", false), "'z");
-  const RoundMotion loop = loop_through({{0, 0, 1}, {4, 0, 1}, {4, 3, 1}}, 2.0);
+  const LoopMotion loop = loop_through({{0, 0, 1}, {4, 0, 1}, {4, 3, 1}}, 2.0);
   EXPECT_TRUE(loop.at(SimTime(std::chrono::seconds(1))).translation.isApprox(Vector3d(2, 0, 1)));
   EXPECT_TRUE(loop.at(SimTime(std::chrono::seconds(3))).translation.isApprox(Vector3d(4, 2, 1)));
   // 12 m round at 2 m/s

@@ -9,7 +9,7 @@
 
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/random.hpp"
-#include "pointflight/render/internal/meeting_kernel.hpp"
+#include "pointflight/render/internal/all_hits_kernel.hpp"
 #include "pointflight/render/renderer.hpp"
 #include "tests/support.hpp"
 
@@ -260,17 +260,17 @@ TEST(MeetAll, FindsWhatBruteForceFindsBehindSurfacesToo) {
   }
   std::size_t far_behind = 0;
   std::size_t seen = 0;
-  const auto visit = [&](const RayMeetings& way) {
+  const auto visit = [&](const RayHits& way) {
     ++seen;
     MetByWord got;
-    for (const MetSurfel& met : way.met) {
+    for (const SurfelHit& met : way.hits) {
       got[met.word] = {static_cast<double>(met.t),
                        static_cast<double>(met.weight) / static_cast<double>(kWeightOne)};
       far_behind += way.range >= 0.0f && met.t > way.range + 1.0f ? 1 : 0;
     }
     expect_same(got, met_by_force(*map, rays[way.ray]));
   };
-  EXPECT_EQ(meet_all(kernel_map_of(*map), rays, order, visit), 0u);
+  EXPECT_EQ(find_all_hits(kernel_map_of(*map), rays, order, visit), 0u);
   EXPECT_EQ(seen, rays.size());
   EXPECT_GT(far_behind, 20u) << "the wall behind the ball";
 }
@@ -280,17 +280,17 @@ TEST(MeetAll, AnEmptyMapAndNoRays) {
   std::vector<Ray> rays = {{Vector3d::Zero(), Vector3f::UnitX(), 5.0f}};
   const std::vector<std::uint32_t> order = {0};
   std::size_t seen = 0;
-  meet_all(kernel_map_of(*map), rays, {}, [&](const RayMeetings&) { ++seen; });
+  find_all_hits(kernel_map_of(*map), rays, {}, [&](const RayHits&) { ++seen; });
   EXPECT_EQ(seen, 0u);
-  meet_all(kernel_map_of(*map), rays, order, [&](const RayMeetings& way) {
+  find_all_hits(kernel_map_of(*map), rays, order, [&](const RayHits& way) {
     ++seen;
     EXPECT_LT(way.range, 0.0f);
-    EXPECT_TRUE(way.met.empty());
+    EXPECT_TRUE(way.hits.empty());
   });
   EXPECT_EQ(seen, 1u);
   KernelMap empty = kernel_map_of(*map);
   empty.node_count = 0;
-  meet_all(empty, rays, order, [&](const RayMeetings& way) {
+  find_all_hits(empty, rays, order, [&](const RayHits& way) {
     ++seen;
     EXPECT_LT(way.range, 0.0f);
   });

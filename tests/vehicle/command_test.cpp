@@ -129,7 +129,7 @@ TEST(VehicleShow, ShippedVehiclesReachTheirDesignInTheirOwnAir) {
        {"quad_250", "quad_330", "quad_450", "hexa_550", "octo_1045", "lee2010"}) {
     for (const StepResponse& r : step_responses(load_vehicle(name))) {
       SCOPED_TRACE(std::string(name) + " " + r.name);
-      EXPECT_NEAR(r.value.back(), 1.0, 0.13);  // drag takes its part where nothing integrates
+      EXPECT_NEAR(r.value.back(), 1.0, 0.13);  // drag takes its part if nothing integrates
       EXPECT_LT(r.overshoot, 0.2);
       EXPECT_GT(r.bandwidth, 0.45 * r.design.natural_frequency);
     }

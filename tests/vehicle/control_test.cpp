@@ -327,7 +327,7 @@ TEST_P(ShippedVehicles, Statistics_ComeBackToTheirPlaceInSteadyWindAndWithAWrong
     flown.mass *= 1.15;
     const Vector3d wind(5.0, 3.0, 0.0);
     const double blown = place_after(2.0, flown, known, wind).norm();
-    EXPECT_GT(blown, 0.05);  // it is a test only where something disturbs
+    EXPECT_GT(blown, 0.05);  // it is a test only if something disturbs
     EXPECT_LT(place_after(30.0, flown, known, wind).norm(), 0.005);
   }
 }

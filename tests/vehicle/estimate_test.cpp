@@ -58,7 +58,7 @@ TEST(Estimate, DriftsAsARandomWalkAndStatesIt) {
     EXPECT_NEAR(s.stated.position, 0.02 * 0.02 * seconds + 1e-4, 1e-9);
     EXPECT_NEAR(s.stated.yaw / (kDegree * kDegree), 0.3 * 0.3 * seconds + 0.01, 1e-9);
   }
-  // the same where reports are left out, and at another rate
+  // the same if reports are left out, and at another rate
   const Spread sparse = spread_after(drifting(), 10.0, 20, 4);
   expect_true(sparse);
   EXPECT_NEAR(sparse.stated.position, 0.02 * 0.02 * 20 + 1e-4, 1e-9);

@@ -179,7 +179,7 @@ TEST_P(Formulations, NewtonEulerAndMomentumAgree) {
 
 TEST_P(Formulations, TheirDifferenceFallsSixteenfoldWithHalfTheStep) {
   Tumble tumble(GetParam());
-  tumble.settings.drag_area.setZero();  // |v| v has a kink where v is zero: no order there
+  tumble.settings.drag_area.setZero();  // |v| v has a kink if v is zero: no order there
   const MomentumModel model(tumble.settings, tumble.commands, tumble.wind);
   const Momenta reference = model.advanced(tumble.momenta(tumble.start, model), 4.0, 40000);
   const auto error = [&](double dt) {

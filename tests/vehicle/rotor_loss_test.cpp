@@ -61,7 +61,7 @@ TEST(Mixer, WhatIsLeftMakesTheSameWrenchWhereItCan) {
         shares[lost] = left;
         EXPECT_TRUE(mixer.holds_heading(shares));
         const Wrench wanted{weight, {0.02 * weight, -0.01 * weight, 0.0}};
-        std::vector<double> turning = mixer.speeds_of_what_is_left(wanted, {}, shares);
+        std::vector<double> turning = mixer.speeds_with_failed_rotors(wanted, {}, shares);
         for (std::size_t i = 0; i < turning.size(); ++i) turning[i] *= shares[i];
         EXPECT_EQ(turning[lost] == 0.0, left == 0.0);
         const Wrench made = mixer.wrench(turning);

@@ -78,7 +78,7 @@ void begin() {
   if (job().deals && job().rank == 0) job().dealer = std::make_unique<Dealer>();
 }
 
-void meet() {
+void barrier() {
   MPI_Request request;
   MPI_Ibarrier(MPI_COMM_WORLD, &request);
   wait_for(request);
@@ -110,6 +110,6 @@ extern "C" __attribute__((visibility("default"))) const pointflight::MpiModule*
 pointflight_mpi_module() {
   using namespace pointflight;
   static const MpiModule module = {
-      begin, [] { return job().rank; }, [] { return job().size; }, meet, next, end};
+      begin, [] { return job().rank; }, [] { return job().size; }, barrier, next, end};
   return &module;
 }

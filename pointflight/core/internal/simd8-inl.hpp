@@ -150,7 +150,7 @@ POINTFLIGHT_INLINE M8 without(const M8& a, const M8& b) {
   POINTFLIGHT_EACH(hn::AndNot(b.v[p], a.v[p]))
   return out;
 }
-/// Zero where the condition does not hold.
+/// Zero if the condition does not hold.
 POINTFLIGHT_INLINE I8 keep(const M8& condition, const I8& a) {
   I8 out;
   POINTFLIGHT_EACH(hn::IfThenElseZero(hn::RebindMask(kI, condition.v[p]), a.v[p]))

@@ -73,7 +73,7 @@ void ShapeTree::build(std::uint32_t begin, std::uint32_t end) {
   build(middle, end);
 }
 
-std::optional<ShapeTree::Met> ShapeTree::intersect(const Vector3d& origin,
+std::optional<ShapeTree::Hit> ShapeTree::intersect(const Vector3d& origin,
                                                    const Vector3d& direction) const {
   if (nodes_.empty()) return std::nullopt;
   Vector3d inverse;
@@ -81,7 +81,7 @@ std::optional<ShapeTree::Met> ShapeTree::intersect(const Vector3d& origin,
     const double d = direction[axis];
     inverse[axis] = 1.0 / (std::abs(d) > 1e-300 ? d : 1e-300);
   }
-  std::optional<Met> met;
+  std::optional<Hit> met;
   double end = std::numeric_limits<double>::infinity();
   std::array<std::uint32_t, 64> stack{};  // halves of up to 2^32 shapes
   std::size_t depth = 0;
@@ -104,7 +104,7 @@ std::optional<ShapeTree::Met> ShapeTree::intersect(const Vector3d& origin,
       const auto t = pointflight::intersect(shapes_[shape], origin, direction);
       if (t && *t < end) {
         end = *t;
-        met = Met{*t, shape};
+        met = Hit{*t, shape};
       }
     }
   }

@@ -15,14 +15,14 @@ class ShapeTree {
   /// Refers to `shapes`, which must outlive the tree and stay as they are.
   explicit ShapeTree(const std::vector<Shape>& shapes);
 
-  struct Met {
+  struct Hit {
     double range;         ///< m along the ray.
     std::uint32_t shape;  ///< Index in `shapes`.
   };
 
-  /// First meeting of the ray (unit `direction`) with any shape, the same as
+  /// First intersection of the ray (unit `direction`) with any shape, the same as
   /// `ShapeScene::intersect`.
-  [[nodiscard]] std::optional<Met> intersect(const Vector3d& origin,
+  [[nodiscard]] std::optional<Hit> intersect(const Vector3d& origin,
                                              const Vector3d& direction) const;
 
  private:

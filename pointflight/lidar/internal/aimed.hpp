@@ -14,8 +14,8 @@ struct Lidar::Aimed {
   bool snapshot = false;
   Pose middle;                    ///< T_world_sensor in the middle of the scan.
   std::vector<Ray> rays;          ///< Their axes.
-  std::vector<Vector3f> across;   ///< `WideBeams::across`; none where beams are lines.
-  std::vector<Duration> offsets;  ///< Their times, where bodies move meanwhile.
+  std::vector<Vector3f> across;   ///< `WideBeams::across`; none if beams are lines.
+  std::vector<Duration> offsets;  ///< Their times, if bodies move meanwhile.
 
   [[nodiscard]] const std::vector<Beam>& beams() const { return ordered->beams; }
 };

@@ -66,7 +66,7 @@ CsvTable table_of(std::vector<Channel> channels, const RingsSettings& s, const s
   return {text, name};
 }
 
-/// Refuses a time between channels where the table has the time of each.
+/// Refuses a time between channels if the table has the time of each.
 void check_interval(const LidarSettings& settings, const CsvTable& table) {
   const int time = table.find("fire_time_us");
   if (time < 0 || settings.rings.channel_interval_us <= 0.0) return;
@@ -92,8 +92,8 @@ CsvTable load_table(const LidarSettings& settings) {
 
 /// Velodyne and Hesai: the head turns clockwise seen from above; a channel fires at its own time
 /// within the cycle. Velodyne: at azimuth encoder(time) - rot_correction, geometry of the channels
-/// as in the maker's ROS driver (velodyne_pointcloud, RawData::unpack), with the offsets as the
-/// beam's origin. Hesai: at encoder(time) + azimuth offset, as in the maker's SDK
+/// as in the vendor's ROS driver (velodyne_pointcloud, RawData::unpack), with the offsets as the
+/// beam's origin. Hesai: at encoder(time) + azimuth offset, as in the vendor's SDK
 /// (HesaiLidar_SDK_2.0); that driver's frame has y where ours has x: the way that azimuth 0 looks.
 class FiringsPattern : public BeamPattern {
  public:
@@ -197,9 +197,9 @@ class FiringsPattern : public BeamPattern {
   std::int64_t reach_ = 0;         ///< Cycles that a channel fires before or after its own.
 };
 
-/// Ouster: all rows of a column share one time; geometry of the maker's SDK ("lidar range to XYZ"),
-/// in the sensor frame (half a turn about z from the lidar frame). A scan is one turn. Rings are
-/// the rows from the top, as in the maker's ROS driver (ouster_ros).
+/// Ouster: all rows of a column share one time; geometry of the vendor's SDK ("lidar range to
+/// XYZ"), in the sensor frame (half a turn about z from the lidar frame). A scan is one turn. Rings
+/// are the rows from the top, as in the vendor's ROS driver (ouster_ros).
 class OusterPattern : public BeamPattern {
  public:
   explicit OusterPattern(const LidarSettings& settings) {

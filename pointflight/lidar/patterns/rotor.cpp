@@ -8,7 +8,7 @@
 namespace pointflight {
 namespace {
 
-/// Livox Mid-360 (constants fitted to the maker's published table; mean error 0.005 deg, max
+/// Livox Mid-360 (constants fitted to the vendor's published table; mean error 0.005 deg, max
 /// 0.015).
 ///
 /// In the rotor's frame (T tangential, R radial, K along the shaft) the lasers are fixed in the

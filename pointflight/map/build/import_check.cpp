@@ -12,7 +12,7 @@
 namespace pointflight {
 namespace {
 
-constexpr double kSparsest = 2.0;     // m between points: what a drone meets has to show
+constexpr double kSparsest = 2.0;     // m between points: what a drone hits has to show
 constexpr double kSmallest = 1.0;     // m, of the whole world
 constexpr double kWidestMesh = 50e3;  // m
 constexpr double kHighest = 5e3;      // m, of the whole world

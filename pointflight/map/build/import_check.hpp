@@ -14,10 +14,10 @@ std::vector<std::string> import_warnings(const ImportReport& report,
                                          const ImportOptions& options,
                                          const Aabb& bounds_world);
 
-/// The same for the floor alone; empty where it is level or there is none.
+/// The same for the floor alone; empty if it is level or there is none.
 std::string floor_warning(const FloorPlane& floor);
 
-/// Throws InputError where an option is none: what the command line cannot give, a program may.
+/// Throws InputError if an option is none: what the command line cannot give, a program may.
 void check_options(const ImportOptions& options);
 
 }  // namespace pointflight

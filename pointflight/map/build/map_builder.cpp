@@ -230,7 +230,7 @@ class Import {
     pointflight::report(progress_, "building the hierarchy", 1.0);
   }
 
-  /// Surfels of the cells, of wider ones where points are thin, of smaller ones where many lie on
+  /// Surfels of the cells, of wider ones if points are thin, of smaller ones if many lie on
   /// something that is not flat.
   ChosenSurfels choose_scales() {
     ImportReport& report = map_.report;

@@ -54,10 +54,10 @@ struct ImportReport {
   std::uint64_t small_surfels = 0;        ///< Of them, those that stand for part of a cell.
   std::uint64_t planar_surfels = 0;       ///< Of them, those of thickness class 0.
   double noise = 0.0;                     ///< Deviation of the points across flat surfaces, m.
-  ProjectionReport projection;            ///< All zero where the cloud was clean.
+  ProjectionReport projection;            ///< All zero if the cloud was clean.
   double points_per_cell = 0.0;           ///< Median of the planar surfels.
   float tau = 0.0f;                       ///< Coverage that makes a return.
-  std::uint64_t grown_surfels = 0;        ///< Widened where the scan is thin.
+  std::uint64_t grown_surfels = 0;        ///< Widened if the scan is thin.
   double resolution = 0.0;                ///< r, m.
   double spacing = 0.0;                   ///< Median nearest-neighbour distance, m; 0 if unknown.
   double supported_resolution = 0.0;      ///< 2 spacings.

@@ -13,7 +13,7 @@
 namespace pointflight {
 
 /// Calls `sink` with rows for the surfels of a map, in order: one each, at its centre, or points
-/// spread evenly over it where `points_per_square_metre` is above 0. Rows carry intensity, normal
+/// spread evenly over it if `points_per_square_metre` is above 0. Rows carry intensity, normal
 /// and ellipsoid.
 void for_each_row(const SurfelMap& map,
                   double points_per_square_metre,

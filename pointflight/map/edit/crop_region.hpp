@@ -15,7 +15,7 @@ struct CropRegion {
   std::vector<std::array<double, 2>> polygon;  ///< x, y of its corners in order, m; closes itself.
   double above_ground_min = -1e300;            ///< m above `ground`.
   double above_ground_max = 1e300;             ///< m above `ground`.
-  std::shared_ptr<const GroundHeight> ground;  ///< Null where heights do not matter.
+  std::shared_ptr<const GroundHeight> ground;  ///< Null if heights do not matter.
   bool outside = false;                        ///< All but that part.
 
   /// True for a point (world, m) that stays.

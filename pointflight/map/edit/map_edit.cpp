@@ -35,7 +35,7 @@ Surfel turned(Surfel surfel, const Quaterniond& rotation) {
   return surfel;
 }
 
-/// True where a surfel of `map` stands for the place already: its cell, turned as it is, holds it.
+/// True if a surfel of `map` stands for the place already: its cell, turned as it is, holds it.
 bool covers(const SurfelMap& map, const Vector3d& p_map) {
   const double r = map.resolution();
   const Vector3d half(0.5 * r, 0.6 * r, 0.6 * r);  // centroids lie anywhere in their cells
@@ -82,7 +82,7 @@ EditedMap shifted(const SurfelMap& map, const Vector3d& by, const EditOptions& o
   return edited;
 }
 
-/// What one of them knows; nothing where one does not say.
+/// What one of them knows; nothing if one does not say.
 void join_known_space(const std::vector<PlacedMap>& maps, EditedMap& joined) {
   std::vector<std::byte> section;
   const bool all_say = std::all_of(maps.begin(), maps.end(), [](const PlacedMap& placed) {
@@ -200,7 +200,7 @@ EditedMap crop_map(const SurfelMap& map,
   });
   SurfelGathering gathering(map.origin_world(), map.resolution(), count, options);
   std::size_t at = 0;
-  std::vector<Vector3d> gone;  // where space is not known any more
+  std::vector<Vector3d> gone;  // if space is not known any more
   for_each_surfel(map.words(), [&](const LeafHeader& leaf, std::size_t word) {
     if (!kept[at++]) {
       if (map.known_space() != nullptr) gone.push_back(map.center_world(leaf, map.words()[word]));

@@ -46,7 +46,7 @@ void set_reflectivity(MapDescription& description, double per_intensity);
 void append_note(EditedMap& edited, const std::string& note);
 
 /// Keeps the surfels whose centre in the world `keep` accepts; it is called from one thread. Space
-/// that held what goes is not known any more. Throws InputError where none is left.
+/// that held what goes is not known any more. Throws InputError if none is left.
 EditedMap crop_map(const SurfelMap& map,
                    const std::function<bool(const Vector3d& center_world)>& keep,
                    const EditOptions& options,
@@ -67,7 +67,7 @@ struct PlacedMap {
 /// Joins maps of one resolution. A surfel of a later one that lies within the cell of an earlier
 /// one's is left out: twice the coverage would make edges fat. Space is known where one of them
 /// knows it, if all say what they know. Intensities keep their reflectivity if all have one scale.
-/// Throws InputError where resolutions differ or the whole is too wide.
+/// Throws InputError if resolutions differ or the whole is too wide.
 EditedMap merge_maps(const std::vector<PlacedMap>& maps,
                      const EditOptions& options,
                      const Executor& executor,

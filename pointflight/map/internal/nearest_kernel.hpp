@@ -12,7 +12,7 @@ namespace pointflight {
 struct NearestWord {
   float squared_distance = 0.0f;
   std::uint32_t leaf = 0;  ///< Word of its leaf's header.
-  std::uint32_t word = 0;  ///< 0 where nothing is within the distance.
+  std::uint32_t word = 0;  ///< 0 if nothing is within the distance.
 };
 
 /// Nearest surfel to a point (metres from the map's origin) within `max_distance`: best-first

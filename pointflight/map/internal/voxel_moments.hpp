@@ -151,9 +151,9 @@ class VoxelGrid {
     };
     return part(x) | part(y) << 1 | part(z) << 2;
   }
-  /// The brick's index in bricks_, made where it is new.
+  /// The brick's index in bricks_, made if it is new.
   std::uint32_t brick_at(std::uint64_t key);
-  /// The cell's index in cells_, made where it is new.
+  /// The cell's index in cells_, made if it is new.
   std::uint32_t cell_at(const std::array<std::int32_t, 3>& voxel);
   /// Index of a brick in bricks_, or kNone.
   [[nodiscard]] std::uint32_t find_brick(std::uint64_t key) const;
@@ -167,7 +167,7 @@ class VoxelGrid {
   std::uint32_t last_brick_ = kNone;  ///< The one used last: neighbours follow each other.
 };
 
-/// Looks around cells of a grid that does not change. One per thread; fast where consecutive cells
+/// Looks around cells of a grid that does not change. One per thread; fast if consecutive cells
 /// lie near each other.
 class NeighbourWindow {
  public:
@@ -240,7 +240,7 @@ class NeighbourWindow {
 
   const VoxelGrid& grid_;
   std::uint64_t key_ = ~0ull;                         ///< Of the brick in the middle.
-  std::array<const VoxelGrid::Brick*, 27> around_{};  ///< Null where empty.
+  std::array<const VoxelGrid::Brick*, 27> around_{};  ///< Null if empty.
 };
 
 }  // namespace pointflight

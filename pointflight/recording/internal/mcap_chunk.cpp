@@ -9,7 +9,7 @@ namespace {
 
 constexpr std::uint64_t kLargestChunk = std::uint64_t{1} << 28;  // bytes, unpacked
 
-/// Bytes of a packed chunk; empty where they do not unpack to `size`.
+/// Bytes of a packed chunk; empty if they do not unpack to `size`.
 std::vector<std::byte> unpacked(std::span<const std::byte> packed,
                                 const std::string& how,
                                 std::uint64_t size) {
@@ -17,7 +17,7 @@ std::vector<std::byte> unpacked(std::span<const std::byte> packed,
   if (how.empty()) {
     out.assign(packed.begin(), packed.end());
   } else if (how == "zstd") {
-    // the frame says its size as well: memory is taken only where both agree
+    // the frame says its size as well: memory is taken only if both agree
     if (ZSTD_getFrameContentSize(packed.data(), packed.size()) != size) return {};
     out.resize(size);
     if (ZSTD_decompress(out.data(), size, packed.data(), packed.size()) != size) return {};

@@ -23,10 +23,10 @@ struct PackedChunk {
   std::span<const std::byte> data;  ///< Packed.
 };
 
-/// Nothing where the record is cut, or claims more than is taken.
+/// Nothing if the record is cut, or claims more than is taken.
 std::optional<PackedChunk> chunk_of(RecordReader& record);
 
-/// Its records; nothing where they do not unpack to the size and the checksum that it says.
+/// Its records; nothing if they do not unpack to the size and the checksum that it says.
 std::optional<std::vector<std::byte>> unpack(const PackedChunk& chunk);
 
 }  // namespace pointflight::mcap

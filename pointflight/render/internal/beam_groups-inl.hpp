@@ -1,8 +1,8 @@
 // Groups of beams that go down the tree together: who they are, and the frustum around them.
 //
-// Neighbouring beams meet much the same nodes of the hierarchy. Eight beams make a group, whose
-// lanes the arithmetic works on; up to eight groups go together, as a packet where they lie close
-// (packet-inl.hpp), as a bundle where they do not (bundle-inl.hpp). Around them lies a frustum:
+// Neighbouring beams hit much the same nodes of the hierarchy. Eight beams make a group, whose
+// lanes the arithmetic works on; up to eight groups go together, as a packet if they lie close
+// (packet-inl.hpp), as a bundle if they do not (bundle-inl.hpp). Around them lies a frustum:
 // four planes through an apex (the first beam's origin, moved outwards by as far as other origins
 // lie from it), with the mean direction w as its axis and u, v across it.
 //
@@ -57,7 +57,7 @@ struct BeamGroups {
   Group groups[kGroups];
 };
 
-/// Copies eight beams to a group. False where they are too far apart to go together: more than
+/// Copies eight beams to a group. False if they are too far apart to go together: more than
 /// `widest` from their mean direction, rad.
 POINTFLIGHT_INLINE bool take_beams(
     const KernelMap& map, const Ray* rays, const std::uint32_t* beams, float widest, Group& group) {
@@ -156,7 +156,7 @@ POINTFLIGHT_INLINE void set_up(BeamGroups& p, std::size_t count) {
   // the frame: w along the mean direction, u and v across it
   Vector3f mean = Vector3f::Zero();
   for (std::size_t g = 0; g < kGroups; ++g) {
-    // what is not there meets nothing
+    // what is not there hits nothing
     p.group_end[g] = g < count ? greatest(load(p.groups[g].end)) : -kNever;
     for (int k = 0; k < 3 && g < count; ++k) mean[k] += p.groups[g].mean[k];
   }

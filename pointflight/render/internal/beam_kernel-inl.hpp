@@ -29,7 +29,7 @@ POINTFLIGHT_INLINE std::size_t most_steps(const KernelMap& map) {
   return map.node_count * 8 + 8;
 }
 
-/// What one beam has met on its way, and where the way ends.
+/// What one beam has hit on its way, and where the way ends.
 struct BeamState {
   float end;    ///< Nothing beyond matters.
   float first;  ///< Where the surface begins, kNever before one is found.
@@ -120,12 +120,12 @@ POINTFLIGHT_INLINE void shorten(const KernelMap& map, BeamState& s) {
   s.end = end < s.end ? end : s.end;
 }
 
-/// What becomes of what a beam has met: it ends the beam's way, or all is kept up to the beam's
+/// What becomes of what a beam has hit: it ends the beam's way, or all is kept up to the beam's
 /// end.
-enum class Meetings { kEndTheWay, kAllKept };
+enum class HitMode { kFirst, kAll };
 
 /// Adds the hits among eight lanes; `hit` has a bit for each. `first_word` is the word of lane 0.
-template <Meetings kMeetings>
+template <HitMode kMode>
 POINTFLIGHT_INLINE void add_hits(const KernelMap& map,
                                  BeamState& s,
                                  std::uint32_t hit,
@@ -133,11 +133,11 @@ POINTFLIGHT_INLINE void add_hits(const KernelMap& map,
                                  std::uint32_t first_word,
                                  std::uint64_t& overflows) {
   if (s.hits.count + 8 > kHits) {
-    if constexpr (kMeetings == Meetings::kEndTheWay) shorten(map, s);
+    if constexpr (kMode == HitMode::kFirst) shorten(map, s);
     const bool was_lossy = make_room(s.hits, s.end);
     overflows += was_lossy ? 1 : 0;
     // what is kept has no gap: its end is the ray's
-    if (kMeetings == Meetings::kAllKept && was_lossy) {
+    if (kMode == HitMode::kAll && was_lossy) {
       s.end = *std::max_element(s.hits.t, s.hits.t + s.hits.count);
     }
   }
@@ -158,12 +158,12 @@ POINTFLIGHT_INLINE void add_hits(const KernelMap& map,
     h.nearest = std::min(h.nearest, t[lane]);
   }
   store_unaligned(splat(kNever), h.t + h.count);
-  if constexpr (kMeetings == Meetings::kAllKept) return;
-  // where the nearest hit begins the surface, farther ones cannot move it
+  if constexpr (kMode == HitMode::kAll) return;
+  // if the nearest hit begins the surface, farther ones cannot move it
   if (h.nearest < s.first && h.total >= map.tau) shorten(map, s);
 }
 
-template <Meetings kMeetings>
+template <HitMode kMode>
 POINTFLIGHT_INLINE void visit_leaf(const KernelMap& map,
                                    RayState& s,
                                    const Entry& entry,
@@ -196,11 +196,11 @@ POINTFLIGHT_INLINE void visit_leaf(const KernelMap& map,
   const M8 accepted = (meeting.m2 < splat(map.support_squared)) & (splat(0.0f) <= meeting.t) &
                       (meeting.t <= splat(s.end));
   const std::uint32_t hit = bits(accepted) & lanes;
-  if (hit != 0) add_hits<kMeetings>(map, s, hit, meeting, entry.index + 1, overflows);
+  if (hit != 0) add_hits<kMode>(map, s, hit, meeting, entry.index + 1, overflows);
 }
 
 /// On to the next inner node, through the leaves on the way. False at the end of the beam's way.
-template <Meetings kMeetings>
+template <HitMode kMode>
 POINTFLIGHT_INLINE bool advance(const KernelMap& map,
                                 RayState& s,
                                 std::uint32_t entered,
@@ -222,7 +222,7 @@ POINTFLIGHT_INLINE bool advance(const KernelMap& map,
         next = swapped ? other : next;
       }
       if (next.meta != Bvh8Node::kInner) {
-        visit_leaf<kMeetings>(map, s, next, overflows);
+        visit_leaf<kMode>(map, s, next, overflows);
       } else if (next.index < map.node_count) {
         s.node = map.nodes + next.index;
         return true;
@@ -235,7 +235,7 @@ POINTFLIGHT_INLINE bool advance(const KernelMap& map,
     const Entry entry = s.stack[--s.depth];
     if (entry.t > s.end) continue;
     if (entry.meta != Bvh8Node::kInner) {
-      visit_leaf<kMeetings>(map, s, entry, overflows);
+      visit_leaf<kMode>(map, s, entry, overflows);
     } else if (entry.index < map.node_count) {
       s.node = map.nodes + entry.index;
       return true;
@@ -246,7 +246,7 @@ POINTFLIGHT_INLINE bool advance(const KernelMap& map,
 
 /// Single rays, several in flight. `finish(state)` takes each at the end of its way. Returns how
 /// many lists overflowed.
-template <Meetings kMeetings, class Finish>
+template <HitMode kMode, class Finish>
 POINTFLIGHT_INLINE std::uint64_t follow_singly(const KernelMap& map,
                                                const Ray* rays,
                                                const std::uint32_t* order,
@@ -271,7 +271,7 @@ POINTFLIGHT_INLINE std::uint64_t follow_singly(const KernelMap& map,
     for (std::size_t k = 0; k < flying; ++k) entered[k] = test_node(*active[k]);
     for (std::size_t k = 0; k < flying;) {
       RayState& s = *active[k];
-      if (advance<kMeetings>(map, s, entered[k], overflows)) {
+      if (advance<kMode>(map, s, entered[k], overflows)) {
         ++k;
         continue;
       }

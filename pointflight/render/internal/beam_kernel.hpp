@@ -26,7 +26,7 @@ struct KernelMap {
   SurfelScale scale;
   float window = 0.0f;   ///< m
   std::int32_t tau = 0;  ///< In steps of kWeightOne.
-  /// Groups of eight beams that are wider (radius, rad) meet so many surfels apart that bundles are
+  /// Groups of eight beams that are wider (radius, rad) hit so many surfels apart that bundles are
   /// faster than packets: in proportion to r up to a limit, measured from 0.02 to 0.2 m.
   float widest_group = 0.0f;
 };
@@ -34,18 +34,18 @@ struct KernelMap {
 /// Weights are whole numbers of 2^-20: their sums do not depend on the order of adding.
 inline constexpr float kWeightOne = 1048576.0f;
 
-/// What a beam met, before intensities are looked up.
+/// What a beam hit, before intensities are looked up.
 struct KernelHit {
-  float range = -1.0f;  ///< m; negative where nothing was met.
+  float range = -1.0f;  ///< m; negative if nothing was hit.
   float cos_incidence = 0.0f;
   std::uint32_t strongest = 0;  ///< Word of the surfel with the largest weight.
 };
 
 /// Which beams go through the tree together.
 enum class BeamGrouping {
-  kAsSuits,  ///< Close ones as packets, others as bundles or by themselves, whatever is faster.
-  kSingly,   ///< Each by itself.
-  kBundles,  ///< Bundles wherever 64 neighbours lie within 0.4 rad.
+  kAutomatic,  ///< Close ones as packets, others as bundles or by themselves, whatever is faster.
+  kSingly,     ///< Each by itself.
+  kBundles,    ///< Bundles wherever 64 neighbours lie within 0.4 rad.
 };
 
 KernelMap kernel_map_of(const SurfelMap& map);
@@ -53,18 +53,18 @@ KernelMap kernel_map_of(const SurfelMap& map);
 /// Traces the rays `order[0..]` of `rays` and writes `hits[order[i]]`, by the best kernel for this
 /// processor: AVX-512, AVX2, SSE4 or NEON. The results are the same bits on all of them, whatever
 /// the order, whatever else is traced in the same call, and however beams are grouped: neighbours
-/// in `order` go together. Returns how many beams met more surfels than fit in their list
+/// in `order` go together. Returns how many beams hit more surfels than fit in their list
 /// (docs/architecture.md, "Hit rule").
 std::uint64_t trace_beams(const KernelMap& map,
                           std::span<const Ray> rays,
                           std::span<const std::uint32_t> order,
                           std::span<KernelHit> hits,
-                          BeamGrouping grouping = BeamGrouping::kAsSuits);
+                          BeamGrouping grouping = BeamGrouping::kAutomatic);
 
 /// The same for beams of eight sub-rays each: rays 8 k to 8 k + 7 are beam k's, leave from one
 /// place, and follow each other in `order`, whose length is a multiple of eight. Besides
 /// `nearest[k]`: how far the centre of the nearest surfel is that reaches into the rectangle around
-/// beam k's sub-rays by more than its fringe (m, along the beam; very large or infinite where there
+/// beam k's sub-rays by more than its fringe (m, along the beam; very large or infinite if there
 /// is none, and where the sub-rays are farther than 0.1 rad apart). It tells whether anything lies
 /// between them; which beams share a call may change it, but not the hits.
 std::uint64_t trace_footprints(const KernelMap& map,

@@ -65,7 +65,7 @@ POINTFLIGHT_INLINE void drop_behind(HitRows& rows, const F8& end) {
 /// Looks for the surfaces of a group that has new hits.
 POINTFLIGHT_INLINE void shorten(const KernelMap& map, Packet& p, std::size_t g) {
   Group& group = p.groups[g];
-  // where the nearest hit begins the surface, farther ones cannot move it
+  // if the nearest hit begins the surface, farther ones cannot move it
   const M8 open = load(group.nearest) < load(group.first);
   if (bits(open & (splat_int(map.tau - 1) < load(group.total))) == 0) return;
   HitRows& rows = p.rows[g];
@@ -125,7 +125,7 @@ POINTFLIGHT_INLINE void meet_group(
       p.failed |= 1u << g;
       return;
     }
-    // a row that no beam meets is written over by the next: half of them, at no pattern
+    // a row that no beam hits is written over by the next: half of them, at no pattern
     const I8 weight = keep(accepted, weights_of(map, meeting.m2));
     const F8 met = select(accepted, meeting.t, splat(kNever));
     nearest = min(nearest, met);

@@ -9,13 +9,13 @@
 
 namespace pointflight {
 
-/// One ray per beam through the map's hierarchy; a return is where the surfels met within half a
+/// One ray per beam through the map's hierarchy; a return is where the surfels hit within half a
 /// voxel of depth cover at least the share tau of the beam (docs/architecture.md, "Hit rule").
 ///
 /// Rays longer than `range_max` end there. Uses + - * / and sqrt only: the same bytes everywhere.
 class BeamRenderer : public Renderer {
  public:
-  explicit BeamRenderer(const Scene& scene, BeamGrouping grouping = BeamGrouping::kAsSuits);
+  explicit BeamRenderer(const Scene& scene, BeamGrouping grouping = BeamGrouping::kAutomatic);
 
   [[nodiscard]] Hit trace(const Ray& ray) const override;
 

@@ -17,7 +17,7 @@ constexpr std::size_t kRaysPerChunk = 2048;  // rays
 constexpr std::size_t kLanes = 8;
 constexpr std::size_t kManyBodies = 200;  // from here on sorted rays are worth their sorting
 
-/// The directions in which a body can be met while the batch is fired: around the middle of the
+/// The directions in which a body can be hit while the batch is fired: around the middle of the
 /// rays' origins, as wide as it and everybody's motion make it.
 struct Cone {
   const Body* body = nullptr;
@@ -51,7 +51,7 @@ Start start_of(const RayBatch& batch) {
   return start;
 }
 
-/// Bodies that some ray may meet.
+/// Bodies that some ray may hit.
 std::vector<Cone> cones_of(const RayBatch& batch) {
   const Start start = start_of(batch);
   std::vector<Cone> cones;
@@ -81,7 +81,7 @@ std::vector<Cone> cones_of(const RayBatch& batch) {
 /// neighbours, so that a body asks only blocks that it may be seen from.
 class Directions {
  public:
-  /// `order`: the numbers of the chunk's rays, neighbours together where there are many bodies.
+  /// `order`: the numbers of the chunk's rays, neighbours together if there are many bodies.
   Directions(std::span<const Ray> rays, std::span<const std::uint32_t> order) : order_(order) {
     const std::size_t groups = (order.size() + kLanes - 1) / kLanes * kLanes;
     for (std::size_t i = 0; i < groups; ++i) {
@@ -99,7 +99,7 @@ class Directions {
   void within(const Cone& cone, std::vector<std::uint32_t>& found) const {
     const float sine = std::sqrt(std::max(0.0f, 1.0f - cone.cos_limit * cone.cos_limit));
     for (const Block& block : blocks_) {
-      // apart where the angle between the axes is more than both half angles
+      // apart if the angle between the axes is more than both half angles
       const bool whole = cone.cos_limit <= -block.cosine;
       const float limit = cone.cos_limit * block.cosine - sine * block.sine - kBlockSlack;
       if (!whole && cone.axis.dot(block.axis) < limit) continue;
@@ -146,7 +146,7 @@ class Directions {
   std::vector<Block> blocks_;
 };
 
-/// Numbers of a batch's rays: as they are, or along a curve over the sphere where sorting pays.
+/// Numbers of a batch's rays: as they are, or along a curve over the sphere if sorting pays.
 std::vector<std::uint32_t> ray_order(const RayBatch& batch,
                                      std::size_t bodies,
                                      const Executor& executor) {
@@ -178,7 +178,7 @@ bool is_nearer(float range, const Ray& ray, const Hit& hit) {
   return range <= ray.range_max && (!hit.is_return() || range < hit.range);
 }
 
-/// Where a ray meets what is exact of a body, in the body's frame.
+/// Where a ray hits what is exact of a body, in the body's frame.
 std::optional<SolidHit> meet_exact(const Body& body,
                                    const Vector3d& origin,
                                    const Vector3d& direction,

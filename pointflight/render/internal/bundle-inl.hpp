@@ -1,6 +1,6 @@
-// Bundles: up to 64 beams that lie too far apart to meet the same surfels, but near enough to share
+// Bundles: up to 64 beams that lie too far apart to hit the same surfels, but near enough to share
 // the nodes above them. They go down the tree together, each child with a mask of the beams that
-// may enter its box as seen from the apex; at a leaf each beam meets the eight surfels by itself,
+// may enter its box as seen from the apex; at a leaf each beam hits the eight surfels by itself,
 // by the operations of a single ray, so that the results are the same bits. A single ray spends
 // more than half of its time on nodes: here most of it is shared.
 //
@@ -206,7 +206,7 @@ POINTFLIGHT_INLINE void visit_leaf(const KernelMap& map, Bundle& b, const Bundle
     const std::uint32_t hit = bits(accepted) & lanes;
     if (hit == 0) continue;
     std::uint64_t overflows = 0;
-    add_hits<Meetings::kEndTheWay>(map, s, hit, meeting, entry.place.index + 1, overflows);
+    add_hits<HitMode::kFirst>(map, s, hit, meeting, entry.place.index + 1, overflows);
     if (overflows != 0) b.failed |= std::uint64_t{1} << n;
     if (!(s.end < group.end[i])) continue;
     group.end[i] = s.end;

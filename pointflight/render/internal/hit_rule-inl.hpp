@@ -1,5 +1,5 @@
 // The hit rule for one beam and for eight: what a beam and a surfel have in common, and where the
-// surface lies among the surfels that a beam has met (docs/architecture.md, "Hit rule"). Single
+// surface lies among the surfels that a beam has hit (docs/architecture.md, "Hit rule"). Single
 // rays and packets both use it, so that their results are the same bits.
 //
 // Included once a target by Highway's foreach_target; see beam_kernel.cpp.
@@ -65,7 +65,7 @@ inline constexpr float kNever = 3.0e38f;
 /// Surfels that the list of one beam holds.
 inline constexpr std::size_t kHits = 256;
 
-/// Surfels that one beam has met, in no order; lanes behind the last are never met.
+/// Surfels that one beam has hit, in no order; lanes behind the last are never hit.
 struct HitLanes {
   std::size_t count;
   std::int32_t total;  ///< Of the weights: below tau no surface can exist.
@@ -125,7 +125,7 @@ static HWY_NOINLINE bool make_room(HitLanes& h, float end) {
   float sorted[kHits + 16];
   std::copy(h.t, h.t + h.count, sorted);
   std::nth_element(sorted, sorted + kHits / 2, sorted + h.count);
-  // where most lie at one depth, any of them will do
+  // if most lie at one depth, any of them will do
   keep_up_to(h, sorted[kHits / 2], kHits - 8);
   return true;
 }

@@ -1,5 +1,5 @@
-// Packets: up to 64 beams that lie so close together that most surfels which one of them meets are
-// met by its neighbours too. `test_node` holds the eight children of a node against the frustum's
+// Packets: up to 64 beams that lie so close together that most surfels which one of them hits are
+// hit by its neighbours too. `test_node` holds the eight children of a node against the frustum's
 // four planes, and bounds their distance along the axis w is closest to. What passes is held
 // against the groups' own rectangles in (u, v) (packet_leaf-inl.hpp), and its surfels against eight
 // beams at once (beam_packets-inl.hpp).
@@ -20,7 +20,7 @@ namespace pointflight::HWY_NAMESPACE {
 /// Rows of hits of one group: beyond, its beams are traced singly.
 inline constexpr std::size_t kRows = 96;
 
-/// Hits of eight beams: a row is one surfel, lanes that it does not meet hold kNever and weight 0.
+/// Hits of eight beams: a row is one surfel, lanes that it does not hit hold kNever and weight 0.
 struct HitRows {
   std::size_t count;
   alignas(32) float t[kRows][8];

@@ -1,4 +1,4 @@
-// A leaf's surfels as a packet of beams sees them: which groups may meet which surfels.
+// A leaf's surfels as a packet of beams sees them: which groups may hit which surfels.
 //
 // Included once a target by Highway's foreach_target; see beam_kernel.cpp.
 #if defined(POINTFLIGHT_RENDER_PACKET_LEAF_INL_HPP) == defined(HWY_TARGET_TOGGLE)
@@ -23,7 +23,7 @@ struct PacketLeaf {
   // one value per surfel
   alignas(32) float shape[10][8];
   alignas(32) float center[3][8];    ///< From the leaf's origin, m.
-  alignas(32) float whitened[3][8];  ///< From the apex: what all beams share where origins agree.
+  alignas(32) float whitened[3][8];  ///< From the apex: what all beams share if origins agree.
 };
 
 /// Of eight surfels' centres, from the apex.
@@ -31,7 +31,7 @@ struct Place {
   F8 x, y, z;
 };
 
-/// The centres of a leaf's surfels in the packet's frame, and which of them the packet may meet.
+/// The centres of a leaf's surfels in the packet's frame, and which of them the packet may hit.
 struct InFrustum {  // NOLINT(cppcoreguidelines-pro-type-member-init): all is written
   F8 u, v, depth;   ///< From the apex, m.
   std::uint32_t surfels = 0;
@@ -84,7 +84,7 @@ POINTFLIGHT_INLINE std::uint64_t pairs_from_origins(const Packet& p,
     const F8 half_v = (reach.v + abs(at_v - reach.at_v) * reach.w) * per_begin;
     const M8 beside = (abs(at_u - splat(p.middle_u[g])) <= half_u + splat(p.half_u[g])) &
                       (abs(at_v - splat(p.middle_v[g])) <= half_v + splat(p.half_v[g]));
-    // around the origin a surfel may be met in any direction
+    // around the origin a surfel may be hit in any direction
     const std::uint32_t around = bits(begin <= splat(0.0f));
     const std::uint32_t met = (around | bits(beside)) & bits(begin <= splat(p.group_end[g]));
     pairs |= static_cast<std::uint64_t>(met & in.surfels) << (8 * g);
@@ -92,7 +92,7 @@ POINTFLIGHT_INLINE std::uint64_t pairs_from_origins(const Packet& p,
   return pairs;
 }
 
-/// Which surfels of a leaf each group may meet: bit i of byte g. A surfel's support is an
+/// Which surfels of a leaf each group may hit: bit i of byte g. A surfel's support is an
 /// ellipsoid; seen from the apex it lies within a rectangle of the plane across the packet's mean
 /// direction: with its centre at c_u = (c.u) / (c.w), a point c + e of it lies (e.(u - c_u w)) /
 /// ((c + e).w) beside, and e.n is M |S R n| at most.
@@ -130,7 +130,7 @@ POINTFLIGHT_INLINE std::uint64_t pairs_of(const KernelMap& map,
   const F8 reach_u = reach.u + spread * (splat(1.0f) + abs(at_u));
   const F8 reach_v = reach.v + spread * (splat(1.0f) + abs(at_v));
   const F8 begin = in.depth - reach_w;
-  // around the apex a surfel may be met in any direction
+  // around the apex a surfel may be hit in any direction
   const M8 ahead = splat(0.0f) < begin;
   const F8 per_begin = splat(1.0f) / begin;
   const F8 everywhere = splat(1e30f);
@@ -153,7 +153,7 @@ POINTFLIGHT_INLINE std::uint64_t pairs_of(const KernelMap& map,
 inline constexpr float kSolidShare = 0.5f;
 
 /// Of groups that are one beam's sub-rays, which share an origin: how far the nearest surfel is
-/// that reaches into the group's rectangle, whether a sub-ray meets it or not.
+/// that reaches into the group's rectangle, whether a sub-ray hits it or not.
 POINTFLIGHT_INLINE void note_nearest(Packet& p,
                                      const InFrustum& in,
                                      const Reach& reach,

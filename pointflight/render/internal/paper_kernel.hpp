@@ -24,7 +24,7 @@ struct PaperPoints {
   std::size_t count = 0;
   std::vector<float> x, y, z;     ///< From the voxel's corner, m.
   std::vector<float> nx, ny, nz;  ///< Normals.
-  std::vector<float> planar;      ///< 1 where gamma is below the threshold, else 0.
+  std::vector<float> planar;      ///< 1 if gamma is below the threshold, else 0.
   std::vector<float> intensity;
   std::vector<float> radius;  ///< Of the point's cube, m.
 
@@ -39,7 +39,7 @@ struct PaperPoints {
   void finish();
 };
 
-/// The depth image as planes of rows: depths (infinity where empty), cosines of incidence,
+/// The depth image as planes of rows: depths (infinity if empty), cosines of incidence,
 /// intensities. Rows are elevations, columns azimuths, in the sensor's frame.
 struct PaperImage {
   int rows = 0;

@@ -13,12 +13,12 @@ struct PaperOptions {
   double gamma_threshold = 0.06;  ///< Planes thinner than this share of r are corrected.
 };
 
-/// The renderer of the MARSIM paper, section IV.A: map points in voxels that meet the field of view
-/// are projected into a depth image of angular resolution theta_res (azimuth by elevation, laid
-/// over the rays of the batch); each fills the pixels within theta_max = asin(sqrt(3)/2 r / d) (eq.
-/// 1), a point on a plane with the depth at which the pixel's ray meets that plane; pixels keep the
-/// smallest depth. A ray returns the depth of its pixel. r is that of the cell that a surfel stands
-/// for: half the map's for small ones, more for wide ones.
+/// The renderer of the MARSIM paper, section IV.A: map points in voxels that intersect the field of
+/// view are projected into a depth image of angular resolution theta_res (azimuth by elevation,
+/// laid over the rays of the batch); each fills the pixels within theta_max = asin(sqrt(3)/2 r / d)
+/// (eq. 1), a point on a plane with the depth at which the pixel's ray hits that plane; pixels keep
+/// the smallest depth. A ray returns the depth of its pixel. r is that of the cell that a surfel
+/// stands for: half the map's for small ones, more for wide ones.
 ///
 /// All rays start at the sensor's pose, as in the paper: no rolling scan. Bodies are drawn as
 /// points of their surfaces, about r apart, where they are at that instant (the paper, section

@@ -1,5 +1,5 @@
-// Which beams go through the tree together: packets where they lie close, bundles where they lie
-// farther apart, single rays where even the way down is hardly shared. However they go, the results
+// Which beams go through the tree together: packets if they lie close, bundles if they lie
+// farther apart, single rays if even the way down is hardly shared. However they go, the results
 // are the same bits.
 //
 // Included once a target by Highway's foreach_target; see beam_kernel.cpp.
@@ -31,7 +31,7 @@ POINTFLIGHT_INLINE float visits_worth(float nodes_of_single_ray) {
   return 0.38f * nodes_of_single_ray - 1.0f;
 }
 
-/// Beams of one call, and where to write what they meet.
+/// Beams of one call, and where to write what they hit.
 struct Beams {
   const KernelMap& map;
   const Ray* rays;
@@ -48,7 +48,7 @@ static std::uint64_t trace_singly(const Beams& beams,
     beams.hits[s.ray] = return_of(beams.map, s.first, s.hits);
     nodes += steps - s.steps;
   };
-  return follow_singly<Meetings::kEndTheWay>(beams.map, beams.rays, order, count, finish);
+  return follow_singly<HitMode::kFirst>(beams.map, beams.rays, order, count, finish);
 }
 
 static std::uint64_t trace_singly(const Beams& beams,
@@ -115,7 +115,7 @@ static std::uint64_t trace_bundles(const Beams& beams,
   const Widths widths{kWidestBundle, kWidestBundle};
   std::uint64_t overflows = 0;
   std::size_t at = 0;
-  std::size_t singly = 4 * kTogether;  // that go by themselves where the way is hardly shared
+  std::size_t singly = 4 * kTogether;  // that go by themselves if the way is hardly shared
   float worth = -1.0f;                 // visits for each beam, not known yet
   Waiting waiting;
   std::size_t taken[kGroups];

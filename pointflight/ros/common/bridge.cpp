@@ -66,7 +66,7 @@ void RosBridge::on_time(SimTime time) {
 }
 
 void RosBridge::on_wait(SimTime now) {
-  // where it stands, which is seldom where the clock's rate put its last message
+  // where it stands, which is seldom if the clock's rate put its last message
   now = std::max(ros_.latest, now);
   for (OutputStream& stream : streams_) stream.output->on_wait(now);
   for (OutputStream& stream : streams_) stream.output->on_look();

@@ -24,7 +24,7 @@ class RosBridge : public SampleSink {
   void add(Outlet& outlet);
   /// Before the first scan: `resend_scans` will be called.
   void keep_scans() { ros_.keeps_scans = true; }
-  /// Makes all topics known and sends what is latched (map, static transforms) where somebody is
+  /// Makes all topics known and sends what is latched (map, static transforms) if somebody is
   /// there; later to the first who comes.
   void start();
 

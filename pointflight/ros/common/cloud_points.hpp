@@ -14,7 +14,7 @@ struct CloudMessagePoints {
   bool has_intensity = false;         ///< intensity, reflectivity, i
 };
 
-/// Reads x, y, z, an intensity and times: whole numbers are ns; others are s, or, where they are
+/// Reads x, y, z, an intensity and times: whole numbers are ns; others are s, or, if they are
 /// beyond 1e11, ns. Throws InputError that says what is wrong with the cloud.
 CloudMessagePoints points_of(const msg::PointCloud2& cloud);
 

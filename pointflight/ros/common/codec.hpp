@@ -237,7 +237,7 @@ std::vector<std::byte> encode(const M& message) {
   return bytes;
 }
 
-/// The message that the bytes stand for; nothing where they are malformed or left over (CDR allows
+/// The message that the bytes stand for; nothing if they are malformed or left over (CDR allows
 /// three of padding). `is_head`: any number may follow, for a message's header by itself.
 template <Wire W, class M>
 std::optional<M> decode(std::span<const std::byte> bytes, bool is_head = false) {

@@ -85,7 +85,7 @@ void add_variance(msg::Odometry& odometry, const EstimateVariance& variance) {
 msg::Imu imu_of(const ImuSample& sample,
                 const ImuSettings& settings,
                 const msg::Header& header,
-                const ImuCustoms& customs) {
+                const ImuConventions& customs) {
   msg::Imu imu;
   imu.header = header;
   imu.orientation = quaternion_of(sample.q_world_imu);

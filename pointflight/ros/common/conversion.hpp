@@ -29,7 +29,7 @@ msg::Pose pose_of(const Pose& pose);
 Vector3d vector_of(const msg::Point& v);
 /// A direction; what is not finite stays so.
 Vector3d vector_of(const msg::Vector3& v);
-/// Normalised; identity where it is zero or not finite.
+/// Normalised; identity if it is zero or not finite.
 Quaterniond rotation_of(const msg::Quaternion& q);
 
 /// Pose in the header's frame, velocities in the body's (REP 105: the child frame's), or in the
@@ -43,7 +43,7 @@ msg::Odometry odometry_of(const RigidBodyState& state,
 void add_variance(msg::Odometry& odometry, const EstimateVariance& variance);
 
 /// Conventions for published accelerations.
-struct ImuCustoms {
+struct ImuConventions {
   bool in_g = false;          ///< Units of 9.80665 m/s^2, as Livox' drivers send them.
   bool gravity_down = false;  ///< a + g instead of a - g: MARSIM.
 };
@@ -53,7 +53,7 @@ struct ImuCustoms {
 msg::Imu imu_of(const ImuSample& sample,
                 const ImuSettings& settings,
                 const msg::Header& header,
-                const ImuCustoms& customs);
+                const ImuConventions& customs);
 
 /// `header`: the parent's frame.
 msg::TransformStamped transform_of(const Pose& T_parent_child,

@@ -13,7 +13,7 @@ namespace {
 
 using Many = FieldDescription::Many;
 
-/// "float64", "geometry_msgs/Point", ...; ROS 1's own words for time where `ros` is 1.
+/// "float64", "geometry_msgs/Point", ...; ROS 1's own words for time if `ros` is 1.
 std::string word_for(const FieldDescription& field, int ros) {
   switch (field.kind) {
     case FieldKind::kBool:

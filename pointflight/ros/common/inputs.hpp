@@ -34,7 +34,7 @@ struct OrderContext {
   ///@}
 };
 
-/// A message that was read, as an order for any vehicle. Nothing, and `why` in words, where it
+/// A message that was read, as an order for any vehicle. Nothing, and `why` in words, if it
 /// cannot be one.
 using OrderMaker =
     std::function<std::optional<Order>(const OrderContext& context, std::string& why)>;
@@ -43,7 +43,7 @@ using OrderMaker =
 struct InputMaker {
   /// The type that it is read with. One topic has one type: ROS 2's tools take no other.
   MessageType (*type)(const RosInput& input) = nullptr;
-  /// Empty where the bytes are no such message.
+  /// Empty if the bytes are no such message.
   OrderMaker (*read)(const RosInput& input, Wire wire, const Received& received) = nullptr;
 };
 
@@ -67,7 +67,7 @@ inline std::optional<Order> told(const OrderContext& context, Command command) {
   return VehicleOrder{context.vehicle, std::move(command), false};
 }
 
-/// The message in a received one's bytes, where it has our definition.
+/// The message in a received one's bytes, if it has our definition.
 template <class M>
 std::optional<M> message_in(Wire wire, const Received& received) {
   const std::span bytes(received.data, received.size);
@@ -116,7 +116,7 @@ struct InputStream {
 /// The streams of a profile in a run.
 std::vector<InputStream> input_streams(const RunDescription& run, const RosProfile& profile);
 
-/// The orders that a message stands for: one for each context. None, and the reason, where it is
+/// The orders that a message stands for: one for each context. None, and the reason, if it is
 /// malformed or in a frame that is not known.
 std::vector<Order> orders_of(const InputStream& stream,
                              Wire wire,

@@ -120,7 +120,7 @@ std::vector<OutputType> lidar_outputs() {
        .make = per_sample<depth_image>(),
        .per = kLidar,
        .frame = Frame::kOptical,
-       .cameras = Cameras::kRather,
+       .cameras = Cameras::kPreferred,
        .large = true,
        .depth = 5},
       {.name = "infrared",
@@ -128,7 +128,7 @@ std::vector<OutputType> lidar_outputs() {
        .make = made_by<Infrared, msg::Image>(),
        .per = kLidar,
        .frame = Frame::kOptical,
-       .cameras = Cameras::kOnly,
+       .cameras = Cameras::kRequired,
        .large = true,
        .depth = 5},
       {.name = "camera_info",
@@ -136,7 +136,7 @@ std::vector<OutputType> lidar_outputs() {
        .make = per_sample<camera_info>(),
        .per = kLidar,
        .frame = Frame::kOptical,
-       .cameras = Cameras::kOnly},
+       .cameras = Cameras::kRequired},
   };
 }
 

@@ -57,7 +57,7 @@ std::vector<std::size_t> lidars_for(const RosOutput& output,
                                     const OutputType& type,
                                     const VehicleDescription& vehicle) {
   const bool each = names_lidar(type.is_transform ? output.child_frame : output.topic);
-  const bool wants_camera = type.cameras != Cameras::kNot;
+  const bool wants_camera = type.cameras != Cameras::kExcluded;
   std::vector<std::size_t> all(vehicle.lidars.size());
   for (std::size_t l = 0; l < all.size(); ++l) all[l] = l;
   const auto camera = [&](std::size_t l) { return is_camera(vehicle.lidars[l].settings); };
@@ -66,13 +66,13 @@ std::vector<std::size_t> lidars_for(const RosOutput& output,
         all.begin(), all.end(), [&](std::size_t l) { return camera(l) == wants_camera; });
     all = {first == all.end() ? 0 : *first};
   }
-  // a LiDAR has a depth picture only where one is asked for by name
-  const bool only_cameras = type.cameras == Cameras::kOnly || (wants_camera && each);
+  // a LiDAR has a depth picture only if one is asked for by name
+  const bool only_cameras = type.cameras == Cameras::kRequired || (wants_camera && each);
   if (only_cameras) std::erase_if(all, [&](std::size_t l) { return !camera(l); });
   return all;
 }
 
-/// Throws where a stream is to say what its points do not know.
+/// Throws if a stream is to say what its points do not know.
 void check_marks(const OutputStream& stream) {
   const std::string& layout = stream.settings.layout;
   if (layout.empty() || layout == kLivoxCustom) return;

@@ -42,20 +42,20 @@ struct OutputType {
   enum class Frame { kWorld, kBody, kImu, kSensor, kOptical };
   /// Which sensors a stream of a LiDAR is for.
   enum class Cameras {
-    kNot,     ///< The first that is no camera; all where the topic names the LiDAR.
-    kRather,  ///< The first camera, if there is one; all cameras where the topic names it.
-    kOnly     ///< Cameras.
+    kExcluded,   ///< The first that is no camera; all if the topic names the LiDAR.
+    kPreferred,  ///< The first camera, if there is one; all cameras if the topic names it.
+    kRequired    ///< Cameras.
   };
-  std::string name;                 ///< In profiles.
-  std::string help;                 ///< For docs/ros.md; half a sentence.
-  OutputMaker make;                 ///< Its messages.
-  Per per = Per::kVehicle;          ///< What there is one of each for.
-  Frame frame = Frame::kWorld;      ///< header.frame_id where the profile names none.
-  Frame child = Frame::kBody;       ///< child_frame_id where the profile names none.
-  Cameras cameras = Cameras::kNot;  ///< Of a LiDAR's.
-  bool sets_odometry_rate = false;  ///< Odometry is sampled at its rate at least.
-  bool has_child = false;           ///< Profiles may name its child_frame.
-  bool is_transform = false;        ///< Names its frames: all vehicles may share a topic.
+  std::string name;                      ///< In profiles.
+  std::string help;                      ///< For docs/ros.md; half a sentence.
+  OutputMaker make;                      ///< Its messages.
+  Per per = Per::kVehicle;               ///< What there is one of each for.
+  Frame frame = Frame::kWorld;           ///< header.frame_id if the profile names none.
+  Frame child = Frame::kBody;            ///< child_frame_id if the profile names none.
+  Cameras cameras = Cameras::kExcluded;  ///< Of a LiDAR's.
+  bool sets_odometry_rate = false;       ///< Odometry is sampled at its rate at least.
+  bool has_child = false;                ///< Profiles may name its child_frame.
+  bool is_transform = false;             ///< Names its frames: all vehicles may share a topic.
   /// Of a run that several processes share: each says its own vehicles' part. Others of the run
   /// come from the process that flies the first vehicle.
   bool from_each = false;
@@ -63,7 +63,7 @@ struct OutputType {
   bool large = false;       ///< Paced on ROS 2.
   std::size_t depth = 10;   ///< Messages that a reader's queue should hold.
   std::string sensor = {};  ///< Of measurements: the kind of sensor (`sensor_kinds`); empty: any.
-  std::string layout = "xyzi";  ///< Of clouds where the profile names none.
+  std::string layout = "xyzi";  ///< Of clouds if the profile names none.
 };
 
 /// All kinds, in the order in which they are sent at one instant. Programs may add to it before
@@ -99,7 +99,7 @@ struct RosRun {
 class OutputStream {
  public:
   /// `entry` of the profile; what it leaves open is filled in and names are written out. Throws
-  /// InputError where the kind has no such message.
+  /// InputError if the kind has no such message.
   OutputStream(
       RosRun& run, const OutputType& row, RosOutput entry, std::size_t vehicle, std::size_t lidar);
   OutputStream(const OutputStream&) = delete;
@@ -146,9 +146,9 @@ class OutputStream {
 
   /// How many get a message now.
   [[nodiscard]] int reader_count() const;
-  /// True where somebody does.
+  /// True if somebody does.
   [[nodiscard]] bool is_wanted() const;
-  /// True where its rate has come round and somebody gets it; to be asked once for each message.
+  /// True if its rate has come round and somebody gets it; to be asked once for each message.
   [[nodiscard]] bool is_due(SimTime time);
   /// True once, `calls` calls after a reader has come: it may not know of us at first.
   [[nodiscard]] bool has_newcomer(int calls);
@@ -157,7 +157,7 @@ class OutputStream {
   /// Messages so far.
   [[nodiscard]] std::uint32_t sent() const { return sent_; }
 
-  /// Sends a message that leaves at a time; `always`: also where nobody reads, for transports that
+  /// Sends a message that leaves at a time; `always`: also if nobody reads, for transports that
   /// keep it for whoever comes.
   template <class M>
   // NOLINTNEXTLINE(performance-unnecessary-value-param): a header's number is written
@@ -179,7 +179,7 @@ class OutputStream {
     }
     keep(bytes, time);
   }
-  /// The last scan once more for those who have come since, where scans are kept.
+  /// The last scan once more for those who have come since, if scans are kept.
   void resend(int calls);
   /// The run starts again at zero.
   void restart();
@@ -194,7 +194,7 @@ class OutputStream {
   std::uint32_t sent_ = 0;
   int served_ = 0;              ///< Readers that have got what there is.
   int newcomer_calls_ = 0;      ///< Since there are more of them.
-  Bytes last_[2];               ///< Of a scan, by wire, where it may have to be sent again.
+  Bytes last_[2];               ///< Of a scan, by wire, if it may have to be sent again.
   std::int64_t last_time_ = 0;  ///< When it left.
 };
 
@@ -209,7 +209,7 @@ class Output {
 
   /// All topics are known: what is there before anything else.
   virtual void on_start() {}
-  /// Samples of the whole run, also where nobody reads; obstacles behind all else of their step.
+  /// Samples of the whole run, also if nobody reads; obstacles behind all else of their step.
   virtual void on_sample(const Sample& /*sample*/) {}
   /// The run has reached a time.
   virtual void on_time(SimTime /*time*/) {}
@@ -278,7 +278,7 @@ OutputMaker per_sample() {
                  typename detail::MessageFunction<decltype(make)>::Message>();
 }
 
-/// Names of a vehicle's LiDARs, as ROS takes them: their model's, with a number where several are
+/// Names of a vehicle's LiDARs, as ROS takes them: their model's, with a number if several are
 /// alike.
 std::vector<std::string> lidar_names(const VehicleSetup& vehicle);
 
@@ -286,7 +286,7 @@ std::vector<std::string> lidar_names(const VehicleSetup& vehicle);
 inline constexpr const char* kOpticalSuffix = "_optical";
 
 /// The streams of a profile in a run. Outputs with `{lidar}` in their topic have one for each
-/// LiDAR; without it the first that fits (a camera for depth pictures). Throws InputError where two
+/// LiDAR; without it the first that fits (a camera for depth pictures). Throws InputError if two
 /// streams have one topic but different types.
 std::deque<OutputStream> output_streams(RosRun& run);
 

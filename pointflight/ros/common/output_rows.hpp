@@ -11,7 +11,7 @@ namespace pointflight {
 std::vector<OutputType> leading_outputs();
 /// Of each vehicle: states, IMU, markers.
 std::vector<OutputType> vehicle_outputs();
-/// Of each vehicle: barometers and the like, where it has them.
+/// Of each vehicle: barometers and the like, if it has them.
 std::vector<OutputType> navigation_outputs();
 /// Of each LiDAR: clouds and pictures.
 std::vector<OutputType> lidar_outputs();

@@ -27,7 +27,7 @@ constexpr std::array<std::string_view, 2> kLivoxPackages = {"livox_ros_driver2",
 
 using Place = std::function<std::string(const std::string& key)>;
 
-/// Throws where ROS would not take a name; what stands in braces is written out later.
+/// Throws if ROS would not take a name; what stands in braces is written out later.
 void check_pattern(const std::string& key,
                    const std::string& pattern,
                    bool is_topic,
@@ -44,7 +44,7 @@ void check_pattern(const std::string& key,
                                fault));
 }
 
-/// Throws where a kind or layout is unknown, or a name is none for ROS; `place` gives file and line
+/// Throws if a kind or layout is unknown, or a name is none for ROS; `place` gives file and line
 /// of a key.
 void check_names(const std::vector<RosOutput>& outputs,
                  const std::vector<RosInput>& inputs,
@@ -81,7 +81,7 @@ void check_names(const std::vector<RosOutput>& outputs,
   }
 }
 
-/// Throws where a vehicle's name cannot be part of a topic.
+/// Throws if a vehicle's name cannot be part of a topic.
 void check_vehicle_names(const Scenario& scenario) {
   const auto fleet = scenario.fleet();
   for (std::size_t v = 0; v < fleet.size(); ++v) {

@@ -60,7 +60,7 @@ RosProfile load_ros_profile(const std::string& name_or_path, const std::string& 
 /// From text, for tests and fuzzers.
 RosProfile parse_ros_profile(std::string_view text, const std::string& path);
 
-/// The profile that a scenario asks for (or `name`, where it is not empty) with the scenario's own
+/// The profile that a scenario asks for (or `name`, if it is not empty) with the scenario's own
 /// names in it. Throws InputError with file and line, also for vehicles' names that ROS does not
 /// take.
 RosProfile profile_for(const Scenario& scenario, const std::string& name = {});
@@ -69,7 +69,7 @@ RosProfile profile_for(const Scenario& scenario, const std::string& name = {});
 struct RosNames {
   std::string vehicle;  ///< The vehicle's name in the scenario.
   std::int64_t id = 0;  ///< first_id + number.
-  std::string lidar;    ///< As `lidar_names` has it; empty where a name is of no LiDAR.
+  std::string lidar;    ///< As `lidar_names` has it; empty if a name is of no LiDAR.
 };
 
 /// Of a vehicle, without a LiDAR's.
@@ -88,7 +88,7 @@ std::string bare_frame(const std::string& frame);
 /// With a / in front.
 std::string absolute(const std::string& topic);
 
-/// True where a topic or frame is another for each vehicle.
+/// True if a topic or frame is another for each vehicle.
 bool names_vehicle(const std::string& pattern);
 
 /// A topic or frame with its names written out.

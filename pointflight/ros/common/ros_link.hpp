@@ -60,7 +60,7 @@ class RosLink : public Link {
   [[nodiscard]] Duration epoch() const { return bridge_.epoch(); }
   /// How many recordings it has.
   [[nodiscard]] std::size_t recordings() const { return recordings_.size(); }
-  /// True where a recording, counted as they were added, could not be written to its end; it was
+  /// True if a recording, counted as they were added, could not be written to its end; it was
   /// said.
   [[nodiscard]] bool has_failed(std::size_t recording) const;
 

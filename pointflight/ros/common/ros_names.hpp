@@ -14,7 +14,7 @@ inline bool is_ros_word(std::string_view word) {
   });
 }
 
-/// The same text where what ROS does not take is replaced by _.
+/// The same text if what ROS does not take is replaced by _.
 inline std::string as_ros_word(std::string text) {
   for (char& c : text) {
     if (!is_ros_word({&c, 1})) c = '_';
@@ -22,7 +22,7 @@ inline std::string as_ros_word(std::string text) {
   return text;
 }
 
-/// Why no ROS takes a topic's name ("/quad_0/imu"; a leading / may be left out); empty where it
+/// Why no ROS takes a topic's name ("/quad_0/imu"; a leading / may be left out); empty if it
 /// does. `ros2`: also what only ROS 2 refuses.
 inline std::string topic_fault(std::string_view topic, bool ros2 = false) {
   if (!topic.empty() && topic.front() == '/') topic.remove_prefix(1);
@@ -41,7 +41,7 @@ inline std::string topic_fault(std::string_view topic, bool ros2 = false) {
   }
 }
 
-/// Why tf takes no frame of this name; empty where it does.
+/// Why tf takes no frame of this name; empty if it does.
 inline std::string frame_fault(std::string_view frame) {
   if (!frame.empty() && frame.front() == '/') return "begins with /, which tf2 does not take";
   const bool plain = std::all_of(frame.begin(), frame.end(), [](char c) {

@@ -32,7 +32,7 @@ struct RosInput {
   std::string topic;  ///< "-": not read.
   RotorUnit unit = RotorUnit::kSi;              ///< Of rotor speeds.
   VelocityFrame frame = VelocityFrame::kWorld;  ///< Of velocities that name no frame.
-  /// Of a PositionCommand on ROS 2, where readers of different types do not meet.
+  /// Of a PositionCommand on ROS 2, if readers of different types do not meet.
   CommandPackage package = CommandPackage::kQuadrotorMsgs;
 };
 
@@ -54,7 +54,7 @@ struct RosSetup {
 /// The keys of `ros`.
 void describe(SettingsVisitor& visitor, RosSetup& setup);
 
-/// What a scenario says of ROS; the defaults where it says nothing.
+/// What a scenario says of ROS; the defaults if it says nothing.
 const RosSetup& ros_setup_of(const Scenario& scenario);
 /// The same, to be changed by a program.
 RosSetup& ros_setup_of(Scenario& scenario);

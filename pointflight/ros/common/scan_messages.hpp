@@ -15,9 +15,9 @@ namespace pointflight {
 std::vector<Vector3f> world_points(const Scan& scan, const PoseTrack& T_world_sensor);
 
 /// Depth picture of a scan, encoding 32FC1. Pinhole cameras: depth along the optical axis, m, 0
-/// where nothing returned (REP 118 has NaN, planners expect 0). Other sensors: a picture over
+/// if nothing returned (REP 118 has NaN, planners expect 0). Other sensors: a picture over
 /// azimuth (columns, left first) and elevation (rows, highest first) at `image_resolution_deg`,
-/// range as a share of `range_max`, 1 where nothing returned (MARSIM's depth_img).
+/// range as a share of `range_max`, 1 if nothing returned (MARSIM's depth_img).
 msg::Image depth_image_of(const Scan& scan, const LidarSettings& lidar);
 
 /// True for sensors whose picture has a camera matrix.
@@ -29,15 +29,15 @@ msg::Image infrared_image_of(const Scan& scan, const LidarSettings& lidar);
 /// Camera matrix of a pinhole camera; a picture of zero size for other sensors.
 msg::CameraInfo camera_info_of(const LidarSettings& lidar);
 
-/// The map's surfels as points, one for each cell of `resolution` (m) at least; coarser where there
+/// The map's surfels as points, one for each cell of `resolution` (m) at least; coarser if there
 /// would be more than `points_max`.
 struct MapCloud {
   std::vector<Vector3f> points;  ///< World, m.
-  /// Of each point, in the cloud's scale; 0 where the map has none.
+  /// Of each point, in the cloud's scale; 0 if the map has none.
   std::vector<float> intensities;
   double resolution = 0.0;  ///< That was taken, m.
 };
-/// As many points as the map has, in the order of its file, where `resolution` is at most its own.
+/// As many points as the map has, in the order of its file, if `resolution` is at most its own.
 MapCloud map_cloud(const SurfelMap& map, double resolution, std::size_t points_max);
 
 /// Points on the surface of a shape, about `spacing` apart, in the world.

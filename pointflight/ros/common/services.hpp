@@ -15,7 +15,7 @@ struct ServiceType {
   const char* type;               ///< "Trigger"
   const char* md5;                ///< Of the service as a whole, as ROS 1 compares it.
   std::string (*request_hash)();  ///< For ROS 2.
-  /// Nothing where the request is malformed.
+  /// Nothing if the request is malformed.
   std::optional<Order> (*read)(Wire wire, const Received& request);
 };
 
@@ -24,10 +24,10 @@ struct ServiceType {
 extern const ServiceType kPauseService, kStepService, kResetService;
 ///@}
 
-/// What the run answers; none where the profile has no such topics.
+/// What the run answers; none if the profile has no such topics.
 std::vector<Service> run_services(const RosProfile& profile);
 
-/// The order in a request of one of them; nothing where it is malformed.
+/// The order in a request of one of them; nothing if it is malformed.
 std::optional<Order> order_in(const Service& service, Wire wire, const Received& request);
 
 /// The answer to a request.

@@ -39,7 +39,7 @@ class TimedRecording {
   [[nodiscard]] virtual std::pair<std::int64_t, std::int64_t> range() const = 0;
   /// The next message is the first one at `time` or after it.
   virtual void seek(std::int64_t time) = 0;
-  /// False where there are none left.
+  /// False if there are none left.
   virtual bool next(TimedMessage& message) = 0;
   /// Of each latched channel the last message before `time`, to `take`; the next message stays.
   virtual void latched_before(std::int64_t time,

@@ -79,13 +79,13 @@ class Outlet {
   /// All topics are known.
   virtual void start() {}
 
-  /// False where nobody would get a message: it need not be made.
+  /// False if nobody would get a message: it need not be made.
   virtual bool has_readers(int topic) const = 0;
 
-  /// How many would; at least one where there are readers.
+  /// How many would; at least one if there are readers.
   virtual int reader_count(int topic) const { return has_readers(topic) ? 1 : 0; }
 
-  /// True where somebody reads now; false in a recording.
+  /// True if somebody reads now; false in a recording.
   virtual bool is_live() const { return false; }
 
   /// `time`: ns since the Unix epoch, when the message leaves; not before the last one's.
@@ -97,7 +97,7 @@ class Outlet {
   /// Ends what is open; nothing is sent after.
   virtual void close() {}
 
-  /// Why it had to end, in words for the user; empty where nothing is wrong.
+  /// Why it had to end, in words for the user; empty if nothing is wrong.
   virtual std::string failure() const { return {}; }
 };
 
@@ -127,7 +127,7 @@ class Transport : public Outlet {
   /// True once somebody outside has ended the node (ROS 1: rosnode kill, another node of its name).
   virtual bool is_over() const { return false; }
 
-  /// False where `close` had to leave threads behind (ROS 1: a master that does not answer): the
+  /// False if `close` had to leave threads behind (ROS 1: a master that does not answer): the
   /// process must then end without the destructors of static objects.
   virtual bool has_ended() const { return true; }
 
@@ -195,7 +195,7 @@ class MessageReader {
   virtual ~MessageReader() = default;
   /// How its messages became bytes.
   virtual Wire wire() const = 0;
-  /// The next message; false where there are none left.
+  /// The next message; false if there are none left.
   virtual bool next(Recorded& message) = 0;
   /// Share of the recording that was read, 0 to 1.
   virtual double share_read() const = 0;

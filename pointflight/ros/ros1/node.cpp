@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::chrono::milliseconds kLook(50);
 
-/// True where the master knows a living node of this name: it would be shut down by ours.
+/// True if the master knows a living node of this name: it would be shut down by ours.
 bool is_taken(const std::string& name) {
   XmlRpc::XmlRpcValue request;
   XmlRpc::XmlRpcValue response;
@@ -119,7 +119,7 @@ void Ros1Node::connect() {
   over_ = true;
 }
 
-/// False where it is told to end before there is one.
+/// False if it is told to end before there is one.
 bool Ros1Node::find_master() {
   bool said = false;
   while (!stop_ && !ros::master::check()) {

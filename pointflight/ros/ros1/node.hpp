@@ -59,7 +59,7 @@ class Ros1Node {
 
   /// No message comes in any more; what runs is told to end. Returns at once.
   void stop();
-  /// Leaves the graph. May take as long as the master likes. False where roscpp was left half made
+  /// Leaves the graph. May take as long as the master likes. False if roscpp was left half made
   /// by an answer of the master's: then neither it nor this may be taken down.
   bool leave();
 

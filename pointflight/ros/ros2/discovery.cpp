@@ -76,7 +76,7 @@ std::string escaped(const std::string& text) {
   return out;
 }
 
-/// True where a user's configuration, XML or files with it, selects network interfaces: DDS refuses
+/// True if a user's configuration, XML or files with it, selects network interfaces: DDS refuses
 /// one that is selected twice.
 bool selects_interfaces(const std::string& user) {
   constexpr const char* kElement = "<NetworkInterface";

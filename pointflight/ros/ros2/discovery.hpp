@@ -19,7 +19,7 @@ struct DiscoverySettings {
 
 /// What ROS 2's own environment asks for: ROS_DOMAIN_ID, ROS_AUTOMATIC_DISCOVERY_RANGE,
 /// ROS_STATIC_PEERS, ROS_LOCALHOST_ONLY, ROS_DISTRO. `get` returns a variable or nothing. Throws
-/// std::runtime_error where a value means nothing.
+/// std::runtime_error if a value means nothing.
 DiscoverySettings discovery_from(
     const std::function<std::optional<std::string>(const char* name)>& get);
 

@@ -22,7 +22,7 @@ struct RawTopic {
 /// Throws std::runtime_error with words for the user.
 RawTopic make_raw_topic(dds_entity_t participant, const std::string& name, const std::string& type);
 
-/// Hands a message to a writer of such a topic. False where it was not taken.
+/// Hands a message to a writer of such a topic. False if it was not taken.
 bool write_raw(dds_entity_t writer, const ddsi_sertype* type, const Bytes& bytes);
 
 /// A message that was read.
@@ -31,7 +31,7 @@ struct RawSample {
   dds_sample_info_t info;
 };
 
-/// The next message of a reader of such a topic; false where there is none. Samples without data
+/// The next message of a reader of such a topic; false if there is none. Samples without data
 /// (a writer has gone) are passed over.
 bool take_raw(dds_entity_t reader, RawSample& sample);
 

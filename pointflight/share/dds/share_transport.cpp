@@ -61,7 +61,7 @@ using Qos = std::unique_ptr<dds_qos_t, QosDeleter>;
 /// Liveliness is the participant's: a process that is stopped or cut off is lost after the lease.
 Qos qos_for(ShareChannel channel, const ShareTransportOptions& options) {
   Qos qos(dds_create_qos());
-  const bool is_crew = channel == ShareChannel::kCrew;
+  const bool is_crew = channel == ShareChannel::kMembers;
   const bool all = is_crew || channel == ShareChannel::kPast ||
                    (channel == ShareChannel::kStates && options.lockstep);
   dds_qset_reliability(
@@ -131,7 +131,7 @@ class DdsShareTransport : public ShareTransport {
  private:
   struct End {
     DdsShareTransport* transport = nullptr;
-    ShareChannel channel = ShareChannel::kCrew;
+    ShareChannel channel = ShareChannel::kMembers;
     dds_entity_t reader = 0, writer = 0;
     const ddsi_sertype* type = nullptr;
   };
@@ -165,7 +165,7 @@ class DdsShareTransport : public ShareTransport {
     end.type = topic.type;
     const Qos qos = qos_for(end.channel, options);
     const auto steps = std::max(kStepsKept, static_cast<std::int32_t>(options.ahead) + 16);
-    const std::int32_t depth = end.channel == ShareChannel::kCrew ? 1 : steps;
+    const std::int32_t depth = end.channel == ShareChannel::kMembers ? 1 : steps;
     dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, depth);
     end.writer = dds_create_writer(participant_, topic.topic, qos.get(), nullptr);
     // of several writers: one's news must not push out another's
@@ -174,7 +174,7 @@ class DdsShareTransport : public ShareTransport {
     dds_qset_liveliness(qos.get(), DDS_LIVELINESS_AUTOMATIC, DDS_INFINITY);
     dds_listener_t* listener = dds_create_listener(&end);
     dds_lset_data_available(listener, &DdsShareTransport::on_data);
-    if (end.channel == ShareChannel::kCrew) {
+    if (end.channel == ShareChannel::kMembers) {
       dds_lset_liveliness_changed(listener, &DdsShareTransport::on_liveliness);
     }
     end.reader = dds_create_reader(participant_, topic.topic, qos.get(), listener);

@@ -7,14 +7,14 @@
 namespace pointflight {
 namespace {
 
-/// A meeting within the step.
+/// A contact within the step.
 struct Meeting {
   double share;  ///< Of the step.
   Contact contact;
 };
 
-/// The first meeting on the way between both ends of the step. `contact_at(share)` is the contact
-/// there, nothing where it is farther than `moved`.
+/// The first contact on the way between both ends of the step. `contact_at(share)` is the contact
+/// there, nothing if it is farther than `moved`.
 template <class ContactAt>
 std::optional<Meeting> meeting_on_the_way(const ContactAt& contact_at, double moved) {
   std::optional<Contact> last;

@@ -20,7 +20,7 @@ struct PlacedBody {
 struct ProximityState {
   std::optional<Contact> nearest;  ///< At the last step; nothing within the reach.
   double map_distance = 0.0;       ///< To the map, at most the reach.
-  std::vector<Label> touching;     ///< In the order in which they were met.
+  std::vector<Label> touching;     ///< In the order in which they were hit.
   Pose T_world_body;               ///< At the last step.
   bool started = false;
 };
@@ -37,7 +37,7 @@ struct ProximityQuery {
   bool ignores_map = false;  ///< On the ground, or a wreck.
 };
 
-/// Finds what is nearest, and what the hull met on the way: appends events of what it enters and
+/// Finds what is nearest, and what the hull hit on the way: appends events of what it enters and
 /// leaves. Continuous: what lies between the two ends of the step is found too.
 void sense_proximity(const ProximityQuery& query,
                      const SurfelMap& map,

@@ -123,7 +123,7 @@ std::vector<double> LoopController::speeds(const RigidBodyState& state,
   const AirMotion motion = motion_of(state);
   const Wrench wanted{thrust, {torque.x(), torque.y(), memory.yaw_torque}};
   std::vector<double> speeds =
-      rotors_fail(memory) ? mixer_.speeds_of_what_is_left(wanted, motion, memory.rotor_shares)
+      rotors_fail(memory) ? mixer_.speeds_with_failed_rotors(wanted, motion, memory.rotor_shares)
                           : mixer_.speeds(wanted, motion);
   memory.limits.rotors =
       std::abs(thrust_of(speeds, state, memory) - thrust) > 1e-3 * settings_.mass * kGravity;

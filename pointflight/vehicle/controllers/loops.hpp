@@ -64,7 +64,7 @@ class LoopController : public Controller {
                                                const Vector3d& a_world,
                                                const std::vector<double>& speeds,
                                                const ControllerMemory& memory) const;
-  /// True where some turn slower than they are told, and that is allowed for.
+  /// True if some turn slower than they are told, and that is allowed for.
   [[nodiscard]] bool rotors_fail(const ControllerMemory& memory) const;
   /// That comes of commanded speeds, N.
   [[nodiscard]] double thrust_of(const std::vector<double>& commands,
@@ -96,7 +96,7 @@ inline constexpr double kVelocityToPosition = 1.5;
 /// Natural frequency of the velocity loop along each axis, rad/s.
 Vector3d velocity_frequency(const ControllerSettings& settings);
 
-/// Attitude whose z axis is `b3` and whose x axis points to heading `yaw`; where b3 lies along the
+/// Attitude whose z axis is `b3` and whose x axis points to heading `yaw`; if b3 lies along the
 /// heading, the nearest that `R_now` allows.
 Matrix3d attitude_from(const Vector3d& b3, double yaw, const Matrix3d& R_now);
 

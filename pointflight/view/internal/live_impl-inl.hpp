@@ -89,7 +89,7 @@ class LiveServer::Impl {
   void accept();
   [[nodiscard]] Permission permission_of(const http::request<http::string_body>& request) const;
   void greet(Client& client);
-  void to_all(Frame frame);
+  void to_all(const Frame& frame);
   void leave(Client& client);
   /// A channel stays where it is.
   [[nodiscard]] KnownChannel* channel(std::uint32_t id) {

@@ -13,7 +13,7 @@ export class FrameBudget {
     this.frames = 0;
   }
 
-  // Once per frame, with when it began (ms). True where the budget changed.
+  // Once per frame, with when it began (ms). True if the budget changed.
   frame(now, map) {
     if (document.hidden || this.since === 0) {
       this.since = now;

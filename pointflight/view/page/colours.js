@@ -24,7 +24,7 @@ export const turboCss = (x) => `rgb(${[R, G, B].map((c) => Math.round(255 * at(c
 // CSS stops of the height's colours, low to high.
 export const heightStops = () => Array.from({ length: 13 }, (_, i) => turboCss(0.08 + (0.84 * i) / 12)).join(", ");
 
-// How planar a surfel is: SurfelWord's thickness is 0 where it is flat.
+// How planar a surfel is: SurfelWord's thickness is 0 if it is flat.
 export const FLAT_LEVEL = [0.55, 0.75, 0.85];
 export const FLAT_STEEP = [0.3, 0.55, 0.75];
 export const ROUGH = [0.85, 0.55, 0.25];

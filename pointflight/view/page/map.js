@@ -98,7 +98,7 @@ export class SurfelMap {
     return this.index;
   }
 
-  // False where there is no map.
+  // False if there is no map.
   async load() {
     const index = await this.fetch("/map/index");
     if (index.byteLength === 0) return false;

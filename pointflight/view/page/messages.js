@@ -4,7 +4,7 @@ import { MessageReader } from "@foxglove/rosmsg2-serialization";
 
 const text = new TextDecoder();
 
-// Reads bytes by a channel's schema; null where nobody here can.
+// Reads bytes by a channel's schema; null if nobody here can.
 export function decoderOf({ encoding, schema, schemaEncoding }) {
   try {
     if (encoding === "json") return (bytes) => JSON.parse(text.decode(bytes));

@@ -75,7 +75,7 @@ export class Recording {
     this.say(words, true);
   }
 
-  // Takes what a topic's messages say into the scene; nothing where nobody knows how.
+  // Takes what a topic's messages say into the scene; nothing if nobody knows how.
   drawerOf(topic) {
     const { kind } = topic;
     if (kind === "tf2_msgs/TFMessage" || kind === "tf/tfMessage") return (m) => this.takeTransforms(m.transforms);
@@ -161,7 +161,7 @@ export class Recording {
     };
   }
 
-  // From a cloud's frame to the world; where nothing says how its sensor is mounted, at the vehicle.
+  // From a cloud's frame to the world; if nothing says how its sensor is mounted, at the vehicle.
   placeOf(topic, frame, stamp) {
     if (this.frames.has(frame) || this.vehicles.length !== 1) return this.frames.toRoot(frame, stamp);
     const [vehicle] = this.vehicles;

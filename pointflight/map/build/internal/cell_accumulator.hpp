@@ -13,7 +13,7 @@ namespace pointflight {
 /// that exceed the limit go to a scratch array as a sorted run, and runs are merged in the end.
 ///
 /// A cell's sums are those of its points in the order in which they came, whatever the number of
-/// threads; only where a run ends, sums of sums are taken.
+/// threads; only if a run ends, sums of sums are taken.
 class CellAccumulator {
  public:
   static constexpr std::size_t kDefaultMemory = std::size_t{1} << 30;  ///< Bytes.

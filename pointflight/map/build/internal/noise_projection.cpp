@@ -23,7 +23,7 @@ double full_plane_variance(const VoxelGrid& grid, std::int32_t reach) {
   return width * width / 12.0;
 }
 
-/// Thickness of the planar neighbourhood of a cell, or negative where there is none.
+/// Thickness of the planar neighbourhood of a cell, or negative if there is none.
 double thickness_around(const VoxelGrid& grid, NeighbourWindow& window, const VoxelCell& cell) {
   for (const std::int32_t reach : {1, 2}) {
     const Moments around = window.moments(cell, reach);
@@ -43,7 +43,7 @@ struct MovedCell {
   Fate fate = Fate::kUnchanged;
 };
 
-/// The points of a cell with another mean and covariance (about the mean), in the cell where they
+/// The points of a cell with another mean and covariance (about the mean), in the cell if they
 /// are then.
 VoxelCell cell_with(const VoxelFrame& frame,
                     const VoxelCell& cell,

@@ -7,7 +7,7 @@
 namespace pointflight {
 
 /// Standard deviation of the cloud's points across its flat surfaces, m: the 20th percentile of the
-/// thickness of planar neighbourhoods. 0 where there are none (foliage).
+/// thickness of planar neighbourhoods. 0 if there are none (foliage).
 double estimate_noise(const CellTiles& cells, const Executor& executor);
 
 /// What the projection did.

@@ -9,7 +9,7 @@ namespace {
 
 constexpr double kStandsOut = 2.0;  // times the mean distance of the neighbours
 constexpr double kFarInCells = 10.0;
-constexpr std::int32_t kHalo = 4;       // where nearly all cells have their neighbours
+constexpr std::int32_t kHalo = 4;       // if nearly all cells have their neighbours
 constexpr std::int32_t kWideHalo = 16;  // beyond kFarInCells it no longer matters how far
 
 /// Centroids of the cells of a view, metres from its first cell's corner.
@@ -78,7 +78,7 @@ class WideView {
   std::vector<std::pair<double, std::uint32_t>> found_;
 };
 
-/// Mean distance to the nearest neighbours where all of them surely lie within kHalo cells.
+/// Mean distance to the nearest neighbours if all of them surely lie within kHalo cells.
 class NearView {
  public:
   NearView(const VoxelGrid& grid, std::size_t neighbours)

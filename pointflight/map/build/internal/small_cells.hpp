@@ -22,7 +22,7 @@ class SmallCells {
              std::size_t memory_bytes);
   ~SmallCells();
 
-  /// True where there is nothing to split: no second pass is wanted.
+  /// True if there is nothing to split: no second pass is wanted.
   [[nodiscard]] bool empty() const;
   /// Points of the second pass, in the world.
   void add(std::span<const CloudPoint> points_world);

@@ -14,7 +14,7 @@ namespace {
 constexpr std::size_t kEnoughCells = 7;
 constexpr std::int32_t kWidest = 3;  // cells to each side: 7^3
 
-/// The widened surfel, or nothing where the surroundings are not planar.
+/// The widened surfel, or nothing if the surroundings are not planar.
 std::optional<Surfel> widened(const VoxelGrid& grid,
                               NeighbourWindow& window,
                               const VoxelCell& cell,

@@ -6,7 +6,7 @@
 namespace pointflight {
 
 /// Fits a surfel to a cell of the grid that `window` looks at; its centre is in voxels from the
-/// cell's low corner. Axes come from the 3x3x3 neighbourhood where that is planar, spreads from the
+/// cell's low corner. Axes come from the 3x3x3 neighbourhood if that is planar, spreads from the
 /// cell's own points, shrunk to a prior worth 8 points (docs/architecture.md, "Surfels").
 Surfel fit_surfel(const VoxelGrid& grid, NeighbourWindow& window, const VoxelCell& cell);
 

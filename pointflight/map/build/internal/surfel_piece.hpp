@@ -1,4 +1,4 @@
-// One width of cells does not suit a whole map: where points are thin on a flat surface a wide cell
+// One width of cells does not suit a whole map: if points are thin on a flat surface a wide cell
 // holds enough of them (wide_cells), and where many lie on something that is not flat small cells
 // show its form (small_cells).
 #pragma once
@@ -18,7 +18,7 @@ struct SurfelPiece {
   float mean_intensity = 0.0f;  ///< Of the points.
 };
 
-/// Mean intensity of a cell's points; 0 where it is not finite.
+/// Mean intensity of a cell's points; 0 if it is not finite.
 float mean_intensity(const VoxelCell& cell);
 
 /// The cell twice as wide that a cell lies in.

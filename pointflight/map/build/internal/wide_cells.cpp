@@ -14,10 +14,10 @@ constexpr int kDoublingsMax = 3;       // wider ones are more than a surfel's 1.
 constexpr std::uint32_t kPlane = 4;    // points of a wide cell
 constexpr double kThin = 3.5;          // points per cell
 constexpr double kOnePlane = 0.005;    // r, standard deviation across it
-constexpr double kNoisyPlane = 0.02;   // r, the same where points are noisier
+constexpr double kNoisyPlane = 0.02;   // r, the same if points are noisier
 constexpr double kMergedPoints = 4.0;  // points per cell
 constexpr double kThinAround = 16.0;   // points per wide cell
-constexpr double kSurface = 6.0;       // occupied cells in 3 x 3 x 3 where a surface goes on
+constexpr double kSurface = 6.0;       // occupied cells in 3 x 3 x 3 if a surface goes on
 
 using Voxel = std::array<std::int32_t, 3>;
 
@@ -54,7 +54,7 @@ struct Candidate {
 struct Level {
   CellTiles cells;
   std::vector<std::uint8_t> children;
-  std::vector<std::uint8_t> planar;    ///< Of them; empty where planes are not looked for.
+  std::vector<std::uint8_t> planar;    ///< Of them; empty if planes are not looked for.
   ScratchArray<Candidate> candidates;  ///< Those of a tile from `first` on; the tiles ascend.
   struct OfTile {
     std::size_t tile, first, count;

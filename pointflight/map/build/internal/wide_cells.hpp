@@ -18,11 +18,11 @@ struct WideSurfels {
   std::size_t merged = 0;            ///< How many for cells amid a plane.
 };
 
-/// Wide cells instead of several narrow ones. In sparse blocks, where points are thin: a cell two
-/// to eight times as wide, up to 0.45 m, that is planar with 4 points or more, where the cells half
+/// Wide cells instead of several narrow ones. In sparse blocks, if points are thin: a cell two
+/// to eight times as wide, up to 0.45 m, that is planar with 4 points or more, if the cells half
 /// as wide in it have fewer than 3.5 on average. Elsewhere amid planes: a cell twice as wide whose
 /// points lie within 0.005 r of one plane, or a quarter of `noise` (m, of the points across flat
-/// surfaces), but 0.02 r at most, where the surface goes on to all sides. `surfels` are those of
+/// surfaces), but 0.02 r at most, if the surface goes on to all sides. `surfels` are those of
 /// `cells`, in their order. Does not depend on threads.
 WideSurfels surfels_of_wide_cells(const CellTiles& cells,
                                   const ScratchArray<BuildSurfel>& surfels,

@@ -42,7 +42,7 @@ class SurfelGathering {
     append(voxel, (word & ~kPlaceBits) | place, intensity);
   }
 
-  /// A surfel anywhere; false where it lies too far from the lattice's base.
+  /// A surfel anywhere; false if it lies too far from the lattice's base.
   bool add(const Vector3d& center_world, Surfel surfel, std::uint8_t intensity) {
     std::array<std::int32_t, 3> voxel{};
     for (int axis = 0; axis < 3; ++axis) {

@@ -1,4 +1,4 @@
-#include "pointflight/share/other_track.hpp"
+#include "pointflight/share/remote_track.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -62,7 +62,7 @@ double extrapolation_bound(const VehicleSettings& vehicle, double radius, double
   return 0.5 * seconds * seconds * (acceleration + turn * radius);
 }
 
-void OtherTrack::add(SimTime time, const RigidBodyState& state) {
+void RemoteTrack::add(SimTime time, const RigidBodyState& state) {
   auto place = states_.end();
   while (place != states_.begin() && std::prev(place)->time >= time) --place;
   if (place != states_.end() && place->time == time) return;  // said twice
@@ -70,11 +70,11 @@ void OtherTrack::add(SimTime time, const RigidBodyState& state) {
   while (states_.size() > 2 && states_[1].time < states_.back().time - kKept) states_.pop_front();
 }
 
-void OtherTrack::add_past(SimTime time, const RigidBodyState& state) {
+void RemoteTrack::add_past(SimTime time, const RigidBodyState& state) {
   if (states_.empty() || states_.back().time < time) states_.push_back({time, state});
 }
 
-std::optional<RigidBodyState> OtherTrack::at(SimTime time, Duration most) const {
+std::optional<RigidBodyState> RemoteTrack::at(SimTime time, Duration most) const {
   if (states_.empty() || time < states_.front().time) return std::nullopt;
   const auto later = [](SimTime t, const Timed& timed) { return t < timed.time; };
   const auto next = std::upper_bound(states_.begin(), states_.end(), time, later);
@@ -88,7 +88,7 @@ std::optional<RigidBodyState> OtherTrack::at(SimTime time, Duration most) const 
   return between(before.state, next->state, seconds, to_seconds(time - before.time) / seconds);
 }
 
-std::optional<PoseTrack> OtherTrack::track(SimTime from, SimTime until, Duration most) const {
+std::optional<PoseTrack> RemoteTrack::track(SimTime from, SimTime until, Duration most) const {
   std::vector<TimedPose> poses;
   for (SimTime time = from; time < until + kTrackStep; time += kTrackStep) {
     const SimTime instant = std::min(time, until);

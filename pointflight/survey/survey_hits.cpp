@@ -1,4 +1,4 @@
-#include "pointflight/survey/survey_meetings.hpp"
+#include "pointflight/survey/survey_hits.hpp"
 
 #include <atomic>
 #include <memory>
@@ -9,14 +9,13 @@
 
 namespace pointflight {
 
-std::uint64_t follow_survey(
-    const SurfelMap& map,
-    const SurveyOpener& survey,
-    double right,
-    const Executor& executor,
-    const std::string& stage,
-    const Progress& progress,
-    const std::function<void(const SurveyRay&, const RayMeetings&)>& visit) {
+std::uint64_t follow_survey(const SurfelMap& map,
+                            const SurveyOpener& survey,
+                            double right,
+                            const Executor& executor,
+                            const std::string& stage,
+                            const Progress& progress,
+                            const std::function<void(const SurveyRay&, const RayHits&)>& visit) {
   constexpr std::size_t kChunk = 1024;
   const KernelMap kernel = kernel_map_of(map);
   const float behind = static_cast<float>(right) + kernel.window;
@@ -33,7 +32,7 @@ std::uint64_t follow_survey(
     }
     const auto order = direction_order(rays, executor);
     executor.parallel_for(order.size(), kChunk, [&](std::size_t begin, std::size_t end) {
-      overflows += meet_all(
+      overflows += find_all_hits(
           kernel, rays, std::span(order).subspan(begin, end - begin), [&](const auto& way) {
             visit(batch[way.ray], way);
           });

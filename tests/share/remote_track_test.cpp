@@ -1,5 +1,5 @@
 // States of vehicles of other processes: moved on, put between two, bounded; clocks of others.
-#include "pointflight/share/other_track.hpp"
+#include "pointflight/share/remote_track.hpp"
 
 #include <gtest/gtest.h>
 
@@ -26,7 +26,7 @@ RigidBodyState turning() {
   return state;
 }
 
-TEST(OtherTrack, AStateIsMovedOnAsItsVelocitiesSay) {
+TEST(RemoteTrack, AStateIsMovedOnAsItsVelocitiesSay) {
   const RigidBodyState state = turning();
   const RigidBodyState moved = moved_on(state, 0.4);
   EXPECT_NEAR((moved.p_world - Vector3d(1.8, 1.6, 3.2)).norm(), 0.0, 1e-12);
@@ -43,7 +43,7 @@ TEST(OtherTrack, AStateIsMovedOnAsItsVelocitiesSay) {
   EXPECT_EQ(moved.v_world, state.v_world);
 }
 
-TEST(OtherTrack, Statistics_NothingThatRotorsCanDoIsBeyondTheBound) {
+TEST(RemoteTrack, Statistics_NothingThatRotorsCanDoIsBeyondTheBound) {
   std::mt19937 draws(1);
   const auto draw = [&draws](double least, double most) {
     return least + (most - least) * static_cast<double>(draws()) / 4294967295.0;
@@ -85,12 +85,12 @@ TEST(OtherTrack, Statistics_NothingThatRotorsCanDoIsBeyondTheBound) {
   }
 }
 
-TEST(OtherTrack, BetweenStatesACubicIsExact) {
+TEST(RemoteTrack, BetweenStatesACubicIsExact) {
   const auto place = [](double t) {
     return Vector3d(1 + 2 * t - t * t * t, 0.5 * t * t, 3 - t + 2 * t * t * t);
   };
   const auto speed = [](double t) { return Vector3d(2 - 3 * t * t, t, -1 + 6 * t * t); };
-  OtherTrack track;
+  RemoteTrack track;
   for (const double t : {0.0, 0.1, 0.3, 0.2}) {  // one comes late
     RigidBodyState state;
     state.p_world = place(t);

@@ -1,10 +1,10 @@
 // Rays that go through everything: what a map's fit to its survey asks.
-#include "pointflight/render/internal/meeting_kernel.hpp"
+#include "pointflight/render/internal/all_hits_kernel.hpp"
 
 #include "pointflight/core/internal/simd_targets-inl.hpp"
 // for foreach_target
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "pointflight/render/internal/meeting_kernel.cpp"
+#define HWY_TARGET_INCLUDE "pointflight/render/internal/all_hits_kernel.cpp"
 #include <hwy/foreach_target.h>
 // after foreach_target
 #include "pointflight/render/internal/beam_kernel-inl.hpp"
@@ -16,13 +16,13 @@ static std::uint64_t follow(const KernelMap& map,
                             const Ray* rays,
                             const std::uint32_t* order,
                             std::size_t count,
-                            const std::function<void(const RayMeetings&)>& visit) {
-  MetSurfel met[kHits + 16];
+                            const std::function<void(const RayHits&)>& visit) {
+  SurfelHit met[kHits + 16];
   if (map.node_count == 0) {
     for (std::size_t i = 0; i < count; ++i) visit({order[i], -1.0f, -1.0f, {}});
     return 0;
   }
-  return follow_singly<Meetings::kAllKept>(map, rays, order, count, [&](RayState& s) {
+  return follow_singly<HitMode::kAll>(map, rays, order, count, [&](RayState& s) {
     for (std::size_t i = 0; i < s.hits.count; ++i) {
       met[i] = {s.hits.t[i], s.hits.weight[i], static_cast<std::uint32_t>(s.hits.word[i])};
     }
@@ -45,10 +45,10 @@ HWY_EXPORT(follow);
 
 }  // namespace
 
-std::uint64_t meet_all(const KernelMap& map,
-                       std::span<const Ray> rays,
-                       std::span<const std::uint32_t> order,
-                       const std::function<void(const RayMeetings&)>& visit) {
+std::uint64_t find_all_hits(const KernelMap& map,
+                            std::span<const Ray> rays,
+                            std::span<const std::uint32_t> order,
+                            const std::function<void(const RayHits&)>& visit) {
   return HWY_DYNAMIC_DISPATCH(follow)(map, rays.data(), order.data(), order.size(), visit);
 }
 

@@ -1,5 +1,5 @@
 // What a process that was killed left of a shared run, and where the next one goes on from it.
-#include "pointflight/sim/ended_run.hpp"
+#include "pointflight/sim/interrupted_run.hpp"
 
 #include <gtest/gtest.h>
 
@@ -67,10 +67,10 @@ class EndedRunTest : public ::testing::Test {
   [[nodiscard]] std::string trajectory(const std::string& vehicle) const {
     return (fs::path(staging_of(killed_)) / vehicle / "trajectory.csv.partial").string();
   }
-  [[nodiscard]] std::optional<EndedRun> ended() const {
+  [[nodiscard]] std::optional<InterruptedRun> ended() const {
     return ended_run(killed_, member_.simulation, {0, 1});
   }
-  void expect_truth(const EndedRun& run) const {
+  void expect_truth(const InterruptedRun& run) const {
     ASSERT_EQ(run.states.size(), 2u);
     for (const auto& [v, state] : run.states) {
       const auto& states = truth_.at(v);

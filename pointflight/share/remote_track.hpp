@@ -31,7 +31,7 @@ RigidBodyState between(const RigidBodyState& a,
 double extrapolation_bound(const VehicleSettings& vehicle, double radius, double seconds);
 
 /// States of a vehicle of another process as they come in, some late, some never.
-class OtherTrack {
+class RemoteTrack {
  public:
   /// Inserts a state in order of time; states too old to matter are dropped.
   void add(SimTime time, const RigidBodyState& state);
@@ -53,7 +53,7 @@ class OtherTrack {
   [[nodiscard]] std::optional<RigidBodyState> at(SimTime time, Duration most) const;
 
   /// Where it was in [from, until], in steps of 5 ms: what is between them is below 0.1 mm off at
-  /// 30 m/s^2. Nothing where nothing is known of it.
+  /// 30 m/s^2. Nothing if nothing is known of it.
   [[nodiscard]] std::optional<PoseTrack> track(SimTime from, SimTime until, Duration most) const;
 
  private:

@@ -1,4 +1,4 @@
-#include "pointflight/sim/ended_run.hpp"
+#include "pointflight/sim/interrupted_run.hpp"
 
 #include <cmath>
 #include <cstdlib>
@@ -67,13 +67,13 @@ std::optional<std::pair<SimTime, VehicleState>> state_in(const std::string& line
 
 }  // namespace
 
-std::optional<EndedRun> ended_run(const std::string& folder,
-                                  const Simulation& simulation,
-                                  const std::vector<std::size_t>& vehicles) {
+std::optional<InterruptedRun> ended_run(const std::string& folder,
+                                        const Simulation& simulation,
+                                        const std::vector<std::size_t>& vehicles) {
   constexpr std::size_t kRead = 1 << 17;
   const fs::path staging = killed_run_in(folder);
   std::map<std::size_t, std::map<SimTime, VehicleState>> known;
-  EndedRun ended{{}, SimTime::max(), Duration{0}, {}};
+  InterruptedRun ended{{}, SimTime::max(), Duration{0}, {}};
   std::int64_t skipped = 0;
   if (!is_file(staging / kSkippedFile) || !is_file(staging / "scenario.yaml")) return std::nullopt;
   if (!(std::ifstream(staging / kSkippedFile) >> skipped)) return std::nullopt;

@@ -1,4 +1,4 @@
-#include "pointflight/lidar/maker_files.hpp"
+#include "pointflight/lidar/vendor_files.hpp"
 
 #include <fmt/format.h>
 
