@@ -120,12 +120,6 @@ Scenario load_input(const FlyFlags& flags, const Executor& executor) {
   if (is_map && !flags.map.empty()) {
     throw InputError(fmt::format("--map: is for a scenario; {} is a map itself", flags.input));
   }
-  if (!is_map && has_cloud_extension(flags.input)) {
-    throw InputError(
-        fmt::format("{0}: is a point cloud; import it first: pointflight map import {0} -o {1}",
-                    flags.input,
-                    fs::path(flags.input).stem().string() + ".pfmap"));
-  }
   Scenario scenario =
       is_map ? scenario_for_map(flags, bounds, executor) : scenario_from_file(flags);
   if (!waypoints.empty()) {
@@ -256,6 +250,12 @@ void say_warnings(const Simulation& simulation, const Executor& executor) {
 }
 
 int fly(const FlyFlags& flags) {
+  if (has_cloud_extension(flags.input)) {
+    throw InputError(
+        fmt::format("{0}: is a point cloud; import it first: pointflight map import {0} -o {1}",
+                    flags.input,
+                    fs::path(flags.input).stem().string() + ".pfmap"));
+  }
   if (flags.output.empty() && !flags.ros.any()) {
     throw InputError(
         "give a folder for the results with -o, or --view, --ros1, --ros2 or --record");

@@ -156,9 +156,6 @@ picture::RunPicture read_run(const fs::path& folder) {
 
 /// The scenario that a run was flown from; nothing if its folder has none.
 std::optional<Scenario> scenario_of(const PictureFlags& flags) {
-  if (!fs::is_directory(flags.run)) {
-    throw InputError(fmt::format("{}: no such run folder", flags.run));
-  }
   const fs::path file = fs::path(flags.run) / "scenario.yaml";
   if (!fs::exists(file)) return std::nullopt;
   return load_scenario(file.string());

@@ -110,7 +110,7 @@ TEST_F(Program, SaysWhichCommandOrFlagWasMeant) {
   expect_user_error(run(fmt::format("fly {}", folder / "hall.pcd")),
                     "import it first: pointflight map import");
   expect_user_error(run(fmt::format("picture {}", folder / "nosuch")),
-                    "nosuch: no such run folder");
+                    "nosuch: cannot open the folder");
   const Result version = run("--version");
   EXPECT_EQ(version.code, 0);
   for (const char* words : {"pointflight 0.", "(commit ", "meshes ", "ROS 1 ", "ROS 2 "}) {
