@@ -53,7 +53,7 @@ TEST_F(Program, ItsScenariosAreReadByProgramsOfTheCoreAlone) {
   EXPECT_EQ(check.code, 0) << check.err;
 }
 
-TEST_F(Program, ScenarioNewCheckAndFly) {
+TEST_F(Program, Slow_ScenarioNewCheckAndFly) {
   const TemporaryFolder folder;
   const std::string yaml = folder / "s.yaml";
   ASSERT_EQ(run(fmt::format("scenario new {} -o {} --length 5", map(), yaml)).code, 0);

@@ -166,7 +166,7 @@ TEST_F(MapEdit, TransformsAndLevels) {
   refused("--pose 1,2,x,0,0,0", "'x' is no number");
 }
 
-TEST_F(MapEdit, MergesExportsAndCompares) {
+TEST_F(MapEdit, Slow_MergesExportsAndCompares) {
   const TemporaryFolder folder;
   expect_done(fmt::format("map crop {} -o {} --box 0,0,-9,12,20,99", map(), folder / "l.pfmap"));
   expect_done(fmt::format("map crop {} -o {} --box 12,0,-9,24,20,99", map(), folder / "r.pfmap"));

@@ -162,7 +162,7 @@ TEST_F(Program, RecordsAFlightAndSaysWhatIsInIt) {
   EXPECT_TRUE(read_file(bag) == read_file(again));
 }
 
-TEST_F(Program, AnIndependentReaderFindsTheSameInARecording) {
+TEST_F(Program, Slow_AnIndependentReaderFindsTheSameInARecording) {
   SKIP_WITHOUT_NODE();
   const TemporaryFolder folder;
   const std::string yaml = scenario_in(folder.path(), map());

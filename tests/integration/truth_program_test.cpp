@@ -14,7 +14,7 @@ using testing::run;
 using testing::TemporaryFolder;
 using testing::write_file;
 
-TEST_F(Program, MeasuresFidelityInExactScenes) {
+TEST_F(Program, Slow_MeasuresFidelityInExactScenes) {
   const TemporaryFolder folder;
   const Result result =
       run(fmt::format("fidelity box partition_5cm --resolution 0.1 --noise 0,0.005 --poses 3 "
@@ -55,7 +55,7 @@ std::string room_csv() {
   return csv + "cone,pillar,4,3,0,4,3,3,,,,0.1,0.1\n";
 }
 
-TEST_F(Program, SurveysASceneAndFitsItsMapToTheRays) {
+TEST_F(Program, Slow_SurveysASceneAndFitsItsMapToTheRays) {
   const TemporaryFolder folder;
   write_file(folder / "room.csv", room_csv());
   const Result result = run(
@@ -86,7 +86,7 @@ std::string survey_the_room(const TemporaryFolder& folder) {
                      folder / "survey/room");
 }
 
-TEST_F(Program, FitsAMapToTheScansItWasMadeOf) {
+TEST_F(Program, Slow_FitsAMapToTheScansItWasMadeOf) {
   const TemporaryFolder folder;
   const std::string scans = survey_the_room(folder);
   const std::string survey = folder / "survey/room";

@@ -87,7 +87,7 @@ void fly(const TemporaryFolder& folder, Messages& messages, double duration = 1.
   loop.run();
 }
 
-TEST(Playback, ARunsFolderGivesTheMessagesOfTheRun) {
+TEST(Playback, Slow_ARunsFolderGivesTheMessagesOfTheRun) {
   const TemporaryFolder folder;
   Messages flown;
   fly(folder, flown);

@@ -80,7 +80,7 @@ TEST(SensorFit, Statistics_FindsTheNoiseThatASensorWasGiven) {
   }
 }
 
-TEST(SensorFit, FindsTheRingsOfASpinningSensor) {
+TEST(SensorFit, Slow_FindsTheRingsOfASpinningSensor) {
   for (const char* model : {"vlp16", "vlp32c"}) {
     LidarSettings settings = load_lidar(model);
     settings.optics.sub_rays = 1;
@@ -132,7 +132,7 @@ TEST(SensorFit, Statistics_ARingsOwnRangeOffsetShows) {
   }
 }
 
-TEST(SensorFit, SaysWhenTheSensorMovedAndWhenNothingIsFlat) {
+TEST(SensorFit, Slow_SaysWhenTheSensorMovedAndWhenNothingIsFlat) {
   const LidarSettings settings = load_lidar("mid360");
   std::vector<RecordedScan> scans = recorded(settings, 10);
   for (std::size_t i = 0; i < scans.size(); ++i) {

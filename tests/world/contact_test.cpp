@@ -62,7 +62,7 @@ class Draws {
   std::uint64_t next_ = 0;
 };
 
-TEST(Contact, ManyQueriesEqualBruteForceOverTheSameBoxes) {
+TEST(Contact, Statistics_ManyQueriesEqualBruteForceOverTheSameBoxes) {
   const auto map = map_of(room(), 0.2);
   const auto boxes = boxes_of(*map);
   ASSERT_EQ(boxes.size(), map->surfel_count());
