@@ -17,7 +17,7 @@
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/fidelity/scene_beams.hpp"
 #include "pointflight/lidar/lidar.hpp"
-#include "pointflight/map/build/map_builder.hpp"
+#include "pointflight/map/import/map_builder.hpp"
 #include "pointflight/picture/error_picture.hpp"
 
 namespace pointflight::apps {

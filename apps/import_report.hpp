@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <string>
 
-#include "pointflight/map/build/map_builder.hpp"
+#include "pointflight/map/import/map_builder.hpp"
 
 namespace pointflight::apps {
 

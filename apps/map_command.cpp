@@ -17,7 +17,7 @@
 #include "pointflight/core/number_text.hpp"
 #include "pointflight/geometry/shape_scene.hpp"
 #include "pointflight/io/pcd_writer.hpp"
-#include "pointflight/map/build/map_builder.hpp"
+#include "pointflight/map/import/map_builder.hpp"
 #include "pointflight/picture/pictures.hpp"
 
 namespace pointflight::apps {

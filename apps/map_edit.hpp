@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "pointflight/io/cloud_writer.hpp"
-#include "pointflight/map/build/map_points.hpp"
 #include "pointflight/map/edit/map_edit.hpp"
+#include "pointflight/map/import/map_points.hpp"
 #include "pointflight/picture/point_picture.hpp"
 
 /// What `map crop`, `thin`, `transform`, `merge`, `export` and `diff` share.

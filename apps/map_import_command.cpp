@@ -16,7 +16,7 @@
 #include "apps/terminal.hpp"
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/io/pcd_writer.hpp"
-#include "pointflight/map/build/map_builder.hpp"
+#include "pointflight/map/import/map_builder.hpp"
 
 namespace pointflight::apps {
 namespace {

@@ -102,7 +102,7 @@ void take_scan(const ScanFlags& flags) {
   if (flags.mark_unknown) request.known = &known_space_of(*map);
   const Scan scan = lidar.take(request, PoseTrack(pose), *renderer, executor);
   if (scan.points.empty()) {
-    log("no beam met anything: is the pose inside the map? (pointflight map info shows its "
+    log("no beam hit anything: is the pose inside the map? (pointflight map info shows its "
         "extent)");
   }
   if (!flags.output.empty()) write_scan_pcd(flags.output, scan);

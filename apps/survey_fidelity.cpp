@@ -13,7 +13,7 @@
 #include "pointflight/fidelity/survey_report.hpp"
 #include "pointflight/io/pcd_writer.hpp"
 #include "pointflight/lidar/lidar.hpp"
-#include "pointflight/map/build/map_builder.hpp"
+#include "pointflight/map/import/map_builder.hpp"
 #include "pointflight/survey/map_fit.hpp"
 
 namespace pointflight::apps {

@@ -202,7 +202,7 @@ void print_fit(const FitReport& report, const OwnRays& after) {
   log("  before      " + about_rays(report.before));
   log("  fitted      " + about_rays(after));
   if (report.overflows > 0) {
-    log(fmt::format("  crowded     {} rays were ended early: they met too many surfels",
+    log(fmt::format("  crowded     {} rays were ended early: they hit too many surfels",
                     report.overflows));
   }
   log(fmt::format("ghosts        {} surfels of what moved removed, {} that only stood in the way",
@@ -251,7 +251,7 @@ void paint_by_signal(EditedMap& map,
       report.reflectivities[2],
       report.reflectivities[1],
       report.limit,
-      report.unseen > 0 ? fmt::format(", {} surfels that no return met are dark",
+      report.unseen > 0 ? fmt::format(", {} surfels that no return hit are dark",
                                       short_count(static_cast<double>(report.unseen)))
                         : ""));
 }

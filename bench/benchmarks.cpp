@@ -12,7 +12,7 @@
 #include "pointflight/geometry/shape_scene.hpp"
 #include "pointflight/io/pcd_writer.hpp"
 #include "pointflight/lidar/lidar.hpp"
-#include "pointflight/map/build/map_builder.hpp"
+#include "pointflight/map/import/map_builder.hpp"
 #include "pointflight/render/internal/beam_kernel.hpp"
 #include "pointflight/render/internal/direction_order.hpp"
 #include "pointflight/vehicle/controller.hpp"

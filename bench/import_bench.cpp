@@ -12,7 +12,7 @@
 
 #include "pointflight/core/random.hpp"
 #include "pointflight/fidelity/exact_scene.hpp"
-#include "pointflight/map/build/map_builder.hpp"
+#include "pointflight/map/import/map_builder.hpp"
 
 namespace pointflight {
 namespace {

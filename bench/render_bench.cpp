@@ -19,7 +19,7 @@
 
 #include "pointflight/fidelity/scene_beams.hpp"
 #include "pointflight/lidar/lidar.hpp"
-#include "pointflight/map/build/map_builder.hpp"
+#include "pointflight/map/import/map_builder.hpp"
 #include "pointflight/render/internal/beam_renderer.hpp"
 #include "pointflight/render/internal/direction_order.hpp"
 #include "pointflight/render/internal/paper_renderer.hpp"

@@ -61,7 +61,7 @@ endfunction()
 
 # pointflight_module(name [FOLDER folder] PUBLIC libs... PRIVATE libs...): the library target pointflight::<name> from
 # all sources in pointflight/<folder>, which is the name if none is given, but for folders that are targets of their own.
-set(POINTFLIGHT_OWN_TARGETS map/build map/edit campaign/mpi share/dds)
+set(POINTFLIGHT_OWN_TARGETS map/import map/edit campaign/mpi share/dds)
 function(pointflight_module name)
   cmake_parse_arguments(ARG "" "FOLDER" "PUBLIC;PRIVATE" ${ARGN})
   if(NOT ARG_FOLDER)

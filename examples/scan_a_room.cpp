@@ -5,7 +5,7 @@
 #include "pointflight/geometry/shape_scene.hpp"
 #include "pointflight/io/pcd_writer.hpp"
 #include "pointflight/lidar/lidar.hpp"
-#include "pointflight/map/build/map_builder.hpp"
+#include "pointflight/map/import/map_builder.hpp"
 
 using namespace pointflight;
 

@@ -11,7 +11,7 @@
 
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/geometry/shape_scene.hpp"
-#include "pointflight/map/build/map_builder.hpp"
+#include "pointflight/map/import/map_builder.hpp"
 #include "pointflight/map/surfel_map.hpp"
 
 namespace pointflight::testing {

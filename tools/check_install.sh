@@ -30,6 +30,8 @@ project(mine LANGUAGES CXX)
 find_package(pointflight REQUIRED)
 add_executable(mine mine.cpp)
 target_link_libraries(mine PRIVATE pointflight::sim)
+add_executable(draws draws.cpp)
+target_link_libraries(draws PRIVATE pointflight::picture)
 END
 cat >user/mine.cpp <<'END'
 #include <cstdio>
@@ -39,12 +41,23 @@ cat >user/mine.cpp <<'END'
 
 int main() { std::printf("%s\n", pointflight::data_folder().c_str()); }
 END
+cat >user/draws.cpp <<'END'
+#include "pointflight/picture/canvas.hpp"
+
+int main() {
+  using namespace pointflight::picture;
+  Canvas canvas(40, 30, kPaper);
+  canvas.dot(20.0, 15.0, 5.0, kInk);
+  canvas.save("dot.png");
+}
+END
 for of in user "$source/examples"; do
   { cmake -S "$of" -B "$folder/build" -G Ninja -DCMAKE_PREFIX_PATH="$folder/usr" \
           -DCMAKE_BUILD_TYPE=RelWithDebInfo && cmake --build "$folder/build"; } >"$folder/log" 2>&1 ||
     { cat "$folder/log"; exit 1; }
   [ "$of" = user ] || continue
   found=$(build/mine)
+  build/draws && [ -s dot.png ] || fail "a program that links pointflight::picture draws nothing"
   [ "$found" = "$folder/usr/share/pointflight" ] || fail "a program found its data in $found"
   rm -r build
 done

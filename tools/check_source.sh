@@ -9,19 +9,19 @@ breach() {
 
 # Includes go down the floors only: a folder may use what stands after the colon, and itself.
 ground="core geometry io"
-step="$ground map map/build render lidar vehicle world sim"
+step="$ground map map/import render lidar vehicle world sim"
 allowed() {
   case $1 in
     core) ;;
     geometry) echo "core" ;;
     io) echo "core geometry" ;;
     map) echo "$ground" ;;
-    map/build | map/edit) echo "$ground map" ;;
+    map/import | map/edit) echo "$ground map" ;;
     render) echo "core geometry map" ;;
     lidar) echo "$ground map render" ;;
     vehicle) echo "$ground" ;;
-    world) echo "$ground map map/build" ;;
-    survey) echo "$ground map map/build map/edit render lidar" ;;
+    world) echo "$ground map map/import" ;;
+    survey) echo "$ground map map/import map/edit render lidar" ;;
     fidelity) echo "$ground map render lidar survey" ;;
     sim) echo "$step" ;;
     run) echo "$step" ;;

@@ -76,8 +76,9 @@ class Message:
         for number, line in enumerate(path.read_text().splitlines(), 1):
             try:
                 fresh = self.read(line.rstrip(), above, fresh)
-            except (ValueError, AttributeError) as fault:
-                sys.exit(f"{path}:{number}: {line!r} is not a line of a message ({fault})")
+            except (ValueError, AttributeError) as fault:  # AttributeError: it fits no pattern
+                why = fault if isinstance(fault, ValueError) else "expected TYPE NAME [DEFAULT]"
+                sys.exit(f"{path}:{number}: {line!r}: {why}")
 
     def read(self, line, above, fresh):
         """One line; `above`: comments since the last field. True if the next field begins a group."""
@@ -126,6 +127,8 @@ def read_messages(folder):
             message.comment = [l[1:].strip() for l in path.read_text().splitlines() if re.match(r"#(?!@)", l)]
         message.finish()
         found[f"{message.package}/{message.cpp_name}"] = message
+    if not found:
+        sys.exit(f"{folder}: there are no messages (PACKAGE/NAME.msg)")
     ordered = []
 
     def place(name):

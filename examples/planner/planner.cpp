@@ -168,7 +168,7 @@ std::shared_ptr<const Trajectory> Planner::spline(const std::vector<Vector3d>& p
   points.push_back(point(now.p_world - dt * dt / 6.0 * a, now.yaw));
   points.push_back(point(now.p_world + dt * now.v_world + dt * dt / 3.0 * a, now.yaw));
 
-  // if the path goes on from the third of them
+  // where the path goes on from the third of them
   const Vector3d third = points.back().head<3>();
   double length = 0.0;
   for (std::size_t i = 1; i < path.size(); ++i) length += (path[i] - path[i - 1]).norm();

@@ -54,7 +54,7 @@ std::span<const Named<ReturnMode>> return_modes() {
 }
 
 void describe(SettingsVisitor& v, DetectionSettings& s) {
-  v.list({"rated", "", "ranges that the sheet states; none: all that a beam meets comes back"},
+  v.list({"rated", "", "ranges that the sheet states; none: all that a beam hits comes back"},
          s.rated,
          [](SettingsVisitor& w, RatedRange& rated) {
            w.value({"reflectivity", "", "of a diffuse target, face on", 1e-3, 1, true},

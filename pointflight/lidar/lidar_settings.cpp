@@ -50,7 +50,7 @@ void describe_prisms(SettingsVisitor& v, PrismsSettings& s) {
            w.value({"rate", "1/s", "turns per second; the sign is the sense", -1e4, 1e4, true},
                    wedge.rate);
            w.value({"phase_deg", "deg", "at time zero", -360, 360}, wedge.phase_deg);
-           w.value({"flat_first", "", "light meets the flat face first"}, wedge.flat_first);
+           w.value({"flat_first", "", "light hits the flat face first"}, wedge.flat_first);
          });
 }
 

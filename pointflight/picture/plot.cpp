@@ -11,7 +11,7 @@ namespace {
 constexpr Color kFrame{0.35, 0.35, 0.4};
 constexpr double kTickLength = 5.0;
 
-/// Calls `place(entry, x, row)` for each entry: rows break if the width is used up.
+/// Calls `place(entry, x, row)` for each entry: rows break when the width is used up.
 template <class Place>
 void lay_out_legend(const Canvas& canvas,
                     const std::vector<LegendEntry>& entries,

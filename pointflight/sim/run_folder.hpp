@@ -46,7 +46,7 @@ class RunFolder : public OutputFolder {
   RunFolder(const RunFolder&) = delete;
   RunFolder& operator=(const RunFolder&) = delete;
 
-  /// As it was given: if the files lie after `commit()`.
+  /// As it was given: where the files lie after `commit()`.
   [[nodiscard]] const std::string& path() const { return path_; }
   /// The path to write a file of the run to until `commit()`. Throws InputError, also if a file
   /// that no run wrote has its name.

@@ -21,7 +21,7 @@ struct DueInterval {
 };
 
 /// What has ended by `now`: of all, those that ended first, at the same instant. If nothing has,
-/// vehicles forget if they were before what is still to be measured.
+/// vehicles forget where they were before what is still to be measured.
 std::vector<DueInterval> due_intervals(const Fleet& fleet,
                                        std::span<VehicleStatus> statuses,
                                        SimTime now) {

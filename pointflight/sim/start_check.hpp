@@ -17,7 +17,7 @@ void check_names(const Scenario& scenario, const std::vector<VehicleSetup>& flee
 /// Copies stay where numbers in files are taken, too. Throws InputError.
 void check_reach(const Scenario& scenario, const std::vector<VehicleSetup>& fleet);
 
-/// A vehicle if it starts.
+/// A vehicle where it starts.
 struct StartingVehicle {
   const VehicleAgent* agent = nullptr;  ///< Never null if it is checked.
   Pose T_world_body;                    ///< Its pose at time zero.

@@ -14,7 +14,7 @@ namespace pointflight {
 struct SourcedState {
   RigidBodyState body;   ///< Truth.
   bool crashed = false;  ///< Its rotors are off for good.
-  bool jumped = false;   ///< It is not if it was before, and did not fly here.
+  bool jumped = false;   ///< It is elsewhere than before, without having flown there.
 };
 
 /// How well a source has known where its vehicle was.

@@ -67,7 +67,7 @@ class FateCounts {
 
 /// A surfel with its standard deviations scaled, its place as it was.
 SurfelWord resized(SurfelWord word, const std::array<double, 3>& factors) {
-  if (factors == std::array{1.0, 1.0, 1.0}) return word;  // axes are rounded if it is encoded
+  if (factors == std::array{1.0, 1.0, 1.0}) return word;  // encoding would round the axes
   Surfel surfel = decode(word);
   for (int k = 0; k < 3; ++k) {
     surfel.s[k] *= static_cast<float>(factors[static_cast<std::size_t>(k)]);
@@ -222,7 +222,7 @@ std::optional<std::array<double, 3>> factors_of(const SurfelEvidence& evidence,
   return factors;
 }
 
-/// Reads a survey and keeps if its rays began.
+/// Reads a survey and keeps where its rays began.
 class OriginKeeper : public SurveyReader {
  public:
   OriginKeeper(std::unique_ptr<SurveyReader> survey, Aabb& origins)

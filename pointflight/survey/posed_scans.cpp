@@ -3,11 +3,9 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <filesystem>
 #include <utility>
 
 #include "pointflight/core/input_error.hpp"
-#include "pointflight/io/byte_cursor.hpp"
 
 namespace pointflight {
 namespace {
@@ -51,6 +49,7 @@ class PosedScanReader : public SurveyReader {
     const bool uses_times = survey_.point_times_ == PosedScans::PointTimes::kUsed &&
                             poses_apart(poses, start) <= kMostApart;
     const Pose at_start = pose_on(poses, start);
+    const std::string path = uses_times ? survey_.source_->path(points_.scan) : "";
     for (const RecordedPoint& point : points_.points) {
       if (point.position.isZero(0.0)) continue;  // drivers say so: no return
       Pose pose = at_start;
@@ -61,15 +60,17 @@ class PosedScanReader : public SurveyReader {
       }
       const double range = seen.norm();
       if (!(range >= kNearest && range < kFarthest)) continue;  // NaN as well
-      if (uses_times && std::isfinite(point.time)) pose = pose_of(point, start);
+      if (uses_times && std::isfinite(point.time)) pose = pose_of(point, start, path);
       batch.push_back(survey_ray(pose, seen, points_.is_return));
       batch.back().intensity = point.intensity;
     }
   }
 
-  [[nodiscard]] Pose pose_of(const RecordedPoint& point, SimTime start) const {
+  /// Of a point with a time; `path` is its scan's, for messages.
+  [[nodiscard]] Pose pose_of(const RecordedPoint& point,
+                             SimTime start,
+                             const std::string& path) const {
     const SurveyPoses& trajectory = survey_.trajectory_;
-    const std::string path = survey_.source_->path(points_.scan);
     if (!trajectory.has_times) {
       throw InputError(
           fmt::format("{}: its points have times and the poses of {} have none; give a TUM "
@@ -113,10 +114,9 @@ SurveyFolder::SurveyFolder(const SurveyFiles& files) {
     for (std::size_t i = 0; i < names.size(); ++i) scans_.push_back({i, poses[i].time});
     return;
   }
-  constexpr double kSecondsEnd = 1e11;
   for (std::size_t i = 0; i < names.size(); ++i) {
-    double time = 0.0;
-    if (!parse_number(std::filesystem::path(names[i]).stem().string(), time)) {
+    const auto time = seconds_in_name(names[i]);
+    if (!time) {
       throw InputError(fmt::format(
           "{}: {} poses for {} scans in {}; name the scan of each pose in a ninth column, or name "
           "the scans by their times",
@@ -125,9 +125,8 @@ SurveyFolder::SurveyFolder(const SurveyFiles& files) {
           names.size(),
           files.scans));
     }
-    if (time > kSecondsEnd) time *= 1e-9;
     const std::string path = source_->path(i);
-    const SimTime at = time_of(time, path);
+    const SimTime at = time_of(*time, path);
     if (at < poses.front().time || at > poses.back().time) {
       throw InputError(fmt::format("{}: its time is not within the poses of {} ({} to {} s)",
                                    path,

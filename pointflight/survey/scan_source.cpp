@@ -18,6 +18,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr double kNanosFrom = 1e11;  // larger numbers are no seconds
+
 /// By the numbers that the names are, if all are; else as text.
 void sort_names(std::vector<std::string>& names) {
   const auto number = [](const std::string& name) -> std::optional<double> {
@@ -37,15 +39,21 @@ void sort_names(std::vector<std::string>& names) {
 
 }  // namespace
 
+std::optional<double> seconds_in_name(const std::string& file) {
+  double number = 0.0;
+  if (!parse_number(fs::path(file).stem().string(), number)) return std::nullopt;
+  return number > kNanosFrom ? 1e-9 * number : number;
+}
+
 std::vector<std::string> scan_files_in(const std::string& folder, const std::string& except) {
   std::vector<std::string> names;
   std::error_code error;
   for (fs::directory_iterator at(folder, error); !error && at != fs::directory_iterator();
        at.increment(error)) {
     std::error_code ignored;
-    // .txt: rather poses or notes
-    const bool is_cloud =
-        has_cloud_extension(at->path().string()) && at->path().extension() != ".txt";
+    const std::string extension = at->path().extension().string();
+    const bool is_notes = extension == ".txt" || extension == ".TXT";  // or poses
+    const bool is_cloud = has_cloud_extension(at->path().string()) && !is_notes;
     if (!is_cloud || !at->is_regular_file(ignored)) continue;
     if (fs::equivalent(at->path(), except, ignored)) continue;
     names.push_back(at->path().filename().string());
@@ -130,12 +138,12 @@ ScanFolder::ScanFolder(std::string folder, std::vector<std::string> names, std::
 }
 
 double ScanFolder::time(std::size_t scan) const {
-  constexpr double kNanosFrom = 1e11;
   const std::string stem = fs::path(names_[scan]).stem().string();
-  double time = 0.0;
-  if (!parse_number(stem, time)) return std::numeric_limits<double>::quiet_NaN();
-  if (time > kNanosFrom) return 1e-9 * time;
-  return stem.find('.') != std::string::npos ? time : std::numeric_limits<double>::quiet_NaN();
+  double number = 0.0;
+  const bool counts_scans =
+      parse_number(stem, number) && number <= kNanosFrom && stem.find('.') == std::string::npos;
+  if (counts_scans) return std::numeric_limits<double>::quiet_NaN();
+  return seconds_in_name(names_[scan]).value_or(std::numeric_limits<double>::quiet_NaN());
 }
 
 std::string ScanFolder::path(std::size_t scan) const {

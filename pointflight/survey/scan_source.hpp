@@ -6,6 +6,7 @@
 #include <functional>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -51,6 +52,10 @@ class ScanSource {
   [[nodiscard]] virtual std::unique_ptr<ScanReader> open(
       const std::function<bool(std::size_t scan)>& chosen = {}) const = 0;
 };
+
+/// The number that a scan's file is named by, in s or, from 1e11 on, ns: "1700000000.25.pcd";
+/// nothing if it is none.
+std::optional<double> seconds_in_name(const std::string& file);
 
 /// Names of the clouds of a folder, by the numbers that they are if all are, else as text;
 /// without the file `except`. Throws InputError, also if there are none.

@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "pointflight/core/argument.hpp"
-#include "pointflight/map/build/import_check.hpp"
+#include "pointflight/map/import/import_check.hpp"
 #include "pointflight/map/map_file.hpp"
 #include "pointflight/survey/surveyed_places.hpp"
 

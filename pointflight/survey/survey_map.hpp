@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "pointflight/map/build/map_builder.hpp"
+#include "pointflight/map/import/map_builder.hpp"
 #include "pointflight/survey/map_fit.hpp"
 #include "pointflight/survey/posed_scans.hpp"
 

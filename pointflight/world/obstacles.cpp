@@ -11,7 +11,7 @@
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/core/resources.hpp"
 #include "pointflight/geometry/rotation.hpp"
-#include "pointflight/map/build/map_builder.hpp"
+#include "pointflight/map/import/map_builder.hpp"
 #include "pointflight/world/obstacle_motion.hpp"
 #include "pointflight/world/random_flight.hpp"
 

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "pointflight/core/input_error.hpp"
-#include "pointflight/map/build/map_builder.hpp"
+#include "pointflight/map/import/map_builder.hpp"
 
 namespace {
 

@@ -10,8 +10,8 @@
 #include "pointflight/core/hash.hpp"
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/geometry/shape_scene.hpp"
-#include "pointflight/map/build/map_builder.hpp"
 #include "pointflight/map/edit/map_edit.hpp"
+#include "pointflight/map/import/map_builder.hpp"
 #include "pointflight/render/renderer.hpp"
 #include "pointflight/world/contact.hpp"
 

@@ -13,7 +13,7 @@
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/geometry/shape_scene.hpp"
 #include "pointflight/io/cloud_reader.hpp"
-#include "pointflight/map/build/map_builder.hpp"
+#include "pointflight/map/import/map_builder.hpp"
 #include "pointflight/map/map_file.hpp"
 #include "pointflight/run/playback.hpp"
 #include "pointflight/run/run_loop.hpp"

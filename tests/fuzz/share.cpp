@@ -6,7 +6,7 @@
 
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/geometry/shape_scene.hpp"
-#include "pointflight/map/build/map_builder.hpp"
+#include "pointflight/map/import/map_builder.hpp"
 #include "pointflight/share/common_ground.hpp"
 #include "pointflight/share/share_link.hpp"
 #include "tests/share/bus.hpp"

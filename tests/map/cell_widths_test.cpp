@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "pointflight/core/random.hpp"
-#include "pointflight/map/build/internal/small_cells.hpp"
-#include "pointflight/map/build/internal/surfel_fit.hpp"
-#include "pointflight/map/build/internal/wide_cells.hpp"
+#include "pointflight/map/import/internal/small_cells.hpp"
+#include "pointflight/map/import/internal/surfel_fit.hpp"
+#include "pointflight/map/import/internal/wide_cells.hpp"
 #include "pointflight/render/renderer.hpp"
 #include "tests/support.hpp"
 

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "pointflight/core/random.hpp"
-#include "pointflight/map/build/internal/cell_accumulator.hpp"
-#include "pointflight/map/build/internal/cell_tiles.hpp"
+#include "pointflight/map/import/internal/cell_accumulator.hpp"
+#include "pointflight/map/import/internal/cell_tiles.hpp"
 
 namespace pointflight {
 namespace {

@@ -1,4 +1,4 @@
-#include "pointflight/map/build/import_check.hpp"
+#include "pointflight/map/import/import_check.hpp"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>

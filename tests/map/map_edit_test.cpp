@@ -11,9 +11,9 @@
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/math.hpp"
 #include "pointflight/geometry/rotation.hpp"
-#include "pointflight/map/build/import_check.hpp"
-#include "pointflight/map/build/map_points.hpp"
 #include "pointflight/map/edit/crop_region.hpp"
+#include "pointflight/map/import/import_check.hpp"
+#include "pointflight/map/import/map_points.hpp"
 #include "pointflight/render/renderer.hpp"
 #include "tests/support.hpp"
 

@@ -8,8 +8,8 @@
 #include "pointflight/core/hash.hpp"
 #include "pointflight/core/random.hpp"
 #include "pointflight/io/pcd_writer.hpp"
-#include "pointflight/map/build/map_builder.hpp"
-#include "pointflight/map/build/spacing.hpp"
+#include "pointflight/map/import/map_builder.hpp"
+#include "pointflight/map/import/spacing.hpp"
 #include "tests/map/small_room.hpp"
 #include "tests/support.hpp"
 

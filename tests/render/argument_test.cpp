@@ -7,7 +7,7 @@
 #include "pointflight/io/cloud_reader.hpp"
 #include "pointflight/io/csv_table.hpp"
 #include "pointflight/io/pcd_writer.hpp"
-#include "pointflight/map/build/spacing.hpp"
+#include "pointflight/map/import/spacing.hpp"
 #include "pointflight/render/internal/beam_renderer.hpp"
 #include "pointflight/render/internal/paper_renderer.hpp"
 #include "tests/support.hpp"

@@ -15,7 +15,7 @@
 #include "pointflight/fidelity/exact_scene.hpp"
 #include "pointflight/geometry/shape_scene.hpp"
 #include "pointflight/lidar/beam_pattern.hpp"
-#include "pointflight/map/build/map_builder.hpp"
+#include "pointflight/map/import/map_builder.hpp"
 #include "pointflight/render/internal/beam_renderer.hpp"
 #include "tests/support.hpp"
 

@@ -8,7 +8,7 @@
 #include <map>
 #include <set>
 
-#include "pointflight/map/build/map_builder.hpp"
+#include "pointflight/map/import/map_builder.hpp"
 #include "pointflight/map/map_file.hpp"
 #include "pointflight/ros/common/ros_link.hpp"
 #include "pointflight/run/run_loop.hpp"

@@ -200,7 +200,7 @@ EditedMap crop_map(const SurfelMap& map,
   });
   SurfelGathering gathering(map.origin_world(), map.resolution(), count, options);
   std::size_t at = 0;
-  std::vector<Vector3d> gone;  // if space is not known any more
+  std::vector<Vector3d> gone;  // where space is not known any more
   for_each_surfel(map.words(), [&](const LeafHeader& leaf, std::size_t word) {
     if (!kept[at++]) {
       if (map.known_space() != nullptr) gone.push_back(map.center_world(leaf, map.words()[word]));

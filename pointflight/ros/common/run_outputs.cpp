@@ -266,7 +266,7 @@ std::vector<OutputType> trailing_outputs() {
        .make = per_sample<obstacle_markers>(),
        .per = Per::kRun},
       {.name = "collisions",
-       .help = "where vehicles met something",
+       .help = "where vehicles hit something",
        .make = made_by<CollisionMarkers, msg::MarkerArray>(),
        .per = Per::kRun,
        .from_each = true},

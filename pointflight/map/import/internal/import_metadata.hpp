@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "pointflight/map/build/map_builder.hpp"
+#include "pointflight/map/import/map_builder.hpp"
 
 namespace pointflight {
 

@@ -1,4 +1,4 @@
-#include "pointflight/map/build/internal/sparse_blocks.hpp"
+#include "pointflight/map/import/internal/sparse_blocks.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "pointflight/io/cloud_reader.hpp"
-#include "pointflight/map/build/internal/cell_tiles.hpp"
+#include "pointflight/map/import/internal/cell_tiles.hpp"
 
 namespace pointflight {
 

@@ -1,4 +1,4 @@
-#include "pointflight/map/build/internal/chosen_surfels.hpp"
+#include "pointflight/map/import/internal/chosen_surfels.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "pointflight/map/build/map_builder.hpp"
+#include "pointflight/map/import/map_builder.hpp"
 
 namespace pointflight {
 

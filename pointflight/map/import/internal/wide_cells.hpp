@@ -2,8 +2,8 @@
 
 #include <vector>
 
-#include "pointflight/map/build/internal/sparse_blocks.hpp"
-#include "pointflight/map/build/internal/surfel_piece.hpp"
+#include "pointflight/map/import/internal/sparse_blocks.hpp"
+#include "pointflight/map/import/internal/surfel_piece.hpp"
 
 namespace pointflight {
 

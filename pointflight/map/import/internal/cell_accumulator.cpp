@@ -1,4 +1,4 @@
-#include "pointflight/map/build/internal/cell_accumulator.hpp"
+#include "pointflight/map/import/internal/cell_accumulator.hpp"
 
 #include <algorithm>
 #include <numeric>

@@ -1,4 +1,4 @@
-#include "pointflight/map/build/internal/noise_projection.hpp"
+#include "pointflight/map/import/internal/noise_projection.hpp"
 
 #include <algorithm>
 #include <cmath>

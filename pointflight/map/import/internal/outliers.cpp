@@ -1,4 +1,4 @@
-#include "pointflight/map/build/internal/outliers.hpp"
+#include "pointflight/map/import/internal/outliers.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -9,7 +9,7 @@ namespace {
 
 constexpr double kStandsOut = 2.0;  // times the mean distance of the neighbours
 constexpr double kFarInCells = 10.0;
-constexpr std::int32_t kHalo = 4;       // if nearly all cells have their neighbours
+constexpr std::int32_t kHalo = 4;       // within which nearly all cells have their neighbours
 constexpr std::int32_t kWideHalo = 16;  // beyond kFarInCells it no longer matters how far
 
 /// Centroids of the cells of a view, metres from its first cell's corner.

@@ -4,8 +4,8 @@
 #include <span>
 #include <vector>
 
-#include "pointflight/map/build/internal/cell_accumulator.hpp"
-#include "pointflight/map/build/internal/surfel_piece.hpp"
+#include "pointflight/map/import/internal/cell_accumulator.hpp"
+#include "pointflight/map/import/internal/surfel_piece.hpp"
 
 namespace pointflight {
 

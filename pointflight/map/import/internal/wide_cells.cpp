@@ -1,10 +1,10 @@
-#include "pointflight/map/build/internal/wide_cells.hpp"
+#include "pointflight/map/import/internal/wide_cells.hpp"
 
 #include <algorithm>
 #include <numeric>
 #include <optional>
 
-#include "pointflight/map/build/internal/surfel_fit.hpp"
+#include "pointflight/map/import/internal/surfel_fit.hpp"
 
 namespace pointflight {
 namespace {

@@ -6,8 +6,8 @@
 
 #include "pointflight/io/cloud_reader.hpp"
 #include "pointflight/io/cloud_writer.hpp"
-#include "pointflight/map/build/internal/cell_accumulator.hpp"
-#include "pointflight/map/build/map_builder.hpp"
+#include "pointflight/map/import/internal/cell_accumulator.hpp"
+#include "pointflight/map/import/map_builder.hpp"
 #include "pointflight/map/surfel_map.hpp"
 
 namespace pointflight {

@@ -10,10 +10,10 @@
 #include "pointflight/core/parallel.hpp"
 #include "pointflight/core/progress.hpp"
 #include "pointflight/io/cloud_reader.hpp"
-#include "pointflight/map/build/internal/cell_accumulator.hpp"
-#include "pointflight/map/build/internal/noise_projection.hpp"
-#include "pointflight/map/build/internal/outliers.hpp"
 #include "pointflight/map/floor_plane.hpp"
+#include "pointflight/map/import/internal/cell_accumulator.hpp"
+#include "pointflight/map/import/internal/noise_projection.hpp"
+#include "pointflight/map/import/internal/outliers.hpp"
 #include "pointflight/map/map_file.hpp"
 
 namespace pointflight {

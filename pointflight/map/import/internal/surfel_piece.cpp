@@ -1,4 +1,4 @@
-#include "pointflight/map/build/internal/surfel_piece.hpp"
+#include "pointflight/map/import/internal/surfel_piece.hpp"
 
 #include <algorithm>
 #include <cmath>

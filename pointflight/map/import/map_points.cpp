@@ -1,4 +1,4 @@
-#include "pointflight/map/build/map_points.hpp"
+#include "pointflight/map/import/map_points.hpp"
 
 #include <cmath>
 #include <optional>

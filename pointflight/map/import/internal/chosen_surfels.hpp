@@ -3,8 +3,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "pointflight/map/build/internal/cell_tiles.hpp"
-#include "pointflight/map/build/internal/surfel_piece.hpp"
+#include "pointflight/map/import/internal/cell_tiles.hpp"
+#include "pointflight/map/import/internal/surfel_piece.hpp"
 
 namespace pointflight {
 

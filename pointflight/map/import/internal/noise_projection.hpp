@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "pointflight/map/build/internal/cell_tiles.hpp"
+#include "pointflight/map/import/internal/cell_tiles.hpp"
 
 namespace pointflight {
 

@@ -1,4 +1,4 @@
-#include "pointflight/map/build/spacing.hpp"
+#include "pointflight/map/import/spacing.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,7 +1,7 @@
 #pragma once
 
-#include "pointflight/map/build/internal/cell_tiles.hpp"
 #include "pointflight/map/bvh8.hpp"
+#include "pointflight/map/import/internal/cell_tiles.hpp"
 
 namespace pointflight {
 

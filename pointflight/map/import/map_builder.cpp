@@ -1,4 +1,4 @@
-#include "pointflight/map/build/map_builder.hpp"
+#include "pointflight/map/import/map_builder.hpp"
 
 #include <fmt/format.h>
 
@@ -10,15 +10,15 @@
 #include "pointflight/core/argument.hpp"
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/io/internal/read_ahead.hpp"
-#include "pointflight/map/build/import_check.hpp"
-#include "pointflight/map/build/internal/chosen_surfels.hpp"
-#include "pointflight/map/build/internal/import_metadata.hpp"
-#include "pointflight/map/build/internal/noise_projection.hpp"
-#include "pointflight/map/build/internal/small_cells.hpp"
-#include "pointflight/map/build/internal/sparse_growth.hpp"
-#include "pointflight/map/build/internal/surfel_fit.hpp"
-#include "pointflight/map/build/internal/wide_cells.hpp"
-#include "pointflight/map/build/spacing.hpp"
+#include "pointflight/map/import/import_check.hpp"
+#include "pointflight/map/import/internal/chosen_surfels.hpp"
+#include "pointflight/map/import/internal/import_metadata.hpp"
+#include "pointflight/map/import/internal/noise_projection.hpp"
+#include "pointflight/map/import/internal/small_cells.hpp"
+#include "pointflight/map/import/internal/sparse_growth.hpp"
+#include "pointflight/map/import/internal/surfel_fit.hpp"
+#include "pointflight/map/import/internal/wide_cells.hpp"
+#include "pointflight/map/import/spacing.hpp"
 
 namespace pointflight {
 namespace {

@@ -5,8 +5,8 @@
 #include <map>
 #include <optional>
 
-#include "pointflight/map/build/internal/cell_tiles.hpp"
 #include "pointflight/map/bvh8.hpp"
+#include "pointflight/map/import/internal/cell_tiles.hpp"
 
 namespace pointflight {
 

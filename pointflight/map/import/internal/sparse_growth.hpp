@@ -3,9 +3,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "pointflight/map/build/internal/cell_tiles.hpp"
-#include "pointflight/map/build/internal/sparse_blocks.hpp"
 #include "pointflight/map/bvh8.hpp"
+#include "pointflight/map/import/internal/cell_tiles.hpp"
+#include "pointflight/map/import/internal/sparse_blocks.hpp"
 
 namespace pointflight {
 

@@ -1,4 +1,4 @@
-#include "pointflight/map/build/internal/surfel_fit.hpp"
+#include "pointflight/map/import/internal/surfel_fit.hpp"
 
 #include <algorithm>
 #include <bit>

@@ -1,7 +1,7 @@
-#include "pointflight/map/build/internal/small_cells.hpp"
+#include "pointflight/map/import/internal/small_cells.hpp"
 
 #include "pointflight/core/hash.hpp"
-#include "pointflight/map/build/internal/surfel_fit.hpp"
+#include "pointflight/map/import/internal/surfel_fit.hpp"
 
 namespace pointflight {
 namespace {

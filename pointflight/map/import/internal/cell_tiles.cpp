@@ -1,4 +1,4 @@
-#include "pointflight/map/build/internal/cell_tiles.hpp"
+#include "pointflight/map/import/internal/cell_tiles.hpp"
 
 #include <algorithm>
 #include <numeric>

@@ -1,11 +1,11 @@
-#include "pointflight/map/build/internal/sparse_growth.hpp"
+#include "pointflight/map/import/internal/sparse_growth.hpp"
 
 #include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <optional>
 
-#include "pointflight/map/build/internal/surfel_fit.hpp"
+#include "pointflight/map/import/internal/surfel_fit.hpp"
 #include "pointflight/map/internal/covariance_axes.hpp"
 
 namespace pointflight {

@@ -1,4 +1,4 @@
-#include "pointflight/map/build/internal/import_metadata.hpp"
+#include "pointflight/map/import/internal/import_metadata.hpp"
 
 #include <nlohmann/json.hpp>
 
