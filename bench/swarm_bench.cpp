@@ -52,7 +52,7 @@ Scenario scenario_for(const Flags& flags, const SurfelMap& map, int vehicles) {
   s.vehicles.erase(s.vehicles.begin());
   ObstacleSettings balls;
   balls.count = flags.obstacles;
-  balls.radius = 0.2;
+  balls.size.radius = 0.2;
   balls.radius_max = 0.6;
   balls.speed_max = 2.0;
   if (flags.obstacles > 0) s.obstacles = {balls};

@@ -12,7 +12,7 @@ using namespace pointflight;
 int main() try {
   ShapeScene room;
   room.add_box({0, 0, 0}, {8, 6, 3});
-  room.shapes.emplace_back(Sphere{{5, 3, 1}, 0.5});
+  room.shapes.emplace_back(SceneSphere{{5, 3, 1}, 0.5});
   std::vector<CloudPoint> points;
   room.sample(2000.0, 0.003, 1, [&](const Vector3d& p) { points.push_back({p, 0.0f}); });
   write_cloud_pcd(OutputFile("room.pcd"), points, false);

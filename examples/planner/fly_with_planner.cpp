@@ -108,7 +108,7 @@ Scenario scenario_for(const Options& options, const SurfelMap& map, int seed, Ve
   drone.lidars = {up, down};
   ObstacleSettings balls;
   balls.count = options.obstacles;
-  balls.radius = 0.25;
+  balls.size.radius = 0.25;
   balls.radius_max = 0.5;
   balls.speed = 0.3;
   balls.speed_max = 1.0;

@@ -27,8 +27,8 @@ struct PointTree {
   [[nodiscard]] double kdtree_get_pt(std::size_t i, std::size_t axis) const {
     return static_cast<double>(points[i][static_cast<int>(axis)]);
   }
-  template <class Box>
-  bool kdtree_get_bbox(Box& /*box*/) const {
+  template <class Bounds>
+  bool kdtree_get_bbox(Bounds& /*box*/) const {
     return false;
   }
   using Index = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, PointTree>,

@@ -5,34 +5,13 @@
 #include <cmath>
 #include <limits>
 
-#include "pointflight/geometry/solid.hpp"
+#include "pointflight/geometry/internal/solid_core.hpp"
 
 namespace pointflight {
 namespace {
 
-/// All solids are symmetric about their centres, so one extent serves both directions.
-struct Core {
-  Vector3d half = Vector3d::Zero();  ///< Of a cuboid; zero sides make segments and points.
-  double tube = 0.0;                 ///< Radius of a cylinder along z with half height half.z().
-  double radius = 0.0;               ///< Around the core.
-};
-
-Core core_of(const Solid& solid) {
-  struct Visitor {
-    Core operator()(const Ball& s) const { return {Vector3d::Zero(), 0.0, s.radius}; }
-    Core operator()(const Cuboid& s) const { return {s.half, 0.0, 0.0}; }
-    Core operator()(const Cylinder& s) const {
-      return {Vector3d(0, 0, s.half_height), s.radius, 0.0};
-    }
-    Core operator()(const Capsule& s) const {
-      return {Vector3d(0, 0, s.half_length), 0.0, s.radius};
-    }
-  };
-  return std::visit(Visitor{}, solid);
-}
-
 /// The core's farthest point along a direction.
-Vector3d support(const Core& core, const Vector3d& d) {
+Vector3d support(const SolidCore& core, const Vector3d& d) {
   Vector3d p(std::copysign(core.half.x(), d.x()),
              std::copysign(core.half.y(), d.y()),
              std::copysign(core.half.z(), d.z()));
@@ -45,12 +24,12 @@ Vector3d support(const Core& core, const Vector3d& d) {
 }
 
 /// How far the core reaches from its centre along a unit direction.
-double extent(const Core& core, const Vector3d& n) {
+double extent(const SolidCore& core, const Vector3d& n) {
   return core.half.dot(n.cwiseAbs()) + core.tube * std::hypot(n.x(), n.y());
 }
 
 /// The core's point nearest to a point.
-Vector3d nearest_point(const Core& core, const Vector3d& p) {
+Vector3d nearest_point(const SolidCore& core, const Vector3d& p) {
   Vector3d q = p.cwiseMin(core.half).cwiseMax(-core.half);
   if (core.tube > 0.0) {
     const double across = std::hypot(p.x(), p.y());
@@ -170,7 +149,7 @@ Simplex reduced(const Simplex& s) {
 struct NearestPair {
   Vector3d a, b;
 };
-std::optional<NearestPair> nearest_pair(const Core& a, const Core& b, const Pose& T_a_b) {
+std::optional<NearestPair> nearest_pair(const SolidCore& a, const SolidCore& b, const Pose& T_a_b) {
   constexpr int kIterations = 128;
   constexpr double kTouching = 1e-12;  // m
   constexpr double kRelative = 1e-13;
@@ -208,7 +187,7 @@ struct Overlap {
   double depth = std::numeric_limits<double>::infinity();
   Vector3d direction = Vector3d::UnitZ();  ///< From a towards b, the frame of a.
 };
-Overlap overlap(const Core& a, const Core& b, const Pose& T_a_b) {
+Overlap overlap(const SolidCore& a, const SolidCore& b, const Pose& T_a_b) {
   Overlap least;
   const Matrix3d turn = T_a_b.rotation.toRotationMatrix();
   const Vector3d& offset = T_a_b.translation;
@@ -233,7 +212,10 @@ Overlap overlap(const Core& a, const Core& b, const Pose& T_a_b) {
 }
 
 /// Of a ball around the origin of `center`'s frame to a core.
-Separation ball_to_core(const Vector3d& center, double radius, const Core& core, const Solid& b) {
+Separation ball_to_core(const Vector3d& center,
+                        double radius,
+                        const SolidCore& core,
+                        const Solid& b) {
   const double distance = signed_distance(b, center) - radius;
   const Vector3d on_core = nearest_point(core, center);
   const Vector3d way = center - on_core;
@@ -249,16 +231,16 @@ Separation separation(const Solid& a,
                       const Pose& T_world_a,
                       const Solid& b,
                       const Pose& T_world_b) {
-  const Core core_a = core_of(a);
-  const Core core_b = core_of(b);
-  if (std::holds_alternative<Ball>(a)) {
+  const SolidCore core_a = core_of(a);
+  const SolidCore core_b = core_of(b);
+  if (std::holds_alternative<Sphere>(a)) {
     const Vector3d center = T_world_b.inverse() * T_world_a.translation;
     Separation s = ball_to_core(center, core_a.radius, core_b, b);
     s.place = T_world_b * s.place;
     return s;
   }
   const Pose T_a_b = T_world_a.inverse() * T_world_b;
-  if (std::holds_alternative<Ball>(b)) {
+  if (std::holds_alternative<Sphere>(b)) {
     // the point of the ball that is nearest to (or deepest in) the other
     const Vector3d& center = T_a_b.translation;
     const double distance = signed_distance(a, center) - core_b.radius;

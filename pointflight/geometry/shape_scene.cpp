@@ -57,7 +57,10 @@ std::optional<double> first_root(double a, double b, double c, double t_min, con
   return std::nullopt;
 }
 
-std::optional<double> hit(const Sphere& s, const Vector3d& o, const Vector3d& d, double t_min) {
+std::optional<double> hit(const SceneSphere& s,
+                          const Vector3d& o,
+                          const Vector3d& d,
+                          double t_min) {
   const Vector3d m = o - s.center;
   const auto anywhere = [](double) { return true; };
   return first_root(1.0, m.dot(d), m.squaredNorm() - s.radius * s.radius, t_min, anywhere);
@@ -92,7 +95,7 @@ double area_of(const Triangle& t) {
 double area_of(const Disc& d) {
   return kPi * d.radius * d.radius;
 }
-double area_of(const Sphere& s) {
+double area_of(const SceneSphere& s) {
   return 4.0 * kPi * s.radius * s.radius;
 }
 double area_of(const Cone& c) {
@@ -109,7 +112,7 @@ Vector3d point_of(const Disc& disc, double u, double v) {
   const auto angle = math::sincos(2.0 * kPi * v);
   return disc.center + disc.radius * std::sqrt(u) * (angle.cos * e1 + angle.sin * e2);
 }
-Vector3d point_of(const Sphere& s, double u, double v) {
+Vector3d point_of(const SceneSphere& s, double u, double v) {
   const double z = 1.0 - 2.0 * u;
   const double ring = std::sqrt(std::max(0.0, 1.0 - z * z));
   const auto angle = math::sincos(2.0 * kPi * v);
@@ -135,7 +138,7 @@ Vector3d normal_of(const Triangle& t, const Vector3d& /*p*/) {
 Vector3d normal_of(const Disc& d, const Vector3d& /*p*/) {
   return d.normal;
 }
-Vector3d normal_of(const Sphere& s, const Vector3d& p) {
+Vector3d normal_of(const SceneSphere& s, const Vector3d& p) {
   return (p - s.center).normalized();
 }
 Vector3d normal_of(const Cone& c, const Vector3d& p) {
@@ -163,7 +166,7 @@ Aabb bounds_of(const Triangle& t) {
 Aabb bounds_of(const Disc& d) {
   return box_around(d.center, d.normal, d.radius);
 }
-Aabb bounds_of(const Sphere& s) {
+Aabb bounds_of(const SceneSphere& s) {
   Aabb box;
   box.add(s.center - Vector3d::Constant(s.radius));
   box.add(s.center + Vector3d::Constant(s.radius));

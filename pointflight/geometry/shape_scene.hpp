@@ -30,13 +30,13 @@ struct Disc {
   double radius;    ///< m
 };
 /// The surface of a ball; rays that start inside hit it too.
-struct Sphere {
+struct SceneSphere {
   Vector3d center;  ///< m
   double radius;    ///< m
 };
 
 /// Shapes with exact ranges: what tests and generated maps are made of.
-using Shape = std::variant<Triangle, Cone, Disc, Sphere>;
+using Shape = std::variant<Triangle, Cone, Disc, SceneSphere>;
 
 /// Distance along the unit `direction` to the first intersection with the shape beyond `t_min`, if
 /// any.

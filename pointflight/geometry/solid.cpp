@@ -5,6 +5,7 @@
 
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/math.hpp"
+#include "pointflight/geometry/internal/solid_core.hpp"
 
 namespace pointflight {
 namespace {
@@ -70,13 +71,13 @@ void cut_tube(Inside& inside, double radius, const Vector3d& o, const Vector3d& 
   inside.cut((*t)[0], (*t)[1], Vector3d(at.x(), at.y(), 0.0) / radius);
 }
 
-std::optional<SolidHit> hit(const Ball& s, const Vector3d& o, const Vector3d& d) {
+std::optional<SolidHit> hit(const Sphere& s, const Vector3d& o, const Vector3d& d) {
   const auto t = roots(1.0, o.dot(d), o.squaredNorm() - s.radius * s.radius);
   if (!t || (*t)[0] < 0.0) return std::nullopt;
   return SolidHit{(*t)[0], (o + (*t)[0] * d) / s.radius};
 }
 
-std::optional<SolidHit> hit(const Cuboid& s, const Vector3d& o, const Vector3d& d) {
+std::optional<SolidHit> hit(const Box& s, const Vector3d& o, const Vector3d& d) {
   Inside inside;
   for (int axis = 0; axis < 3; ++axis) cut_slab(inside, axis, s.half[axis], o, d);
   return inside.first();
@@ -94,7 +95,7 @@ std::optional<SolidHit> hit(const Capsule& s, const Vector3d& o, const Vector3d&
   const Vector3d up(0, 0, s.half_length);
   auto best = hit(Cylinder{s.radius, s.half_length}, o, d);
   for (const Vector3d& center : {up, Vector3d(-up)}) {
-    const auto cap = hit(Ball{s.radius}, o - center, d);
+    const auto cap = hit(Sphere{s.radius}, o - center, d);
     if (cap && (!best || cap->range < best->range)) best = cap;
   }
   return best;
@@ -104,10 +105,10 @@ Vector3d on_segment(double half_length, const Vector3d& p) {
   return {0.0, 0.0, std::clamp(p.z(), -half_length, half_length)};
 }
 
-double distance_to(const Ball& s, const Vector3d& p) {
+double distance_to(const Sphere& s, const Vector3d& p) {
   return p.norm() - s.radius;
 }
-double distance_to(const Cuboid& s, const Vector3d& p) {
+double distance_to(const Box& s, const Vector3d& p) {
   const Vector3d q = p.cwiseAbs() - s.half;
   return q.cwiseMax(0.0).norm() + std::min(0.0, q.maxCoeff());
 }
@@ -121,10 +122,10 @@ double distance_to(const Capsule& s, const Vector3d& p) {
   return (p - on_segment(s.half_length, p)).norm() - s.radius;
 }
 
-Vector3d extent_of(const Ball& s) {
+Vector3d extent_of(const Sphere& s) {
   return Vector3d::Constant(s.radius);
 }
-Vector3d extent_of(const Cuboid& s) {
+Vector3d extent_of(const Box& s) {
   return s.half;
 }
 Vector3d extent_of(const Cylinder& s) {
@@ -134,10 +135,10 @@ Vector3d extent_of(const Capsule& s) {
   return {s.radius, s.radius, s.half_length + s.radius};
 }
 
-double reach_of(const Ball& s) {
+double reach_of(const Sphere& s) {
   return s.radius;
 }
-double reach_of(const Cuboid& s) {
+double reach_of(const Box& s) {
   return s.half.norm();
 }
 double reach_of(const Cylinder& s) {
@@ -147,10 +148,10 @@ double reach_of(const Capsule& s) {
   return s.radius + s.half_length;
 }
 
-double area_of(const Ball& s) {
+double area_of(const Sphere& s) {
   return 4.0 * kPi * s.radius * s.radius;
 }
-double area_of(const Cuboid& s) {
+double area_of(const Box& s) {
   return 8.0 * (s.half.x() * s.half.y() + s.half.y() * s.half.z() + s.half.z() * s.half.x());
 }
 double area_of(const Cylinder& s) {
@@ -160,18 +161,31 @@ double area_of(const Capsule& s) {
   return 4.0 * kPi * s.radius * (s.radius + s.half_length);
 }
 
-/// Unit circle at a share of the turn.
+SolidCore core(const Sphere& s) {
+  return {Vector3d::Zero(), 0.0, s.radius};
+}
+SolidCore core(const Box& s) {
+  return {s.half, 0.0, 0.0};
+}
+SolidCore core(const Cylinder& s) {
+  return {Vector3d(0, 0, s.half_height), s.radius, 0.0};
+}
+SolidCore core(const Capsule& s) {
+  return {Vector3d(0, 0, s.half_length), 0.0, s.radius};
+}
+
+/// Unit circle at a fraction of the turn.
 Vector3d around(double turn) {
   const auto angle = math::sincos(2.0 * kPi * turn);
   return {angle.cos, angle.sin, 0.0};
 }
 
-Vector3d point_of(const Ball& s, double u, double v) {
+Vector3d point_of(const Sphere& s, double u, double v) {
   const double z = 2.0 * u - 1.0;  // Archimedes: zones of equal height are equal
   return s.radius * (std::sqrt(std::max(0.0, 1.0 - z * z)) * around(v) + Vector3d(0.0, 0.0, z));
 }
 
-Vector3d point_of(const Cuboid& s, double u, double v) {
+Vector3d point_of(const Box& s, double u, double v) {
   // the pairs of faces across x, y, z in turn; u is used up to choose one
   const Vector3d& h = s.half;
   const Vector3d areas(h.y() * h.z(), h.z() * h.x(), h.x() * h.y());
@@ -218,6 +232,18 @@ std::optional<SolidHit> intersect(const Solid& solid,
                                   const Vector3d& direction) {
   if (signed_distance(solid, origin) < 0.0) return std::nullopt;
   return std::visit([&](const auto& s) { return hit(s, origin, direction); }, solid);
+}
+
+const char* name_of(const Solid& solid) {
+  return std::visit([](const auto& s) { return s.kName; }, solid);
+}
+
+PlainShape plain_shape_of(const Solid& solid) {
+  return std::visit([](const auto& s) { return s.kPlainShape; }, solid);
+}
+
+SolidCore core_of(const Solid& solid) {
+  return std::visit([](const auto& s) { return core(s); }, solid);
 }
 
 double bounding_radius(const Solid& solid) {

@@ -8,26 +8,37 @@
 
 namespace pointflight {
 
+/// What a solid is drawn as by viewers that know these three alone.
+enum class PlainShape { kSphere, kBox, kCylinder };
+
 /// Around the origin of its own frame, as all solids here.
-struct Ball {
-  double radius = 0.0;  ///< m
+struct Sphere {
+  static constexpr const char* kName = "sphere";                  ///< For viewers.
+  static constexpr PlainShape kPlainShape = PlainShape::kSphere;  ///< Exactly.
+  double radius = 0.0;                                            ///< m
 };
 /// A box along its own axes.
-struct Cuboid {
-  Vector3d half = Vector3d::Zero();  ///< Half sides, m.
+struct Box {
+  static constexpr const char* kName = "box";                  ///< For viewers.
+  static constexpr PlainShape kPlainShape = PlainShape::kBox;  ///< Exactly.
+  Vector3d half = Vector3d::Zero();                            ///< Half sides, m.
 };
 /// Upright, with flat ends.
 struct Cylinder {
-  double radius = 0.0;       ///< m
-  double half_height = 0.0;  ///< Along z, m.
+  static constexpr const char* kName = "cylinder";                  ///< For viewers.
+  static constexpr PlainShape kPlainShape = PlainShape::kCylinder;  ///< Exactly.
+  double radius = 0.0;                                              ///< m
+  double half_height = 0.0;                                         ///< Along z, m.
 };
 /// All points within `radius` of a segment along z.
 struct Capsule {
-  double radius = 0.0;       ///< m
+  static constexpr const char* kName = "capsule";                   ///< For viewers.
+  static constexpr PlainShape kPlainShape = PlainShape::kCylinder;  ///< The one around it.
+  double radius = 0.0;                                              ///< m
   double half_length = 0.0;  ///< Of the segment, without the caps, m.
 };
 /// Convex solids around the origin of their own frame: hulls of vehicles and obstacles.
-using Solid = std::variant<Ball, Cuboid, Cylinder, Capsule>;
+using Solid = std::variant<Sphere, Box, Cylinder, Capsule>;
 
 /// Where a ray enters a solid.
 struct SolidHit {
@@ -40,6 +51,12 @@ struct SolidHit {
 std::optional<SolidHit> intersect(const Solid& solid,
                                   const Vector3d& origin,
                                   const Vector3d& direction);
+
+/// The name and outline of a solid's kind.
+///@{
+const char* name_of(const Solid& solid);
+PlainShape plain_shape_of(const Solid& solid);
+///@}
 
 /// The farthest point of the solid from its origin, m.
 double bounding_radius(const Solid& solid);

@@ -40,7 +40,7 @@ class TreeBuilder {
   struct TopNode {
     std::vector<TopChild> children;
     std::size_t slot = 0;  ///< Of the node in the tree.
-    Box box;
+    NodeBox box;
   };
   struct PartInTree {
     TreePart part;
@@ -119,7 +119,7 @@ class TreeBuilder {
   }
 
   void finish(TopNode& top, Bvh8& tree) {
-    std::array<Box, 8> boxes;
+    std::array<NodeBox, 8> boxes;
     Bvh8Node node{};
     for (std::size_t i = 0; i < top.children.size(); ++i) {
       const TopChild& child = top.children[i];

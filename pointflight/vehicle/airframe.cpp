@@ -13,8 +13,6 @@
 namespace pointflight {
 namespace {
 
-constexpr Named<HullShape> kShapes[] = {
-    {HullShape::kSphere, "sphere"}, {HullShape::kBox, "box"}, {HullShape::kCapsule, "capsule"}};
 constexpr Named<CommandLevel> kLevels[] = {{CommandLevel::kRotorSpeeds, "rotor_speeds"},
                                            {CommandLevel::kBodyRates, "body_rates"},
                                            {CommandLevel::kAttitude, "attitude"},
@@ -197,9 +195,9 @@ VehicleSettings read(SettingsReader& reader, const std::string& path) {
   if (settings.rotors.size() < 4) {
     fail("rotors", fmt::format("{} rotors; at least 4 are needed", settings.rotors.size()));
   }
-  if (settings.shape == HullShape::kCapsule && settings.height < 2.0 * settings.radius) {
-    fail("height", "less than twice the radius: that is a sphere");
-  }
+  const SolidSize& hull = settings.hull_size;
+  const char* fault = fault_of_height(*settings.shape, hull.height, hull.radius);
+  if (fault != nullptr) fail("height", fault);
   if (settings.controller.tilt_max_deg > settings.controller.kind->tilt_max_deg) {
     fail("controller.tilt_max_deg", "above 85; only the geometric controller flies so");
   }
@@ -239,16 +237,8 @@ void describe(SettingsVisitor& v, VehicleSettings& s) {
   v.value(required({"mass", "kg", "with everything on board", 1e-3, 1e4}), s.mass);
   v.value(required({"inertia_diagonal", "kg m^2", "about the body axes", 1e-9, 1e4}),
           s.inertia_diagonal);
-  v.choice({"shape", "", "of the hull, which must stay free"}, s.shape, kShapes);
-  v.only_if(s.shape != HullShape::kBox, "shape: sphere or capsule", [&](SettingsVisitor& w) {
-    w.value({"radius", "m", "of the sphere or capsule", 0.001, 100}, s.radius);
-  });
-  v.only_if(s.shape == HullShape::kBox, "shape: box", [&](SettingsVisitor& w) {
-    w.value({"size", "m", "of the box", 0.001, 100}, s.size);
-  });
-  v.only_if(s.shape == HullShape::kCapsule, "shape: capsule", [&](SettingsVisitor& w) {
-    w.value({"height", "m", "along z, caps included", 0.001, 100}, s.height);
-  });
+  v.choice({"shape", "", "of the hull, which must stay free"}, s.shape);
+  describe_solid(v, &*s.shape, s.hull_size, 100.0);
   v.value({"intensity", "", "of LiDAR returns from it", 0, 1e6}, s.intensity);
   v.value({"drag_area", "m^2", "c_d A along each body axis", 0, 100}, s.drag_area);
   v.section(required({"rotor", "", "all rotors are alike"}),
@@ -288,9 +278,7 @@ std::string vehicle_reference() {
 }
 
 Solid VehicleSettings::hull() const {
-  if (shape == HullShape::kBox) return Cuboid{0.5 * size};
-  if (shape == HullShape::kCapsule) return Capsule{radius, 0.5 * height - radius};
-  return Ball{radius};
+  return shape->make(hull_size);
 }
 
 double RotorModel::thrust_share(double climb, double speed) const {

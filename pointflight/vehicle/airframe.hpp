@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "pointflight/core/settings.hpp"
-#include "pointflight/geometry/solid.hpp"
+#include "pointflight/geometry/solid_kind.hpp"
 #include "pointflight/geometry/types.hpp"
 #include "pointflight/vehicle/controller_kind.hpp"
 #include "pointflight/vehicle/imu_errors.hpp"
@@ -108,13 +108,6 @@ struct BatterySettings {
   double reserve = 0.1;     ///< Share of the capacity that is left when it counts as low.
 };
 
-/// What must stay free around a vehicle.
-enum class HullShape {
-  kSphere,   ///< `radius`
-  kBox,      ///< `size`
-  kCapsule,  ///< `radius`, `height`, upright.
-};
-
 /// Setpoints from the innermost loop to the outermost: the order of `Setpoint`.
 enum class CommandLevel {
   kRotorSpeeds,   ///< rad/s
@@ -138,18 +131,16 @@ struct AirframeSettings {
 
 /// A vehicle file, `data/vehicles/<name>.yaml`.
 struct VehicleSettings {
-  std::string path;                              ///< Of the file, for messages.
-  std::string title;                             ///< Name for users.
-  std::string source;                            ///< Where the figures come from.
-  double mass = 1.0;                             ///< kg
-  Vector3d inertia_diagonal = Vector3d::Ones();  ///< kg m^2
-  HullShape shape = HullShape::kSphere;          ///< Of the hull.
-  double radius = 0.3;                           ///< Of a sphere or capsule, m.
-  Vector3d size = Vector3d(0.5, 0.5, 0.2);       ///< Of a box, m.
-  double height = 1.0;                           ///< Of a capsule, caps included, m.
-  double intensity = 100.0;                      ///< Of LiDAR returns from it.
-  Vector3d drag_area = Vector3d::Zero();         ///< c_d A along each body axis, m^2.
-  RotorModel rotor;                              ///< One for all rotors.
+  std::string path;                                   ///< Of the file, for messages.
+  std::string title;                                  ///< Name for users.
+  std::string source;                                 ///< Where the figures come from.
+  double mass = 1.0;                                  ///< kg
+  Vector3d inertia_diagonal = Vector3d::Ones();       ///< kg m^2
+  Choice<SolidKind> shape;                            ///< Of the hull, which must stay free.
+  SolidSize hull_size = {0.3, 1.0, {0.5, 0.5, 0.2}};  ///< Of the hull.
+  double intensity = 100.0;                           ///< Of LiDAR returns from it.
+  Vector3d drag_area = Vector3d::Zero();              ///< c_d A along each body axis, m^2.
+  RotorModel rotor;                                   ///< One for all rotors.
   /// Four or more; commands and states count them in this order.
   std::vector<RotorPlacement> rotors;
   /// The innermost command that its autopilot takes.

@@ -46,7 +46,7 @@ Assembly assembly_of(const VehicleSettings& settings) {
                             ? a.body_size
                             : Vector3d(length * Vector3d(kBodyWidth, kBodyWidth, kBodyHeight));
   if (body.minCoeff() > 0.0) {
-    assembly.parts.push_back({Cuboid{0.5 * body}, {Quaterniond::Identity(), a.body_center}});
+    assembly.parts.push_back({Box{0.5 * body}, {Quaterniond::Identity(), a.body_center}});
   }
   const double arm_radius = or_else(a.arm_radius, kArmRadius * length);
   for (std::size_t i = 0; i < settings.rotors.size(); ++i) {

@@ -27,21 +27,7 @@ json list_of(const Quaterniond& q) {
 }
 
 json shape_of(const Solid& solid) {
-  return std::visit(
-      Overloaded{
-          [](const Ball& s) {
-            return json{{"kind", "ball"}, {"radius", s.radius}};
-          },
-          [](const Cuboid& s) {
-            return json{{"kind", "box"}, {"half", list_of(s.half)}};
-          },
-          [](const Cylinder& s) {
-            return json{{"kind", "cylinder"}, {"radius", s.radius}, {"half_height", s.half_height}};
-          },
-          [](const Capsule& s) {
-            return json{{"kind", "capsule"}, {"radius", s.radius}, {"half_length", s.half_length}};
-          }},
-      solid);
+  return {{"kind", name_of(solid)}, {"half", list_of(half_extent(solid))}};
 }
 
 json parts_of(const VehicleDescription& vehicle) {
@@ -278,7 +264,8 @@ void ViewLink::publish_state(SimTime now, const char* doing) {
           {{"label", o.label},
            {"p", list_of(o.T_world_body.translation)},
            {"q", list_of(o.T_world_body.rotation)},
-           {"shape", shape_of(solid != nullptr ? *solid : Solid{Ball{bounding_radius(o.shape)}})}});
+           {"shape",
+            shape_of(solid != nullptr ? *solid : Solid{Sphere{bounding_radius(o.shape)}})}});
     }
   }
   server_->publish(state_,

@@ -26,7 +26,7 @@ std::optional<Contact> contact_with_map(const SurfelMap& map,
                                         const Solid& hull,
                                         const Pose& T_world_hull,
                                         double reach) {
-  if (const auto* ball = std::get_if<Ball>(&hull)) {
+  if (const auto* ball = std::get_if<Sphere>(&hull)) {
     const auto nearest = map.nearest(T_world_hull.translation, ball->radius + reach);
     if (!nearest) return std::nullopt;
     return Contact{nearest->distance - ball->radius, nearest->center_world, kMapLabel};
@@ -38,7 +38,7 @@ std::optional<Contact> contact_with_map(const SurfelMap& map,
     // cheap first: the hull's distance to the box' centre
     const double to_center = signed_distance(hull, T_hull_world * box.T_world_box.translation);
     if (to_center - box_radius(box) <= least) {
-      const Separation s = separation(hull, T_world_hull, Solid{Cuboid{box.half}}, box.T_world_box);
+      const Separation s = separation(hull, T_world_hull, Solid{Box{box.half}}, box.T_world_box);
       if (s.distance <= least) {
         least = s.distance;
         best = Contact{s.distance, s.place, kMapLabel};

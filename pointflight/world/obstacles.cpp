@@ -18,10 +18,6 @@
 namespace pointflight {
 namespace {
 
-constexpr Named<ObstacleShape> kShapes[] = {{ObstacleShape::kSphere, "sphere"},
-                                            {ObstacleShape::kBox, "box"},
-                                            {ObstacleShape::kCylinder, "cylinder"},
-                                            {ObstacleShape::kCloud, "cloud"}};
 constexpr Named<ObstacleMotion> kMotions[] = {{ObstacleMotion::kRandom, "random"},
                                               {ObstacleMotion::kStill, "still"},
                                               {ObstacleMotion::kLoop, "loop"},
@@ -59,12 +55,6 @@ std::shared_ptr<const SurfelMap> load_cloud(const std::string& path,
   return SurfelMap::from_bytes(map_bytes(map.tree, map.description), path);
 }
 
-BodyShape solid_of(const ObstacleSettings& s) {
-  if (s.shape == ObstacleShape::kBox) return Solid{Cuboid{0.5 * s.size}};
-  if (s.shape == ObstacleShape::kCylinder) return Solid{Cylinder{s.radius, 0.5 * s.height}};
-  return Solid{Ball{s.radius}};
-}
-
 Motion motion_of(const ObstacleSettings& s, const std::string& folder) {
   if (s.motion == ObstacleMotion::kLoop) return loop_through(s.waypoints, s.speed);
   if (s.motion == ObstacleMotion::kKeyframes)
@@ -77,10 +67,11 @@ void check(const ObstacleSettings& s, const std::function<std::string(const char
   const auto fail = [&](const char* key, const char* what) {
     throw InputError(fmt::format("{}: {}", place(key), what));
   };
-  if (s.shape == ObstacleShape::kCloud && s.file.empty())
-    fail("file", "shape 'cloud' needs a cloud or mesh");
-  if (s.shape != ObstacleShape::kCloud && !s.file.empty())
-    fail("file", "only shape 'cloud' has a file");
+  if (!s.shape && s.file.empty()) fail("file", "shape 'cloud' needs a cloud or mesh");
+  if (s.shape && !s.file.empty()) fail("file", "only shape 'cloud' has a file");
+  const double radius = std::max(s.size.radius, s.radius_max);
+  const char* fault = s.shape ? fault_of_height(**s.shape, s.size.height, radius) : nullptr;
+  if (fault != nullptr) fail("height", fault);
   if (s.motion == ObstacleMotion::kLoop && s.waypoints.empty())
     fail("waypoints", "motion 'loop' needs some");
   if (s.motion == ObstacleMotion::kLoop && s.speed <= 0.0)
@@ -94,30 +85,22 @@ void check(const ObstacleSettings& s, const std::function<std::string(const char
 }
 
 void describe_shape(SettingsVisitor& v, ObstacleSettings& s) {
-  const bool is_cloud = s.shape == ObstacleShape::kCloud;
-  v.only_if(
-      s.shape == ObstacleShape::kSphere || s.shape == ObstacleShape::kCylinder,
-      "shape: sphere, cylinder",
-      [&](SettingsVisitor& w) {
-        w.value({"radius", "m", "of the sphere or cylinder", 0.001, 1000}, s.radius);
-        w.only_if(s.motion == ObstacleMotion::kRandom, "motion: random", [&](SettingsVisitor& x) {
-          x.value({"radius_max", "m", "above radius: each is drawn between the two", 0, 1000},
-                  s.radius_max);
-        });
-      });
-  v.only_if(s.shape == ObstacleShape::kCylinder, "shape: cylinder", [&](SettingsVisitor& w) {
-    w.value({"height", "m", "of the cylinder", 0.001, 1000}, s.height);
-  });
-  v.only_if(s.shape == ObstacleShape::kBox, "shape: box", [&](SettingsVisitor& w) {
-    w.value({"size", "m", "of the box", 0.001, 1000}, s.size);
-  });
+  const bool is_cloud = !s.shape;
+  const SolidKind* kind = is_cloud ? nullptr : &**s.shape;
+  describe_solid(v, kind, s.size, 1000.0);
+  v.only_if(kind != nullptr && kind->has_radius && s.motion == ObstacleMotion::kRandom,
+            kinds_with(&SolidKind::has_radius) + "; motion: random",
+            [&](SettingsVisitor& w) {
+              w.value({"radius_max", "m", "above radius: each is drawn between the two", 0, 1000},
+                      s.radius_max);
+            });
   v.only_if(is_cloud, "shape: cloud", [&](SettingsVisitor& w) {
     w.value({"file", "", "cloud, mesh or .pfmap, around its own origin"}, s.file);
     w.only_if(!s.file.ends_with(".pfmap"), "a cloud or mesh as file", [&](SettingsVisitor& x) {
       x.value({"resolution", "m", "at which it is imported", 0.001, 10}, s.resolution);
     });
   });
-  v.only_if(!is_cloud, "shape: sphere, box, cylinder", [&](SettingsVisitor& w) {
+  v.only_if(!is_cloud, "not shape: cloud", [&](SettingsVisitor& w) {
     w.value({"intensity", "", "of returns from it", 0, 1e6}, s.intensity);
   });
 }
@@ -158,7 +141,7 @@ void describe_motion(SettingsVisitor& v, ObstacleSettings& s) {
 }  // namespace
 
 void describe(SettingsVisitor& v, ObstacleSettings& s) {
-  v.choice({"shape", "", "exact shapes, or the points of a cloud or mesh"}, s.shape, kShapes);
+  v.choice({"shape", "", "exact shapes, or the points of a cloud or mesh"}, s.shape, "cloud");
   v.choice({"motion", "", "how it moves: a function of seed and time"}, s.motion, kMotions);
   describe_shape(v, s);
   describe_motion(v, s);
@@ -174,7 +157,7 @@ Obstacles::Obstacles(const std::vector<ObstacleSettings>& settings,
     check_settings(s, fmt::format("obstacles[{}]", entry));
     check(s, place);
     std::shared_ptr<const SurfelMap> cloud;
-    if (s.shape == ObstacleShape::kCloud) {
+    if (!s.shape) {
       try {
         cloud = load_cloud(resolve_path(s.file, world.folder), s.resolution, executor);
       } catch (const InputError& error) {
@@ -197,7 +180,7 @@ Obstacles::Obstacles(const std::vector<ObstacleSettings>& settings,
       }
       Body body;
       body.label = kFirstObstacle + number;
-      body.shape = cloud ? BodyShape{cloud} : solid_of(s);
+      body.shape = cloud ? BodyShape{cloud} : BodyShape{(*s.shape)->make(s.size)};
       body.intensity = static_cast<float>(s.intensity);
       body.motion = motion_of(s, world.folder);
       obstacles_.push_back(std::make_unique<MovingObstacle>(std::move(body)));

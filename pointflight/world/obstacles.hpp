@@ -12,17 +12,10 @@
 #include "pointflight/core/parallel.hpp"
 #include "pointflight/core/settings.hpp"
 #include "pointflight/geometry/internal/ball_tree.hpp"
+#include "pointflight/geometry/solid_kind.hpp"
 #include "pointflight/map/body.hpp"
 
 namespace pointflight {
-
-/// What an obstacle looks like.
-enum class ObstacleShape {
-  kSphere,    ///< `radius`
-  kBox,       ///< `size`
-  kCylinder,  ///< `radius`, `height`, upright.
-  kCloud,     ///< Points of `file`.
-};
 
 /// How an obstacle moves.
 enum class ObstacleMotion {
@@ -47,11 +40,10 @@ enum class AtBorder {
 /// One entry of a scenario's `obstacles`: one or more bodies alike.
 struct ObstacleSettings {
   std::int64_t count = 1;  ///< So many alike; more than one only in random motion.
-  ObstacleShape shape = ObstacleShape::kSphere;  ///< What it looks like.
-  double radius = 0.3;                           ///< Of spheres and cylinders, m.
-  double radius_max = 0.0;                       ///< Above `radius`: drawn between the two.
-  double height = 1.7;                           ///< Of cylinders, m.
-  Vector3d size = Vector3d(0.5, 0.5, 0.5);       ///< Of boxes, m.
+  /// What it looks like; nothing: the points of `file`.
+  std::optional<Choice<SolidKind>> shape = Choice<SolidKind>();
+  SolidSize size = {0.3, 1.7, {0.5, 0.5, 0.5}};  ///< Of a solid.
+  double radius_max = 0.0;                       ///< Above the radius: drawn between the two.
   std::string file;          ///< Of a cloud, mesh or .pfmap, in the body's own frame.
   double resolution = 0.03;  ///< Of its import, m.
   double intensity = 100.0;  ///< Of the returns of exact shapes.

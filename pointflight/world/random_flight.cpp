@@ -89,15 +89,13 @@ RandomFlight::Life RandomFlight::life(std::uint64_t n, SimTime from, bool strict
   Life life;
   life.from = n == 0 ? SimTime::min() : from;
   const double radius =
-      drawn(settings_.radius, settings_.radius_max, random_.uniform(base + kSizeDraw));
+      drawn(settings_.size.radius, settings_.radius_max, random_.uniform(base + kSizeDraw));
   if (cloud_) {
     life.shape = cloud_;
-  } else if (settings_.shape == ObstacleShape::kBox) {
-    life.shape = Solid{Cuboid{0.5 * settings_.size}};
-  } else if (settings_.shape == ObstacleShape::kCylinder) {
-    life.shape = Solid{Cylinder{radius, 0.5 * settings_.height}};
   } else {
-    life.shape = Solid{Ball{radius}};
+    SolidSize size = settings_.size;
+    size.radius = radius;
+    life.shape = (*settings_.shape)->make(size);
   }
   life.start = free_place(n, bounding_radius(life.shape), strict);
 

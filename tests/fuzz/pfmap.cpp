@@ -38,7 +38,7 @@ class MemoryCloud : public CloudReader {
 std::vector<std::byte> good_map() {
   ShapeScene scene;
   scene.add_box({-2, -2, -1}, {2, 2, 1});
-  scene.shapes.emplace_back(Sphere{{1, 0, 0}, 0.3});
+  scene.shapes.emplace_back(SceneSphere{{1, 0, 0}, 0.3});
   std::vector<CloudPoint> points;
   scene.sample(400.0, 0.005, 1, [&](const Vector3d& p) {
     points.push_back({p, static_cast<float>(p.z())});
@@ -84,7 +84,7 @@ void ask_everything(const SurfelMap& map, const std::shared_ptr<const SurfelMap>
   make_renderer("beam", Scene{shared})->render(batch, hits, Executor(1));
   std::size_t surfels = map.reflectivity_per_intensity() > 0.0 ? 1 : 0;
   for (const Ray& ray : rays) surfels += map.nearest(ray.origin_world, 3.0) ? 1 : 0;
-  const Solid box = Cuboid{{0.3, 0.2, 0.1}};
+  const Solid box = Box{{0.3, 0.2, 0.1}};
   const Pose turned{Quaterniond(0.8, 0.1, 0.5, 0.3).normalized(), {0.2, 0.1, 0.3}};
   surfels += contact_with_map(map, box, turned, 2.0) ? 1 : 0;
   if (const KnownSpace* known = map.known_space()) {

@@ -25,8 +25,7 @@ Propeller seven_inch() {
 
 Assembly two_parts_and_a_propeller() {
   Assembly a;
-  a.parts.push_back(
-      {Cuboid{{0.1, 0.06, 0.04}}, {quaternion_from_rpy(0.2, 0.1, 0.4), {0, 0, -0.02}}});
+  a.parts.push_back({Box{{0.1, 0.06, 0.04}}, {quaternion_from_rpy(0.2, 0.1, 0.4), {0, 0, -0.02}}});
   a.parts.push_back({Capsule{0.01, 0.1}, {quaternion_from_rpy(kPi / 2, 0.0, 0.3), {0.1, 0.1, 0}}});
   a.propellers.push_back(seven_inch());
   return a;

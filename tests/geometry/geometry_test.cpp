@@ -80,7 +80,7 @@ TEST(Morton, EncodesAndDecodesAllBits) {
 TEST(Shapes, RangesByHand) {
   const Vector3d o = Vector3d::Zero();
   const Vector3d x = Vector3d::UnitX();
-  EXPECT_NEAR(*intersect(Sphere{{5, 0, 0}, 1}, o, x), 4.0, 1e-12);
+  EXPECT_NEAR(*intersect(SceneSphere{{5, 0, 0}, 1}, o, x), 4.0, 1e-12);
   EXPECT_NEAR(*intersect(Disc{{3, 0.5, 0}, x, 0.6}, o, x), 3.0, 1e-12);
   EXPECT_FALSE(intersect(Disc{{3, 0.7, 0}, x, 0.6}, o, x));
   EXPECT_NEAR(*intersect(Triangle{{2, -1, -1}, {2, 1, -1}, {2, 0, 1}}, o, x), 2.0, 1e-12);
@@ -88,12 +88,12 @@ TEST(Shapes, RangesByHand) {
   EXPECT_NEAR(*intersect(Cone{{4, 0, -1}, {4, 0, 1}, 0.0, 1.0}, o, x), 3.5, 1e-12);
   EXPECT_FALSE(intersect(Cone{{4, 0, 0.1}, {4, 0, 1}, 0.5, 0.5}, o, x));
   // from inside, the far side
-  EXPECT_NEAR(*intersect(Sphere{{0, 0, 0}, 2}, o, x), 2.0, 1e-12);
+  EXPECT_NEAR(*intersect(SceneSphere{{0, 0, 0}, 2}, o, x), 2.0, 1e-12);
 }
 
 TEST(Shapes, SampledPointsLieOnTheSurfaceAndCountByArea) {
   ShapeScene scene;
-  scene.shapes = {Sphere{{0, 0, 0}, 1.0},
+  scene.shapes = {SceneSphere{{0, 0, 0}, 1.0},
                   Disc{{5, 0, 0}, Vector3d(1, 1, 0).normalized(), 0.5},
                   Cone{{0, 5, 0}, {0, 5, 2}, 0.5, 0.1},
                   Triangle{{0, 0, 5}, {1, 0, 5}, {0, 1, 6}}};

@@ -24,7 +24,7 @@ std::vector<Shape> many_shapes() {
     shapes.emplace_back(Cone{p, q, 0.3, 0.02});
     shapes.emplace_back(Disc{p, (q - p).normalized(), 0.4});
     shapes.emplace_back(Disc{q, Vector3d::UnitZ(), 0.4});
-    shapes.emplace_back(Sphere{q, 0.2});
+    shapes.emplace_back(SceneSphere{q, 0.2});
   }
   return shapes;
 }

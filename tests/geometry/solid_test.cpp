@@ -31,9 +31,9 @@ class Draws {
   Solid solid() {
     switch (static_cast<int>(uniform(0, 4))) {
       case 0:
-        return Ball{uniform(0.05, 1)};
+        return Sphere{uniform(0.05, 1)};
       case 1:
-        return Cuboid{{uniform(0.002, 1), uniform(0.002, 1), uniform(0.002, 1)}};
+        return Box{{uniform(0.002, 1), uniform(0.002, 1), uniform(0.002, 1)}};
       case 2:
         return Cylinder{uniform(0.05, 1), uniform(0.01, 1)};
       default:
@@ -54,8 +54,8 @@ Vector3d projected(const Solid& solid, const Vector3d& p) {
       const Vector3d way = p - core;
       return way.norm() <= radius ? p : Vector3d(core + radius * way.normalized());
     }
-    Vector3d operator()(const Ball& s) const { return toward(Vector3d::Zero(), s.radius); }
-    Vector3d operator()(const Cuboid& s) const { return p.cwiseMin(s.half).cwiseMax(-s.half); }
+    Vector3d operator()(const Sphere& s) const { return toward(Vector3d::Zero(), s.radius); }
+    Vector3d operator()(const Box& s) const { return p.cwiseMin(s.half).cwiseMax(-s.half); }
     Vector3d operator()(const Capsule& s) const {
       return toward({0, 0, std::clamp(p.z(), -s.half_length, s.half_length)}, s.radius);
     }
@@ -115,7 +115,7 @@ TEST(Solid, SignedDistanceIsTheDistanceToTheProjection) {
     EXPECT_NEAR(std::max(0.0, d), (p - projected(solid, p)).norm(), 1e-12);
     EXPECT_LE(std::abs(d), p.norm() + bounding_radius(solid));
   }
-  EXPECT_DOUBLE_EQ(signed_distance(Cuboid{{1, 2, 3}}, {0.5, 0, 0}), -0.5);
+  EXPECT_DOUBLE_EQ(signed_distance(Box{{1, 2, 3}}, {0.5, 0, 0}), -0.5);
   EXPECT_DOUBLE_EQ(signed_distance(Cylinder{1, 3}, {0.25, 0, 0}), -0.75);
   EXPECT_DOUBLE_EQ(signed_distance(Capsule{1, 3}, {0, 0, 3.5}), -0.5);
 }
@@ -168,12 +168,11 @@ TEST(Separation, IsTheDistanceThatAlternatingProjectionsFind) {
 TEST(Separation, OverlapIsWhatTakesThemApart) {
   const Pose here;
   const auto at = [](double x) { return Pose{Quaterniond::Identity(), {x, 0, 0}}; };
-  EXPECT_NEAR(separation(Ball{1}, here, Ball{0.5}, at(1.2)).distance, -0.3, 1e-12);
-  EXPECT_NEAR(
-      separation(Cuboid{{1, 1, 1}}, here, Cuboid{{1, 2, 2}}, at(1.9)).distance, -0.1, 1e-12);
-  EXPECT_NEAR(separation(Capsule{0.5, 1}, here, Cuboid{{1, 2, 2}}, at(1.2)).distance, -0.3, 1e-12);
-  EXPECT_NEAR(separation(Capsule{0.5, 1}, here, Cuboid{{1, 2, 2}}, at(0.9)).distance, -0.6, 1e-12);
-  EXPECT_NEAR(separation(Cylinder{0.5, 1}, here, Cuboid{{1, 2, 2}}, at(1.4)).distance, -0.1, 1e-12);
+  EXPECT_NEAR(separation(Sphere{1}, here, Sphere{0.5}, at(1.2)).distance, -0.3, 1e-12);
+  EXPECT_NEAR(separation(Box{{1, 1, 1}}, here, Box{{1, 2, 2}}, at(1.9)).distance, -0.1, 1e-12);
+  EXPECT_NEAR(separation(Capsule{0.5, 1}, here, Box{{1, 2, 2}}, at(1.2)).distance, -0.3, 1e-12);
+  EXPECT_NEAR(separation(Capsule{0.5, 1}, here, Box{{1, 2, 2}}, at(0.9)).distance, -0.6, 1e-12);
+  EXPECT_NEAR(separation(Cylinder{0.5, 1}, here, Box{{1, 2, 2}}, at(1.4)).distance, -0.1, 1e-12);
   // after a move of the overlap along the line between the nearest points they just touch
   Draws draw(4);
   for (int i = 0; i < 2000; ++i) {
@@ -182,7 +181,7 @@ TEST(Separation, OverlapIsWhatTakesThemApart) {
     const Solid b = draw.solid();
     const Pose T_a = draw.pose(0.5);
     Pose T_b = draw.pose(0.5);
-    const auto is_ball = [](const Solid& s) { return std::holds_alternative<Ball>(s); };
+    const auto is_ball = [](const Solid& s) { return std::holds_alternative<Sphere>(s); };
     const auto is_tube = [](const Solid& s) { return std::holds_alternative<Cylinder>(s); };
     if ((is_tube(a) && !is_ball(b)) || (is_tube(b) && !is_ball(a))) continue;  // may be longer
     const double depth = -separation(a, T_a, b, T_b).distance;
@@ -196,8 +195,8 @@ TEST(Separation, OverlapIsWhatTakesThemApart) {
 
 TEST(Solid, SurfacePointsLieOnTheSurfaceUniformly) {
   Draws draw(5);
-  for (const Solid& solid : {Solid{Ball{0.7}},
-                             Solid{Cuboid{{0.3, 0.5, 0.9}}},
+  for (const Solid& solid : {Solid{Sphere{0.7}},
+                             Solid{Box{{0.3, 0.5, 0.9}}},
                              Solid{Cylinder{0.4, 0.8}},
                              Solid{Capsule{0.3, 0.6}}}) {
     // the flux of (0, 0, z) out of a closed surface is its volume; by symmetry half of them are up
@@ -210,8 +209,8 @@ TEST(Solid, SurfacePointsLieOnTheSurfaceUniformly) {
     }
     // share above half the height, by hand
     struct Expected {
-      double operator()(const Ball&) const { return 0.25; }
-      double operator()(const Cuboid& s) const {
+      double operator()(const Sphere&) const { return 0.25; }
+      double operator()(const Box& s) const {
         const double cap = 4 * s.half.x() * s.half.y();
         const double mantle = 8 * s.half.z() * (s.half.x() + s.half.y());
         return (cap + 0.25 * mantle) / surface_area(s);

@@ -132,7 +132,7 @@ TEST(StereoCamera, WhatTheRightImagerDoesNotSeeHasNoDepth) {
   // a wall, and before it a box, a ball and a pole thinner than its shift
   ShapeScene scene = wall_at(4.0);
   scene.add_box({1.5, -0.2, -0.4}, {1.8, 0.5, 0.3});
-  scene.shapes.push_back(Sphere{{2.5, -1.0, 0.2}, 0.4});
+  scene.shapes.push_back(SceneSphere{{2.5, -1.0, 0.2}, 0.4});
   scene.add_box({1.2, -0.62, -2}, {1.23, -0.6, 2});
   const LeftView view(scene);
   const std::vector<Return> returns = view.depths(0, false);

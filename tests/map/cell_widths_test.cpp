@@ -46,7 +46,7 @@ void expect_same(const VoxelCell& a, const VoxelCell& b) {
 
 TEST(WiderCells, HoldTheSamePoints) {
   ShapeScene scene;
-  scene.shapes.emplace_back(Sphere{{1, -2, 0.5}, 4.0});
+  scene.shapes.emplace_back(SceneSphere{{1, -2, 0.5}, 4.0});
   const auto points = points_of(scene, 2.0, 0.1);
   const Executor executor(2);
   Scratch scratch;
@@ -187,7 +187,7 @@ TEST(MergedCells, BentSurfacesAndCornersKeepTheirCells) {
 TEST(SmallCells, TakeTheCellsPointsAndNoOthers) {
   ShapeScene scene;
   for (int i = 0; i < 10; ++i) {
-    scene.shapes.emplace_back(Sphere{{0.9 * i, 0.3 * i, 0.0}, 0.07});
+    scene.shapes.emplace_back(SceneSphere{{0.9 * i, 0.3 * i, 0.0}, 0.07});
   }
   const auto points = points_of(scene, 200.0, 0.1);
   const Executor executor(2);

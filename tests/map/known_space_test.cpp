@@ -198,7 +198,7 @@ TEST(KnownSpace, LiesBesideTheMap) {
   EXPECT_FALSE(map->known_space()->is_seen_through({4.5, 0, 0}, -Vector3d::UnitX(), 1.5));
   EXPECT_EQ(&known_space_of(*map), map->known_space());
   ShapeScene scene;
-  scene.shapes.emplace_back(Sphere{{0, 0, 0}, 1.0});
+  scene.shapes.emplace_back(SceneSphere{{0, 0, 0}, 1.0});
   const auto bare = testing::map_of(scene, 0.2);
   EXPECT_EQ(bare->known_space(), nullptr);
   expect_contains(error_of([&] { known_space_of(*bare); }), "map fit --scans");

@@ -30,7 +30,7 @@ ShapeScene room() {
   scene.add_box({0, 0, 0}, {8, 6, 3});
   scene.add_box({2, 2, 0}, {2.6, 2.6, 3});
   scene.add_box({4, 3, 0}, {5.5, 4, 0.8});
-  scene.shapes.emplace_back(Sphere{{6, 1.5, 1.2}, 0.5});
+  scene.shapes.emplace_back(SceneSphere{{6, 1.5, 1.2}, 0.5});
   return scene;
 }
 

@@ -11,7 +11,7 @@ namespace pointflight::testing {
 inline ShapeScene small_room() {
   ShapeScene scene;
   scene.add_box({0, 0, 0}, {6, 5, 3});
-  scene.shapes.emplace_back(Sphere{{3, 2, 1}, 0.6});
+  scene.shapes.emplace_back(SceneSphere{{3, 2, 1}, 0.6});
   return scene;
 }
 

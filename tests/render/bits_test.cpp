@@ -180,7 +180,7 @@ std::uint64_t bits_of(const Renderer& renderer, const std::vector<Ray>& rays) {
 TEST(BeamRenderer, BundlesAreTheBitsOfSingleRays) {
   ShapeScene scene;
   scene.add_box({-4, -4, -2}, {4, 4, 2});
-  scene.shapes.emplace_back(Sphere{{2, 2, 0}, 0.5});
+  scene.shapes.emplace_back(SceneSphere{{2, 2, 0}, 0.5});
   scene.shapes.emplace_back(Cone{{-1, 0.6, -2}, {-1, 0.6, 2}, 0.03, 0.03});
   const auto map = testing::map_of(scene, 0.05, 8.0, 0.01);
   const BeamRenderer bundles(Scene{map}, BeamGrouping::kBundles);

@@ -35,8 +35,8 @@ std::vector<Body> moving_bodies(std::uint32_t seed, int count) {
     Body body;
     body.label = kFirstObstacle + static_cast<Label>(i);
     body.intensity = static_cast<float>(10 + i);
-    const Solid solids[4] = {Ball{draw(0, 0.1, 0.5)},
-                             Cuboid{{draw(1, 0.1, 0.5), draw(2, 0.1, 0.5), draw(3, 0.1, 0.5)}},
+    const Solid solids[4] = {Sphere{draw(0, 0.1, 0.5)},
+                             Box{{draw(1, 0.1, 0.5), draw(2, 0.1, 0.5), draw(3, 0.1, 0.5)}},
                              Cylinder{draw(4, 0.1, 0.4), draw(5, 0.1, 0.6)},
                              Capsule{draw(6, 0.1, 0.3), draw(7, 0.1, 0.5)}};
     body.shape = solids[i % 4];
@@ -131,7 +131,7 @@ TEST(Bodies, Statistics_AreSeenWhereTheyAreAtEachBeamsOwnTime) {
 TEST(Bodies, OfPointsFollowTheSameRuleAsTheMap) {
   // a ball of points that moves beside an exact one at the same place
   ShapeScene scene;
-  scene.shapes.emplace_back(Sphere{Vector3d::Zero(), 0.5});
+  scene.shapes.emplace_back(SceneSphere{Vector3d::Zero(), 0.5});
   const auto points = map_of(scene, 0.05);
   Body body;
   body.label = kFirstObstacle;
@@ -144,7 +144,7 @@ TEST(Bodies, OfPointsFollowTheSameRuleAsTheMap) {
   }
   body.motion = PoseTrack(std::move(poses));
   Body exact = body;
-  exact.shape = Solid{Ball{0.5}};
+  exact.shape = Solid{Sphere{0.5}};
   const BeamRenderer renderer({room()});
   const Shots shots(60000);
   const Executor executor(2);

@@ -81,7 +81,7 @@ TEST_F(PaperAgainstBeam, Statistics_OnAFloorAtGrazingAngles) {
 
 TEST_F(PaperAgainstBeam, OnASphereAndABox) {
   ShapeScene scene;
-  scene.shapes.emplace_back(Sphere{{6, 0, 0}, 1.5});
+  scene.shapes.emplace_back(SceneSphere{{6, 0, 0}, 1.5});
   scene.add_box({3, 3, -1}, {5, 5, 2});
   const Agreement a = agree(scene, fan({0, 0, 0.2}, 60, 30, 0.5));
   EXPECT_LT(a.median, 0.01);

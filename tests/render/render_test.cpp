@@ -116,7 +116,7 @@ TEST(BeamRenderer, Statistics_GrazingBeamsStayOnTheFloor) {
 
 TEST(BeamRenderer, SphereAndBoxWithinMillimetres) {
   ShapeScene scene;
-  scene.shapes.emplace_back(Sphere{{6, 0, 0}, 1.5});
+  scene.shapes.emplace_back(SceneSphere{{6, 0, 0}, 1.5});
   scene.add_box({3, 3, -1}, {5, 5, 2});
   const BeamRenderer renderer(Scene{map_of(scene, 0.05)});
   const auto rays = fan({0, 0, 0.2}, 60, 30, 0.37);
@@ -200,7 +200,7 @@ Hit brute_force(const SurfelMap& map, const Ray& ray) {
 TEST(BeamRenderer, EqualsTheModelWithoutATree) {
   ShapeScene scene;
   scene.add_box({0, 0, 0}, {6, 5, 3});
-  scene.shapes.emplace_back(Sphere{{3, 2, 1}, 0.6});
+  scene.shapes.emplace_back(SceneSphere{{3, 2, 1}, 0.6});
   scene.shapes.emplace_back(Cone{{1, 4, 0}, {1, 4, 3}, 0.05, 0.02});
   const auto map = map_of(scene, 0.1, 8.0, 0.01);
   const BeamRenderer renderer(Scene{map});
@@ -255,7 +255,7 @@ std::vector<std::uint32_t> bits_of(const std::vector<Hit>& hits) {
 TEST(BeamRenderer, Threads_TheSameBitsOnEveryInstructionSetAndInEveryOrder) {
   ShapeScene scene;
   scene.add_box({-4, -4, -2}, {4, 4, 2});
-  scene.shapes.emplace_back(Sphere{{2, 2, 0}, 0.5});
+  scene.shapes.emplace_back(SceneSphere{{2, 2, 0}, 0.5});
   const BeamRenderer renderer(Scene{map_of(scene, 0.1, 6.0, 0.02)});
   auto rays = fan({0.3, 0.2, 0.1}, 179, 80, 0.9);
   const auto dense = fan({0.3, 0.2, 0.1}, 30, 20, 0.15);  // goes in packets
@@ -284,7 +284,7 @@ TEST(BeamRenderer, Threads_TheSameBitsOnEveryInstructionSetAndInEveryOrder) {
 TEST(BeamRenderer, TheShapeOfTheTreeDoesNotShow) {
   ShapeScene scene;
   scene.add_box({-4, -4, -2}, {4, 4, 2});
-  scene.shapes.emplace_back(Sphere{{2, 2, 0}, 0.5});
+  scene.shapes.emplace_back(SceneSphere{{2, 2, 0}, 0.5});
   std::vector<CloudPoint> points;
   scene.sample(800.0, 0.01, 1, [&](const Vector3d& p) { points.push_back({p, 0.0f}); });
   ImportOptions options;

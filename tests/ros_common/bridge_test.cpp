@@ -362,7 +362,7 @@ TEST(RosBridge, TheClockOfAPausedRunSaysWhereItStands) {
 
 TEST(ScanMessages, PointsThatAHullTouchesLieAroundIt) {
   const auto map = hall();
-  const Solid hull{Ball{0.3}};
+  const Solid hull{Sphere{0.3}};
   Pose pose;
   pose.translation = {6, 6, 3};
   EXPECT_TRUE(touched_points(*map, hull, pose).empty());

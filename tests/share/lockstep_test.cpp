@@ -36,7 +36,7 @@ Scenario three(ShareTime time) {
   s.vehicles[1].mission.waypoints = {{6.4, 4, 3}};
   ObstacleSettings balls;
   balls.count = 10;
-  balls.radius = 0.2;
+  balls.size.radius = 0.2;
   balls.speed = 1.0;
   s.obstacles = {balls};
   ShareSetup setup;

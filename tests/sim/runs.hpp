@@ -114,7 +114,7 @@ inline Simulation run(const Scenario& scenario, SampleSink& sink, const Executor
 /// A ball that passes through (10, 6, 3) along y from 3 m away.
 inline ObstacleSettings passing(double speed) {
   ObstacleSettings o;
-  o.radius = 0.3;
+  o.size.radius = 0.3;
   o.motion = ObstacleMotion::kLoop;
   o.speed = speed;
   o.waypoints = {{10, 3, 3}, {10, 9, 3}};

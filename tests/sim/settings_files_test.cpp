@@ -67,7 +67,7 @@ TEST(KeysWithoutEffect, OfAVehicleAreErrors) {
     return error_of([&] { parse_vehicle(text, "v.yaml"); });
   };
   expect_contains(error("radius: 0.26", "size: [1, 1, 1]"), "size: has no effect here");
-  expect_contains(error("radius: 0.26", "height: 1"), "`shape: capsule`");
+  expect_contains(error("radius: 0.26", "height: 1"), "`shape: cylinder, capsule`");
   expect_contains(error("radius: 0.26", "shape: box\nradius: 0.26"), "radius: has no effect here");
   expect_contains(error("natural_frequency: 100", "natural_frequency: 0"),
                   "rotor.damping: has no effect here");
@@ -141,11 +141,13 @@ TEST(KeysWithoutEffect, AreNotWritten) {
     scenario.vehicles[0].faults.emplace_back().kind = static_cast<FaultKind>(kind);
   }
   for (int motion = 0; motion <= static_cast<int>(ObstacleMotion::kKeyframes); ++motion) {
-    for (int shape = 0; shape <= static_cast<int>(ObstacleShape::kCloud); ++shape) {
+    const auto add = [&](const std::optional<Choice<SolidKind>>& shape) {
       auto& obstacle = scenario.obstacles.emplace_back();
       obstacle.motion = static_cast<ObstacleMotion>(motion);
-      obstacle.shape = static_cast<ObstacleShape>(shape);
-    }
+      obstacle.shape = shape;
+    };
+    for (const SolidKind& kind : SolidKind::table().rows()) add(Choice<SolidKind>(kind.name));
+    add(std::nullopt);
   }
   const std::string text = scenario_yaml(scenario);
   EXPECT_EQ(scenario_yaml(parse_scenario(text, "s.yaml")), text);

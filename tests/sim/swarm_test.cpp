@@ -37,13 +37,13 @@ Scenario swarm(double duration) {
   s.vehicles[2].lidars.front().renderer = "paper";
   ObstacleSettings balls;
   balls.count = 40;
-  balls.radius = 0.1;
+  balls.size.radius = 0.1;
   balls.radius_max = 0.4;
   balls.speed = 0.5;
   balls.speed_max = 3.0;
   ObstacleSettings boxes = balls;
   boxes.count = 10;
-  boxes.shape = ObstacleShape::kBox;
+  boxes.shape = "box";
   boxes.at_border = AtBorder::kBounce;
   s.obstacles = {balls, boxes};
   s.air.wind.mean = {1, 0.5, 0};

@@ -103,7 +103,7 @@ TEST(Obstacles, FlyStraightStayInsideAndAreReplaced) {
   balls.count = 30;
   balls.speed = 4.0;
   balls.speed_max = 8.0;
-  balls.radius = 0.2;
+  balls.size.radius = 0.2;
   balls.radius_max = 0.5;
   scenario.obstacles = {balls};
   const Executor executor(1);
@@ -178,7 +178,7 @@ TEST(Obstacles, BounceWhereTheyAreToldTo) {
 TEST(Obstacles, ThoseThatAreNearAreFoundWithoutLookingAtAll) {
   std::vector<ObstacleSettings> settings(4);
   settings[0].count = 300;
-  settings[0].radius = 0.1;
+  settings[0].size.radius = 0.1;
   settings[0].radius_max = 0.4;
   settings[0].speed = 0.5;
   settings[0].speed_max = 30.0;  // many are replaced within a slice of time
@@ -187,7 +187,7 @@ TEST(Obstacles, ThoseThatAreNearAreFoundWithoutLookingAtAll) {
   settings[1].speed = 20.0;
   settings[2] = passing(3.0);
   settings[3].motion = ObstacleMotion::kStill;
-  settings[3].shape = ObstacleShape::kBox;
+  settings[3].shape = "box";
   settings[3].position = {4, 4, 2};
   ObstacleWorld world;
   world.map = hall();
@@ -287,7 +287,7 @@ TEST(Obstacles, OfACloudAreSeenAndMet) {
   scenario.vehicles[0].start = {10, 6, 1};
   scenario.vehicles[0].lidars = {LidarMount{}};
   ObstacleSettings person = passing(1.0);
-  person.shape = ObstacleShape::kCloud;
+  person.shape = std::nullopt;
   person.file = folder / "person.xyz";
   person.resolution = 0.05;
   person.waypoints = {{10, 4, 0}, {10, 7, 0}};

@@ -73,7 +73,7 @@ float range_in(const SurfelMap& map, const Vector3d& from, const Vector3d& to) {
 ShapeScene wall_and_ghost() {
   ShapeScene scene;
   scene.add_rectangle({4, -2, -2}, {0, 4, 0}, {0, 0, 4});
-  scene.shapes.emplace_back(Sphere{{2, 0, 0}, 0.3});
+  scene.shapes.emplace_back(SceneSphere{{2, 0, 0}, 0.3});
   return scene;
 }
 
@@ -188,7 +188,7 @@ TEST(MapFit, WritesDownWhichSpaceRaysCrossed) {
 
 TEST(MapFit, NothingLeftIsAnErrorOfOneLine) {
   ShapeScene scene;
-  scene.shapes.emplace_back(Sphere{{2, 0, 0}, 0.3});
+  scene.shapes.emplace_back(SceneSphere{{2, 0, 0}, 0.3});
   const auto map = map_of(scene, 0.1);
   std::vector<SurveyRay> rays;
   for (const Vector3d& from : {Vector3d(0, 0, 0), Vector3d(2, 2, 0), Vector3d(2, 0, 2)}) {

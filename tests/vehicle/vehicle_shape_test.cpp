@@ -43,7 +43,7 @@ TEST(VehicleShape, AFileSaysWhatDoesNotFollow) {
   settings.airframe.blade_chord = 0.02;
   settings.airframe.arm_radius = 0.012;
   const Assembly assembly = assembly_of(settings);
-  EXPECT_EQ(std::get<Cuboid>(assembly.parts[0].solid).half, Vector3d(0.15, 0.05, 0.025));
+  EXPECT_EQ(std::get<Box>(assembly.parts[0].solid).half, Vector3d(0.15, 0.05, 0.025));
   EXPECT_EQ(assembly.parts[0].T_assembly_part.translation, Vector3d(0.02, 0, -0.03));
   EXPECT_EQ(std::get<Capsule>(assembly.parts[1].solid).radius, 0.012);
   EXPECT_EQ(assembly.propellers[0].radius, 0.05);

@@ -22,7 +22,7 @@ T at(const std::vector<std::byte>& bytes, std::size_t offset) {
 std::shared_ptr<const SurfelMap> yard() {
   ShapeScene scene;
   scene.add_box({-20, -15, -1}, {20, 15, 6});
-  scene.shapes.emplace_back(Sphere{{3, 2, 1}, 1.5});
+  scene.shapes.emplace_back(SceneSphere{{3, 2, 1}, 1.5});
   return testing::map_of(scene, 0.2);
 }
 

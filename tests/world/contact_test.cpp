@@ -23,7 +23,7 @@ ShapeScene room() {
   ShapeScene scene;
   scene.add_box({0, 0, 0}, {6, 5, 3});
   scene.shapes.emplace_back(Cone{{2, 2, 0}, {2, 2, 3}, 0.2, 0.2});
-  scene.shapes.emplace_back(Sphere{{4, 3, 1.5}, 0.5});
+  scene.shapes.emplace_back(SceneSphere{{4, 3, 1.5}, 0.5});
   scene.add_rectangle({4, 0, 0}, {1, 1, 0}, {0, 0.5, 2});
   return scene;
 }
@@ -52,8 +52,8 @@ class Draws {
   }
   Solid hull() {
     const int kind = static_cast<int>(uniform(0, 3));
-    if (kind == 0) return Ball{uniform(0.1, 0.4)};
-    if (kind == 1) return Cuboid{{uniform(0.1, 0.4), uniform(0.1, 0.4), uniform(0.05, 0.2)}};
+    if (kind == 0) return Sphere{uniform(0.1, 0.4)};
+    if (kind == 1) return Box{{uniform(0.1, 0.4), uniform(0.1, 0.4), uniform(0.05, 0.2)}};
     return Capsule{uniform(0.1, 0.3), uniform(0.05, 0.4)};
   }
 
@@ -80,7 +80,7 @@ TEST(Contact, Statistics_ManyQueriesEqualBruteForceOverTheSameBoxes) {
     double expected = kReach;
     bool any = false;
     const double radius = bounding_radius(hull);
-    const auto* ball = std::get_if<Ball>(&hull);
+    const auto* ball = std::get_if<Sphere>(&hull);
     for (const SurfelBox& box : boxes) {
       const double apart = (box.T_world_box.translation - pose.translation).norm();
       if (apart - radius - box.half.norm() > expected) continue;
@@ -89,7 +89,7 @@ TEST(Contact, Statistics_ManyQueriesEqualBruteForceOverTheSameBoxes) {
         const Vector3d local = box.T_world_box.inverse() * pose.translation;
         d = (local.cwiseAbs() - box.half).cwiseMax(0.0).norm() - ball->radius;
       } else {
-        d = separation(hull, pose, Solid{Cuboid{box.half}}, box.T_world_box).distance;
+        d = separation(hull, pose, Solid{Box{box.half}}, box.T_world_box).distance;
       }
       if (d <= expected) {
         expected = d;
@@ -126,7 +126,7 @@ TEST(Contact, Statistics_ErrorAgainstTheExactShapesIsASmallShareOfACell) {
     int count = 0;
     for (int q = 0; q < 3000; ++q) {
       const Pose pose = draw.pose();
-      const Ball hull{0.25};
+      const Sphere hull{0.25};
       const auto got = contact_with_map(*map, hull, pose, 2.0);
       if (!got) continue;
       // the exact distance: rays of a fine ball of directions see the nearest surface; cheaper, by
@@ -175,11 +175,11 @@ TEST(Contact, WithBodiesIsTheSeparationOfSolids) {
   }
   // a body of points at a pose: as the same points in the map
   ShapeScene ball;
-  ball.shapes.emplace_back(Sphere{Vector3d::Zero(), 0.5});
+  ball.shapes.emplace_back(SceneSphere{Vector3d::Zero(), 0.5});
   const auto points = map_of(ball, 0.05);
   const Pose there{quaternion_from_rpy(0.3, 0.1, 1.0), {3, 1, 2}};
   const auto got = contact_with_body(
-      BodyShape{points}, there, 9, Ball{0.25}, Pose{Quaterniond::Identity(), {4.5, 1, 2}}, 2.0);
+      BodyShape{points}, there, 9, Sphere{0.25}, Pose{Quaterniond::Identity(), {4.5, 1, 2}}, 2.0);
   ASSERT_TRUE(got);
   EXPECT_NEAR(got->distance, 0.75, 0.02);
   EXPECT_NEAR(got->place_world.x(), 3.5, 0.05);
@@ -198,7 +198,7 @@ TEST(Proximity, AWireOfSinglePointsIsMetAtTwentyMetresASecond) {
   for (int pass = 0; pass < kPasses; ++pass) {
     const double radius = draw.uniform(0.02, 0.3);
     const Solid hulls[3] = {
-        Ball{radius}, Cuboid{{radius, radius, 0.5 * radius}}, Capsule{0.5 * radius, radius}};
+        Sphere{radius}, Box{{radius, radius, 0.5 * radius}}, Capsule{0.5 * radius, radius}};
     const Solid& hull = hulls[pass % 3];
     // crosses the wire's line, not always through its middle
     const double height = 1.0 + 0.4 * radius * draw.uniform(-1, 1);
@@ -227,7 +227,7 @@ TEST(Proximity, AWireOfSinglePointsIsMetAtTwentyMetresASecond) {
 
 TEST(Proximity, TwoThatPassThroughEachOtherWithinAStepMeet) {
   const auto map = map_of(std::vector<Vector3d>{{100, 100, 100}, {100, 100, 101}}, 0.1);
-  const Solid small = Ball{0.01};
+  const Solid small = Sphere{0.01};
   const BodyShape shape = small;
   ProximityState state;
   std::vector<CollisionEvent> events;

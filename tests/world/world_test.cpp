@@ -16,15 +16,15 @@ TEST(Contact, OfABallBeforeAWallIsTheGap) {
   const auto map = map_of(scene, 0.05);
   for (const double gap : {0.05, 0.5, 2.0}) {
     const auto c = contact_with_map(
-        *map, Ball{0.3}, {Quaterniond::Identity(), {5.0 - 0.3 - gap, 0.1, 0.2}}, 10.0);
+        *map, Sphere{0.3}, {Quaterniond::Identity(), {5.0 - 0.3 - gap, 0.1, 0.2}}, 10.0);
     ASSERT_TRUE(c);
     EXPECT_NEAR(c->distance, gap, 0.005);
     EXPECT_NEAR(c->place_world.x(), 5.0, 0.01);
   }
   EXPECT_LT(
-      contact_with_map(*map, Ball{0.3}, {Quaterniond::Identity(), {4.8, 0, 0}}, 10.0)->distance,
+      contact_with_map(*map, Sphere{0.3}, {Quaterniond::Identity(), {4.8, 0, 0}}, 10.0)->distance,
       -0.09);
-  EXPECT_FALSE(contact_with_map(*map, Ball{0.3}, {Quaterniond::Identity(), {-20, 0, 0}}, 10.0));
+  EXPECT_FALSE(contact_with_map(*map, Sphere{0.3}, {Quaterniond::Identity(), {-20, 0, 0}}, 10.0));
 }
 
 TEST(Clearance, AlongALineFindsAThinPole) {

@@ -16,8 +16,8 @@ struct Points {
   [[nodiscard]] double kdtree_get_pt(std::size_t i, std::size_t axis) const {
     return points[i][static_cast<int>(axis)];
   }
-  template <class Box>
-  bool kdtree_get_bbox(Box& /*box*/) const {
+  template <class Bounds>
+  bool kdtree_get_bbox(Bounds& /*box*/) const {
     return false;
   }
 };

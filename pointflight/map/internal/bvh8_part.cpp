@@ -29,7 +29,7 @@ double leaves_of(std::size_t count) {
 /// Cuts a box of centres into equal bins along each axis.
 class BinGrid {
  public:
-  BinGrid(std::span<const std::uint32_t> order, const std::vector<Box>& boxes)
+  BinGrid(std::span<const std::uint32_t> order, const std::vector<NodeBox>& boxes)
       : bins_(order.size() < 64 ? 8 : kMostBins) {
     Eigen::Array4f high = Eigen::Array4f::Constant(-std::numeric_limits<float>::infinity());
     low_ = -high;
@@ -47,7 +47,7 @@ class BinGrid {
 
   [[nodiscard]] std::size_t bins() const { return bins_; }
   [[nodiscard]] bool has_extent(int axis) const { return scale_[axis] != 0.0f; }
-  [[nodiscard]] Eigen::Array4i bins_of(const Box& box) const {
+  [[nodiscard]] Eigen::Array4i bins_of(const NodeBox& box) const {
     return ((box.center() - low_) * scale_).cast<int>().min(static_cast<int>(bins_) - 1);
   }
 
@@ -59,7 +59,7 @@ class BinGrid {
 
 /// What lies in the bins along one axis.
 struct Bins {
-  std::array<Box, BinGrid::kMostBins> boxes;
+  std::array<NodeBox, BinGrid::kMostBins> boxes;
   std::array<std::uint32_t, BinGrid::kMostBins> counts{};
 };
 
@@ -76,7 +76,7 @@ struct Border {
 
 void try_borders(const Bins& along, int axis, std::size_t bins, std::size_t total, Border& best) {
   std::array<double, BinGrid::kMostBins> above{};  // areas of the parts from a bin on
-  Box box;
+  NodeBox box;
   for (std::size_t bin = bins - 1; bin > 0; --bin) {
     box.add(along.boxes[bin]);
     above[bin] = box.half_area();
@@ -112,10 +112,10 @@ Split Surfels::split_by_key(const Range& range) const {
       middle, static_cast<double>(middle - range.begin), static_cast<double>(range.end - middle)};
 }
 
-Box Surfels::support_box(SurfelWord word, const Voxel& origin) const {
+NodeBox Surfels::support_box(SurfelWord word, const Voxel& origin) const {
   const Surfel surfel = decode(word);
   const double r = input_.resolution;
-  Box box{Eigen::Array4f::Zero(), Eigen::Array4f::Zero()};
+  NodeBox box{Eigen::Array4f::Zero(), Eigen::Array4f::Zero()};
   for (int axis = 0; axis < 3; ++axis) {
     double variance = 0.0;
     for (int k = 0; k < 3; ++k) {
@@ -133,7 +133,7 @@ Box Surfels::support_box(SurfelWord word, const Voxel& origin) const {
   return box;
 }
 
-void quantise(const Box& whole, std::span<const Box> boxes, Bvh8Node& node) {
+void quantise(const NodeBox& whole, std::span<const NodeBox> boxes, Bvh8Node& node) {
   const float extent = (whole.max - whole.min).head<3>().maxCoeff();
   node.scale = std::nextafter(extent / 254.0f, std::numeric_limits<float>::infinity());
   for (int axis = 0; axis < 3; ++axis) node.origin[axis] = whole.min[axis];
@@ -162,7 +162,7 @@ void TreePart::build(Scratch& scratch) {
   box = build_node(0, {0, order_.size()});
   // "= {}" would keep the room
   order_ = std::vector<std::uint32_t>();
-  boxes_ = std::vector<Box>();
+  boxes_ = std::vector<NodeBox>();
   surfels_.release(range_);
   nodes = stored(scratch, std::move(new_nodes_));
   words = stored(scratch, std::move(new_words_));
@@ -176,13 +176,13 @@ void TreePart::clear() {
 }
 
 /// Fills node `index` with the surfels of `range` and returns their box.
-Box TreePart::build_node(std::size_t index, const Range& range) {
+NodeBox TreePart::build_node(std::size_t index, const Range& range) {
   const Children children = open_children(
       range,
       [this](const Range& part) { return is_leaf(part); },
       [this](const Range& part) { return split(part); });
   std::array<std::uint8_t, 8> meta{};
-  std::array<Box, 8> boxes;
+  std::array<NodeBox, 8> boxes;
   const std::size_t first_leaf_word = new_words_.size();
   const std::size_t first_inner = new_nodes_.size();
   std::size_t inner_count = 0;
@@ -200,7 +200,7 @@ Box TreePart::build_node(std::size_t index, const Range& range) {
   for (std::size_t i = 0; i < children.count; ++i) {
     if (meta[i] == Bvh8Node::kInner) boxes[i] = build_node(next_inner++, children.ranges[i]);
   }
-  Box whole;
+  NodeBox whole;
   for (std::size_t i = 0; i < children.count; ++i) whole.add(boxes[i]);
   Bvh8Node& node = new_nodes_[index];
   node = {};
@@ -271,12 +271,12 @@ Split TreePart::split_by_area(const Range& range) {
   return {range.begin + best.count, best.first_area, best.second_area};
 }
 
-Box TreePart::append_leaf(const Range& range) {
+NodeBox TreePart::append_leaf(const Range& range) {
   const Voxel origin = voxel_bounds(range).first;
   new_words_.push_back(encode(
       LeafHeader{origin[0], origin[1], origin[2], static_cast<std::uint32_t>(range.count())}));
   if (surfels_.has_intensity()) new_intensity_.push_back(0);
-  Box whole;
+  NodeBox whole;
   for (std::size_t i = range.begin; i < range.end; ++i) {
     const Voxel voxel = surfels_.voxel(surfel(i));
     SurfelWord word = surfels_.word(surfel(i));

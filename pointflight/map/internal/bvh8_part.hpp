@@ -23,10 +23,10 @@ struct Range {
 };
 
 /// Lanes 0 to 2; four are as fast as one.
-struct Box {
+struct NodeBox {
   Eigen::Array4f min = Eigen::Array4f::Constant(std::numeric_limits<float>::infinity());
   Eigen::Array4f max = Eigen::Array4f::Constant(-std::numeric_limits<float>::infinity());
-  void add(const Box& other) {
+  void add(const NodeBox& other) {
     min = min.min(other.min);
     max = max.max(other.max);
   }
@@ -105,16 +105,16 @@ class Surfels {
   /// set; parts are worth what they hold.
   [[nodiscard]] Split split_by_key(const Range& range) const;
 
-  /// Box of the ellipsoid of kSupport standard deviations as the reader decodes it, grown so that
-  /// rounding, the reader's included, can never lose a hit. Metres from the map's origin.
-  [[nodiscard]] Box support_box(SurfelWord word, const Voxel& origin) const;
+  /// NodeBox of the ellipsoid of kSupport standard deviations as the reader decodes it, grown so
+  /// that rounding, the reader's included, can never lose a hit. Metres from the map's origin.
+  [[nodiscard]] NodeBox support_box(SurfelWord word, const Voxel& origin) const;
 
  private:
   TreeInput input_;
 };
 
 /// Fills in a node's frame and the boxes of its children, lanes in their order.
-void quantise(const Box& whole, std::span<const Box> boxes, Bvh8Node& node);
+void quantise(const NodeBox& whole, std::span<const NodeBox> boxes, Bvh8Node& node);
 
 /// The tree over a range of surfels, built by one thread; node 0 is its root. Indices count from
 /// the part's own beginnings.
@@ -126,7 +126,7 @@ class TreePart {
   ScratchArray<Bvh8Node> nodes;
   ScratchArray<SurfelWord> words;
   ScratchArray<std::uint8_t> intensity;
-  Box box;
+  NodeBox box;
 
   void build(Scratch& scratch);
 
@@ -134,8 +134,8 @@ class TreePart {
   void clear();
 
  private:
-  Box build_node(std::size_t index, const Range& range);
-  Box append_leaf(const Range& range);
+  NodeBox build_node(std::size_t index, const Range& range);
+  NodeBox append_leaf(const Range& range);
   [[nodiscard]] bool is_leaf(const Range& range) const;
   [[nodiscard]] std::pair<Voxel, Voxel> voxel_bounds(const Range& range) const;
   [[nodiscard]] Split split(const Range& range);
@@ -155,7 +155,7 @@ class TreePart {
   std::vector<SurfelWord> new_words_;
   std::vector<std::uint8_t> new_intensity_;
   std::vector<std::uint32_t> order_;  ///< Of the surfels in the leaves; by Morton code at first.
-  std::vector<Box> boxes_;            ///< For kHigh, in the order of the input.
+  std::vector<NodeBox> boxes_;        ///< For kHigh, in the order of the input.
 };
 
 }  // namespace pointflight

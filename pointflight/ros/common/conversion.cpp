@@ -132,10 +132,10 @@ msg::Marker marker_of(const Solid& solid,
   marker.ns = ns;
   marker.id = id;
   marker.action = msg::Marker::ADD;
-  // RViz has no capsule: the cylinder around it
-  marker.type = std::holds_alternative<Ball>(solid)     ? msg::Marker::SPHERE
-                : std::holds_alternative<Cuboid>(solid) ? msg::Marker::CUBE
-                                                        : msg::Marker::CYLINDER;
+  const PlainShape outline = plain_shape_of(solid);
+  marker.type = outline == PlainShape::kSphere ? msg::Marker::SPHERE
+                : outline == PlainShape::kBox  ? msg::Marker::CUBE
+                                               : msg::Marker::CYLINDER;
   marker.pose = pose_of(T_world_body);
   marker.scale = vector_of(Vector3d(2.0 * half_extent(solid)));
   marker.color = color;

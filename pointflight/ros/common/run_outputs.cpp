@@ -167,7 +167,7 @@ msg::MarkerArray obstacle_markers(const OutputStream& stream, const ObstacleSamp
   for (const auto& [label, pose, shape] : sample.obstacles) {
     const auto* solid = std::get_if<Solid>(&shape);
     markers.markers.push_back(
-        marker_of(solid != nullptr ? *solid : Solid{Ball{bounding_radius(shape)}},
+        marker_of(solid != nullptr ? *solid : Solid{Sphere{bounding_radius(shape)}},
                   pose,
                   stream.header(sample.time),
                   "obstacles",
@@ -196,7 +196,7 @@ class CollisionMarkers : public Output {
     if (stream_.is_wanted()) {
       const bool is_one = stream_.ros.run.vehicles.size() == 1;
       const std::string name = stream_.ros.names(event->vehicle).vehicle;
-      stream_.send(msg::MarkerArray{{marker_of(Solid{Ball{kCollisionRadius}},
+      stream_.send(msg::MarkerArray{{marker_of(Solid{Sphere{kCollisionRadius}},
                                                {Quaterniond::Identity(), event->place_world},
                                                stream_.header(event->time),
                                                is_one ? "collisions" : "collisions/" + name,

@@ -186,7 +186,7 @@ std::vector<Vector3f> touched_points(const SurfelMap& map,
   around.add(T_world_hull.translation + reach);
   std::vector<Vector3f> points;
   visit_near(map, around, 0.0, [&](const SurfelBox& box) {
-    const Separation s = separation(hull, T_world_hull, Solid{Cuboid{box.half}}, box.T_world_box);
+    const Separation s = separation(hull, T_world_hull, Solid{Box{box.half}}, box.T_world_box);
     if (s.distance <= 0.0) points.emplace_back(box.T_world_box.translation.cast<float>());
     return 0.0;
   });

@@ -6,13 +6,13 @@ export const colourOf = (i) => COLOURS[i % COLOURS.length];
 
 // A solid as the run describes it; cylinders and capsules stand along z.
 export function solid(shape, material) {
-  let geometry;
-  if (shape.kind === "ball") geometry = new THREE.SphereGeometry(shape.radius, 24, 16);
-  else if (shape.kind === "box") geometry = new THREE.BoxGeometry(...shape.half.map((h) => 2 * h));
-  else if (shape.kind === "cylinder")
-    geometry = new THREE.CylinderGeometry(shape.radius, shape.radius, 2 * shape.half_height, 24).rotateX(Math.PI / 2);
-  else geometry = new THREE.CapsuleGeometry(shape.radius, 2 * shape.half_length, 6, 12).rotateX(Math.PI / 2);
-  return new THREE.Mesh(geometry, material);
+  const [x, y, z] = shape.half;
+  const make = {
+    sphere: () => new THREE.SphereGeometry(x, 24, 16),
+    cylinder: () => new THREE.CylinderGeometry(x, x, 2 * z, 24).rotateX(Math.PI / 2),
+    capsule: () => new THREE.CapsuleGeometry(x, 2 * (z - x), 6, 12).rotateX(Math.PI / 2),
+  }[shape.kind];
+  return new THREE.Mesh(make ? make() : new THREE.BoxGeometry(2 * x, 2 * y, 2 * z), material);
 }
 
 const setPose = (object, p, q) => {
