@@ -17,12 +17,12 @@
 #include "apps/terminal.hpp"
 #include "apps/view_flags.hpp"
 #include "pointflight/core/input_error.hpp"
-#include "pointflight/recording/mcap_timeline.hpp"
+#include "pointflight/recording/mcap_reader.hpp"
 #include "pointflight/ros/common/profile.hpp"
 #include "pointflight/ros/common/ros_link.hpp"
 #include "pointflight/run/playback.hpp"
 #include "pointflight/view/foxglove_transport.hpp"
-#include "pointflight/view/recording_player.hpp"
+#include "pointflight/view/recording_playback.hpp"
 #include "pointflight/view/view_link.hpp"
 
 namespace pointflight::apps {
@@ -81,9 +81,8 @@ void view_recording(const ViewCommandFlags& flags) {
   const auto map = flags.map.empty() ? nullptr : SurfelMap::open(flags.map);
   const auto recording = open_timed_mcap(flags.input, terminal_progress());
   const auto server = serve_view(place_of(flags), map, recording->range());
-  RecordingPlayer player(*recording, server);
   catch_interrupts();
-  player.play(interrupted);
+  play(*recording, *server, interrupted);
 }
 
 /// The recording in a folder that `ros2 bag record` made; nothing if it is another folder.

@@ -1,41 +1,38 @@
+// MCAP files, read: a file that was cut anywhere as far as its last whole chunk. Chunks that do not
+// unpack to their checksum are left out.
 #pragma once
 
-#include <cstdint>
-#include <functional>
-#include <map>
 #include <memory>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "pointflight/core/progress.hpp"
+#include "pointflight/ros/common/timed_recording.hpp"
 #include "pointflight/ros/common/wire.hpp"
 
 namespace pointflight {
 
-/// A message of a recording; valid during the callback.
-struct RecordedMessage {
-  const std::string& topic;         ///< "/quad_0/imu"
-  const std::string& type;          ///< "sensor_msgs/msg/Imu"
-  std::int64_t time = 0;            ///< ns since the Unix epoch.
-  std::span<const std::byte> data;  ///< CDR, its header of four bytes included.
-};
+/// An MCAP file as a `TimedRecording`. What it says of itself at its end is taken if it is
+/// there; of a file that was cut, all whole chunks are looked through once. Chunks that overlap in
+/// time are merged, as far as half a GiB of them does.
+/// Throws InputError if it is no MCAP file or holds no message.
+std::unique_ptr<TimedRecording> open_timed_mcap(const std::string& path,
+                                                const Progress& progress = {});
 
-/// Reads all messages of an MCAP file in the order in which they lie there, from its chunks: of a
-/// file that was cut anywhere, all whole chunks. Chunks with a wrong checksum are left out.
-/// Throws InputError if it is no MCAP file.
-RecordingInfo read_mcap(const std::string& path,
-                        const std::function<void(const RecordedMessage&)>& on_message = {});
+/// The same of bytes, which must outlive it: for tests and fuzzers.
+std::unique_ptr<TimedRecording> timed_mcap(std::span<const std::byte> bytes,
+                                           const std::string& name,
+                                           const Progress& progress = {});
 
-/// The same from bytes, for tests and fuzzers.
-RecordingInfo read_mcap_bytes(std::span<const std::byte> bytes,
-                              const std::string& name,
-                              const std::function<void(const RecordedMessage&)>& on_message = {});
-
-/// The same messages one after the other, of several files as one: rosbag2 splits what is long.
-/// Throws InputError if one is no MCAP file.
+/// The messages of several files as one, file after file, each in the order of time: rosbag2 splits
+/// what is long. Throws InputError if one is no MCAP file.
 std::unique_ptr<MessageReader> open_mcap(const std::vector<std::string>& paths);
 
-/// The data of an attachment of a file. Throws InputError if there is none of this name.
-std::string read_mcap_attachment(const std::string& path, const std::string& attachment);
+/// What is in a file, counted by reading all of it. Throws InputError if it is no MCAP file.
+RecordingInfo read_mcap(const std::string& path);
+
+/// The same of bytes, for tests and fuzzers.
+RecordingInfo read_mcap_bytes(std::span<const std::byte> bytes, const std::string& name);
 
 }  // namespace pointflight

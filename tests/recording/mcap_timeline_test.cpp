@@ -1,7 +1,5 @@
-// A recording read from any time on: beside the plain reader, of files cut anywhere, with chunks
+// A recording read from any time on: of files cut anywhere, with chunks
 // that overlap or with none.
-#include "pointflight/recording/mcap_timeline.hpp"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -99,7 +97,7 @@ class RawFile {
   std::vector<std::byte> bytes_;
 };
 
-TEST(McapTimeline, GivesWhatThePlainReaderGives) {
+TEST(McapTimeline, GivesWhatWasRecorded) {
   const TemporaryFolder folder;
   record(folder / "a.mcap", 200);
   const auto recording = open_timed_mcap(folder / "a.mcap");
@@ -114,14 +112,12 @@ TEST(McapTimeline, GivesWhatThePlainReaderGives) {
   EXPECT_TRUE(recording->channels()[1].latched);
   EXPECT_EQ(recording->range(), std::pair(std::int64_t{1000}, std::int64_t{2990}));
   TimedMessage message;
-  const RecordingInfo info = read_mcap(folder / "a.mcap", [&](const RecordedMessage& m) {
+  for (int i = 0; i < 200; ++i) {
     ASSERT_TRUE(recording->next(message));
-    EXPECT_EQ(recording->channels()[message.channel].topic, m.topic);
-    EXPECT_EQ(message.time, m.time);
-    EXPECT_TRUE(std::ranges::equal(message.data, m.data));
-  });
-  EXPECT_EQ(info.messages, 200u);
-  EXPECT_GT(info.chunks, 5u);
+    EXPECT_EQ(message.channel, i % 4 == 0 ? 1u : 0u);
+    EXPECT_EQ(message.time, 1000 + 10 * i);
+    EXPECT_TRUE(std::ranges::equal(message.data, *tick_bytes(i)));
+  }
   EXPECT_FALSE(recording->next(message));
 }
 
