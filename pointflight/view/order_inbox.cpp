@@ -32,6 +32,17 @@ void OrderInbox::take_playback_of(LiveServer& server, Duration epoch) {
   });
 }
 
+foxglove::PlaybackState OrderInbox::state_of(const PlaybackStatus& status, Duration epoch) {
+  using Status = foxglove::PlaybackState::Status;
+  foxglove::PlaybackState state;
+  state.status = status.playing ? Status::kPlaying : Status::kPaused;
+  if (status.ended) state.status = Status::kEnded;
+  state.time = (status.time.time_since_epoch() + epoch).count();
+  state.speed = static_cast<float>(status.rate);
+  state.did_seek = status.did_seek;
+  return state;
+}
+
 std::vector<Order> OrderInbox::take() {
   const std::lock_guard lock(queue_->mutex);
   return std::exchange(queue_->orders, {});

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "pointflight/run/order.hpp"
+#include "pointflight/run/playback.hpp"
 #include "pointflight/vehicle/mission.hpp"
 #include "pointflight/view/live_server.hpp"
 
@@ -20,6 +21,9 @@ class OrderInbox {
   /// Playback controls become orders as well; `epoch`: what the run's first instant is stamped
   /// with.
   void take_playback_of(LiveServer& server, Duration epoch);
+
+  /// What clients are told of a playback whose first instant is stamped with `epoch`.
+  static foxglove::PlaybackState state_of(const PlaybackStatus& status, Duration epoch);
 
   /// All since the last call, in the order in which they came.
   std::vector<Order> take();

@@ -157,14 +157,7 @@ void ViewLink::let_play_back() {
 }
 
 void ViewLink::publish_playback(const PlaybackStatus& status) {
-  using Status = foxglove::PlaybackState::Status;
-  foxglove::PlaybackState state;
-  state.status = status.playing ? Status::kPlaying : Status::kPaused;
-  if (status.ended) state.status = Status::kEnded;
-  state.time = stamp(status.time);
-  state.speed = static_cast<float>(status.rate);
-  state.did_seek = status.did_seek;
-  server_->publish_playback(state);
+  server_->publish_playback(OrderInbox::state_of(status, epoch_));
 }
 
 std::vector<Order> ViewLink::take_orders() {
