@@ -1,11 +1,6 @@
 #include "pointflight/sim/command_script.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
-
-#include <algorithm>
-#include <array>
-#include <initializer_list>
 
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/resources.hpp"
@@ -14,123 +9,158 @@
 namespace pointflight {
 namespace {
 
-constexpr Named<CommandKind> kCommandKinds[] = {{CommandKind::kRotorSpeeds, "rotor_speeds"},
-                                                {CommandKind::kBodyRates, "body_rates"},
-                                                {CommandKind::kAttitude, "attitude"},
-                                                {CommandKind::kAcceleration, "acceleration"},
-                                                {CommandKind::kVelocity, "velocity"},
-                                                {CommandKind::kPosition, "position"},
-                                                {CommandKind::kPolynomial, "polynomial"},
-                                                {CommandKind::kBSpline, "b_spline"},
-                                                {CommandKind::kWaypoint, "waypoint"},
-                                                {CommandKind::kTakeOff, "take_off"},
-                                                {CommandKind::kLand, "land"},
-                                                {CommandKind::kHover, "hover"},
-                                                {CommandKind::kArm, "arm"},
-                                                {CommandKind::kDisarm, "disarm"}};
+/// Groups of keys that lines of several commands have.
+enum Keys : unsigned {
+  kVector = 1 << 0,
+  kPlace = 1 << 1,  // with kVector: it is one
+  kHeading = 1 << 2,
+  kThrust = 1 << 3,
+  kRates = 1 << 4,
+  kFeedForward = 1 << 5,
+  kRpy = 1 << 6,
+  kRotors = 1 << 7,
+  kHeight = 1 << 8,
+  kSpeed = 1 << 9,
+  kFile = 1 << 10,
+  kKnots = 1 << 11,
+};
+
+using Settings = const CommandSettings&;
+using Context = const CommandContext&;
+
+double thrust_of(Settings s, Context c) {
+  return s.thrust > 0.0 ? s.thrust : c.vehicle.mass * kGravity;
+}
+
+Command rotor_speeds(Settings s, Context /*c*/) {
+  return RotorSpeedCommand{s.rotors};
+}
+Command body_rates(Settings s, Context c) {
+  return BodyRateCommand{s.rates_deg * kDegree, thrust_of(s, c)};
+}
+Command attitude(Settings s, Context c) {
+  const Vector3d rpy = s.rpy_deg * kDegree;
+  return AttitudeCommand{
+      quaternion_from_rpy(rpy.x(), rpy.y(), rpy.z()), thrust_of(s, c), Vector3d::Zero()};
+}
+Command acceleration(Settings s, Context /*c*/) {
+  return AccelerationCommand{s.vector, s.yaw_deg * kDegree, s.yaw_rate_deg * kDegree};
+}
+Command velocity(Settings s, Context /*c*/) {
+  return VelocityCommand{s.vector, s.yaw_deg * kDegree, s.yaw_rate_deg * kDegree};
+}
+Command position(Settings s, Context /*c*/) {
+  PositionCommand command;
+  command.p_world = s.vector;
+  command.v_world = s.feed_forward;
+  command.yaw = s.yaw_deg * kDegree;
+  command.yaw_rate = s.yaw_rate_deg * kDegree;
+  return command;
+}
+Command polynomial(Settings s, Context c) {
+  return TrajectoryCommand{PolynomialTrajectory::read(resolve_path(s.file, c.folder))};
+}
+Command b_spline(Settings s, Context c) {
+  return TrajectoryCommand{BSplineTrajectory::read(
+      resolve_path(s.file, c.folder), static_cast<int>(s.degree), s.interval)};
+}
+Command waypoint(Settings s, Context c) {
+  WaypointCommand command;
+  command.mission.motion = c.motion;
+  command.mission.waypoints = {s.vector};
+  return command;
+}
+Command take_off(Settings s, Context /*c*/) {
+  return TakeOffCommand{s.height, s.speed};
+}
+Command land(Settings s, Context /*c*/) {
+  return LandCommand{s.speed};
+}
+template <class C>
+Command plain(Settings /*s*/, Context /*c*/) {
+  return C{};
+}
 
 }  // namespace
 
+Registry<ScriptedCommand>& ScriptedCommand::table() {
+  static Registry<ScriptedCommand> table = {
+      {"rotor_speeds", kRotors, rotor_speeds},
+      {"body_rates", kRates | kThrust, body_rates},
+      {"attitude", kRpy | kThrust, attitude},
+      {"acceleration", kVector | kHeading, acceleration},
+      {"velocity", kVector | kHeading, velocity},
+      {"position", kVector | kPlace | kFeedForward | kHeading, position},
+      {"polynomial", kFile, polynomial},
+      {"b_spline", kFile | kKnots, b_spline},
+      {"waypoint", kVector | kPlace, waypoint},
+      {"take_off", kHeight | kSpeed, take_off},
+      {"land", kSpeed, land},
+      {"hover", 0, plain<HoverCommand>},
+      {"arm", 0, plain<ArmCommand>},
+      {"disarm", 0, plain<DisarmCommand>},
+  };
+  return table;
+}
+
+bool has_place(const CommandSettings& settings) {
+  return (settings.kind->keys & kPlace) != 0;
+}
+
 void describe(SettingsVisitor& v, CommandSettings& s) {
   v.value({"time", "s", "when it is given", 0, 1e6}, s.time);
-  v.choice({"kind", "", "what is commanded"}, s.kind, kCommandKinds);
-  // the keys of each kind
-  const auto for_kinds = [&](std::initializer_list<CommandKind> kinds, const auto& keys) {
-    const bool holds = std::find(kinds.begin(), kinds.end(), s.kind) != kinds.end();
-    std::vector<std::string_view> names;
-    for (const CommandKind kind : kinds) names.push_back(name_in(kCommandKinds, kind));
-    v.only_if(holds, fmt::format("kind: {}", fmt::join(names, ", ")), keys);
+  v.choice({"kind", "", "what is commanded"}, s.kind);
+  // the keys of a group, where the command has it
+  const auto group = [&](Keys keys, const auto& describe_keys, const char* hint = "") {
+    std::string names;
+    for (const ScriptedCommand& row : ScriptedCommand::table().rows()) {
+      if ((row.keys & keys) != 0) names += (names.empty() ? "" : ", ") + row.name;
+    }
+    v.only_if((s.kind->keys & keys) != 0, fmt::format("kind: {}{}", names, hint), describe_keys);
   };
-  const bool has_vector = s.kind == CommandKind::kAcceleration ||
-                          s.kind == CommandKind::kVelocity || s.kind == CommandKind::kPosition ||
-                          s.kind == CommandKind::kWaypoint;
-  v.only_if(has_vector,
-            "kind: acceleration, velocity, position, waypoint; body_rates has rates_deg",
-            [&](SettingsVisitor& w) {
-              w.value({"vector",
-                       "",
-                       "acceleration m/s^2, velocity m/s, position or waypoint m",
-                       -kFarthest,
-                       kFarthest},
-                      s.vector);
-            });
-  for_kinds({CommandKind::kBodyRates}, [&](SettingsVisitor& w) {
+  group(
+      kVector,
+      [&](SettingsVisitor& w) {
+        w.value({"vector",
+                 "",
+                 "acceleration m/s^2, velocity m/s, position or waypoint m",
+                 -kFarthest,
+                 kFarthest},
+                s.vector);
+      },
+      "; body_rates has rates_deg");
+  group(kRates, [&](SettingsVisitor& w) {
     w.value({"rates_deg", "deg/s", "about the body's axes", -36000, 36000}, s.rates_deg);
   });
-  for_kinds({CommandKind::kPosition}, [&](SettingsVisitor& w) {
+  group(kFeedForward, [&](SettingsVisitor& w) {
     w.value({"feed_forward", "m/s", "velocity of the command", -100, 100}, s.feed_forward);
   });
-  for_kinds({CommandKind::kAttitude}, [&](SettingsVisitor& w) {
+  group(kRpy, [&](SettingsVisitor& w) {
     w.value({"rpy_deg", "deg", "the attitude", -360, 360}, s.rpy_deg);
   });
-  for_kinds({CommandKind::kAcceleration, CommandKind::kVelocity, CommandKind::kPosition},
-            [&](SettingsVisitor& w) {
-              w.value({"yaw_deg", "deg", "heading", -360, 360}, s.yaw_deg);
-              w.value({"yaw_rate_deg", "deg/s", "feed-forward", -720, 720}, s.yaw_rate_deg);
-            });
-  for_kinds({CommandKind::kBodyRates, CommandKind::kAttitude}, [&](SettingsVisitor& w) {
+  group(kHeading, [&](SettingsVisitor& w) {
+    w.value({"yaw_deg", "deg", "heading", -360, 360}, s.yaw_deg);
+    w.value({"yaw_rate_deg", "deg/s", "feed-forward", -720, 720}, s.yaw_rate_deg);
+  });
+  group(kThrust, [&](SettingsVisitor& w) {
     w.value({"thrust", "N", "0: the weight", 0, 1e5}, s.thrust);
   });
-  for_kinds({CommandKind::kRotorSpeeds}, [&](SettingsVisitor& w) {
+  group(kRotors, [&](SettingsVisitor& w) {
     w.value({"rotors", "rad/s", "of each", 0, 1e5}, s.rotors);
   });
-  for_kinds({CommandKind::kTakeOff}, [&](SettingsVisitor& w) {
+  group(kHeight, [&](SettingsVisitor& w) {
     w.value({"height", "m", "to rise by", 0.01, 1e4}, s.height);
   });
-  for_kinds({CommandKind::kTakeOff, CommandKind::kLand}, [&](SettingsVisitor& w) {
+  group(kSpeed, [&](SettingsVisitor& w) {
     w.value({"speed", "m/s", "up or down", 0.01, 20}, s.speed);
   });
-  for_kinds({CommandKind::kPolynomial, CommandKind::kBSpline}, [&](SettingsVisitor& w) {
+  group(kFile, [&](SettingsVisitor& w) {
     w.value({"file", "", "CSV of a polynomial or of a B-spline's control points"}, s.file);
   });
-  for_kinds({CommandKind::kBSpline}, [&](SettingsVisitor& w) {
+  group(kKnots, [&](SettingsVisitor& w) {
     w.value({"degree", "", "of the B-spline", 1, 7}, s.degree);
     w.value({"interval", "s", "between the B-spline's knots", 0.001, 1000}, s.interval);
   });
-}
-
-Command command_of(const CommandSettings& s,
-                   const VehicleSettings& vehicle,
-                   const MotionLimits& motion,
-                   const std::string& folder) {
-  const double yaw = s.yaw_deg * kDegree;
-  const double yaw_rate = s.yaw_rate_deg * kDegree;
-  const double thrust = s.thrust > 0.0 ? s.thrust : vehicle.mass * kGravity;
-  if (s.kind == CommandKind::kRotorSpeeds) return RotorSpeedCommand{s.rotors};
-  if (s.kind == CommandKind::kBodyRates) return BodyRateCommand{s.rates_deg * kDegree, thrust};
-  if (s.kind == CommandKind::kAttitude) {
-    const Vector3d rpy = s.rpy_deg * kDegree;
-    return AttitudeCommand{
-        quaternion_from_rpy(rpy.x(), rpy.y(), rpy.z()), thrust, Vector3d::Zero()};
-  }
-  if (s.kind == CommandKind::kAcceleration) return AccelerationCommand{s.vector, yaw, yaw_rate};
-  if (s.kind == CommandKind::kVelocity) return VelocityCommand{s.vector, yaw, yaw_rate};
-  if (s.kind == CommandKind::kPosition) {
-    PositionCommand command;
-    command.p_world = s.vector;
-    command.v_world = s.feed_forward;
-    command.yaw = yaw;
-    command.yaw_rate = yaw_rate;
-    return command;
-  }
-  if (s.kind == CommandKind::kPolynomial) {
-    return TrajectoryCommand{PolynomialTrajectory::read(resolve_path(s.file, folder))};
-  }
-  if (s.kind == CommandKind::kBSpline) {
-    return TrajectoryCommand{BSplineTrajectory::read(
-        resolve_path(s.file, folder), static_cast<int>(s.degree), s.interval)};
-  }
-  if (s.kind == CommandKind::kWaypoint) {
-    MissionSettings mission;
-    mission.motion = motion;
-    mission.waypoints = {s.vector};
-    return WaypointCommand{mission};
-  }
-  if (s.kind == CommandKind::kTakeOff) return TakeOffCommand{s.height, s.speed};
-  if (s.kind == CommandKind::kLand) return LandCommand{s.speed};
-  if (s.kind == CommandKind::kArm) return ArmCommand{};
-  if (s.kind == CommandKind::kDisarm) return DisarmCommand{};
-  return HoverCommand{};
 }
 
 }  // namespace pointflight

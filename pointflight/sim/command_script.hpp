@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "pointflight/core/registry.hpp"
 #include "pointflight/core/settings.hpp"
 #include "pointflight/core/time.hpp"
 #include "pointflight/vehicle/airframe.hpp"
@@ -13,29 +14,33 @@ namespace pointflight {
 /// Coordinates of a scenario are no larger, m: those of a UTM zone fit.
 inline constexpr double kFarthest = 1e7;
 
-/// What a line of a scenario commands: `name_of`, and two kinds of trajectories.
-enum class CommandKind {
-  kRotorSpeeds,   ///< `rotors`
-  kBodyRates,     ///< `rates_deg`, `thrust`
-  kAttitude,      ///< `rpy_deg`, `thrust`
-  kAcceleration,  ///< `vector`, heading
-  kVelocity,      ///< `vector`, heading
-  kPosition,      ///< `vector`, `feed_forward`, heading
-  kPolynomial,    ///< A trajectory of `file`.
-  kBSpline,       ///< A trajectory of the control points in `file`.
-  kWaypoint,      ///< `vector`
-  kTakeOff,       ///< `height`, `speed`
-  kLand,          ///< `speed`
-  kHover,         ///< Stays where it is.
-  kArm,           ///< Rotors may turn.
-  kDisarm,        ///< Rotors off.
+struct CommandSettings;
+
+/// What a line's command is made with beside its own keys.
+struct CommandContext {
+  const VehicleSettings& vehicle;  ///< Who gets it.
+  const MotionLimits& motion;      ///< How it flies to places.
+  const std::string& folder;       ///< That relative paths of files start from.
+};
+
+/// What a line of a scenario can command: a row of a table. To add one, add a row; it says which
+/// keys the line has.
+struct ScriptedCommand {
+  static constexpr const char* kWhat = "command";  ///< In messages.
+  /// The commands by their names; trajectories are there as "polynomial" and "b_spline".
+  static Registry<ScriptedCommand>& table();
+
+  std::string name;   ///< In files.
+  unsigned keys = 0;  ///< Of the line: bits of command_script.cpp.
+  /// Throws InputError (files).
+  Command (*make)(const CommandSettings& settings, const CommandContext& context) = nullptr;
 };
 
 /// One line of a scenario's `commands`: what a vehicle is told, and when. Levels that must be
 /// repeated are, until the next one.
 struct CommandSettings {
   double time = 0.0;                         ///< s
-  CommandKind kind = CommandKind::kHover;    ///< What it asks for.
+  Choice<ScriptedCommand> kind = "hover";    ///< What it asks for.
   Vector3d vector = Vector3d::Zero();        ///< Acceleration, velocity or position.
   Vector3d rates_deg = Vector3d::Zero();     ///< Of body rates, deg/s.
   Vector3d feed_forward = Vector3d::Zero();  ///< Velocity of a position command, m/s.
@@ -55,10 +60,7 @@ struct CommandSettings {
 /// The keys of one entry of `commands`.
 void describe(SettingsVisitor& visitor, CommandSettings& settings);
 
-/// The command of a line. Throws InputError (files).
-Command command_of(const CommandSettings& settings,
-                   const VehicleSettings& vehicle,
-                   const MotionLimits& motion,
-                   const std::string& folder);
+/// True if the line's `vector` is a place, which moves with the vehicle's copies.
+bool has_place(const CommandSettings& settings);
 
 }  // namespace pointflight

@@ -217,8 +217,7 @@ std::vector<VehicleSetup> Scenario::fleet() const {
       one.start += offset;
       for (Vector3d& waypoint : one.mission.waypoints) waypoint += offset;
       for (CommandSettings& command : one.commands) {
-        if (command.kind == CommandKind::kPosition || command.kind == CommandKind::kWaypoint)
-          command.vector += offset;
+        if (has_place(command)) command.vector += offset;
       }
       if (one.name.empty()) {
         one.name = fmt::format("drone{}", fleet.size() - 1);

@@ -175,13 +175,13 @@ void VehicleAgent::read_commands(const Scenario& scenario) {
     const auto key = [&](const char* name) {
       return scenario.vehicle_key(number_, fmt::format("commands[{}].{}", i, name));
     };
-    if (s.kind == CommandKind::kBodyRates && !s.vector.isZero(0.0)) {
+    if (s.kind->name == BodyRateCommand::kName && !s.vector.isZero(0.0)) {
       throw InputError(fmt::format("{}: {}: body rates are given as rates_deg: [x, y, z], in deg/s",
                                    scenario.place(key("vector")),
                                    key("vector")));
     }
     const Command command = scenario.at(key(s.file.empty() ? "kind" : "file"), [&] {
-      Command made = command_of(s, settings(), setup_.mission.motion, scenario.folder());
+      Command made = s.kind->make(s, {settings(), setup_.mission.motion, scenario.folder()});
       if (const auto reason = autopilot_.objection(made)) throw InputError(*reason);
       return made;
     });

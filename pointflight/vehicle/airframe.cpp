@@ -9,16 +9,10 @@
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/core/interpolation.hpp"
 #include "pointflight/core/resources.hpp"
+#include "pointflight/vehicle/command.hpp"
 
 namespace pointflight {
 namespace {
-
-constexpr Named<CommandLevel> kLevels[] = {{CommandLevel::kRotorSpeeds, "rotor_speeds"},
-                                           {CommandLevel::kBodyRates, "body_rates"},
-                                           {CommandLevel::kAttitude, "attitude"},
-                                           {CommandLevel::kAcceleration, "acceleration"},
-                                           {CommandLevel::kVelocity, "velocity"},
-                                           {CommandLevel::kPosition, "position"}};
 
 Key required(Key key) {
   key.required = true;
@@ -252,7 +246,7 @@ void describe(SettingsVisitor& v, VehicleSettings& s) {
          });
   v.choice({"lowest_command", "", "the innermost command that its autopilot takes"},
            s.lowest_command,
-           kLevels);
+           setpoint_names());
   v.section({"controller", "", "gains follow from these and the airframe"},
             [&](SettingsVisitor& w) { describe_controller(w, s.controller); });
   v.section({"imu", "", "continuous-time densities"},
@@ -263,10 +257,6 @@ void describe(SettingsVisitor& v, VehicleSettings& s) {
             [&](SettingsVisitor& w) { describe_battery(w, s.battery); });
   v.section({"airframe", "", "what LiDARs see of it; what is 0 follows from where the rotors sit"},
             [&](SettingsVisitor& w) { describe_looks(w, s.airframe); });
-}
-
-std::string_view to_string(CommandLevel level) {
-  return name_in(kLevels, level);
 }
 
 std::string vehicle_reference() {

@@ -108,16 +108,6 @@ struct BatterySettings {
   double reserve = 0.1;     ///< Share of the capacity that is left when it counts as low.
 };
 
-/// Setpoints from the innermost loop to the outermost: the order of `Setpoint`.
-enum class CommandLevel {
-  kRotorSpeeds,   ///< rad/s
-  kBodyRates,     ///< rad/s and thrust
-  kAttitude,      ///< and thrust
-  kAcceleration,  ///< m/s^2
-  kVelocity,      ///< m/s
-  kPosition,      ///< m
-};
-
 /// What it looks like to LiDARs (`assembly_of`); what is 0 follows from where the rotors sit.
 struct AirframeSettings {
   bool seen_as_hull = false;                ///< LiDARs see its hull, as a solid, instead.
@@ -143,8 +133,8 @@ struct VehicleSettings {
   RotorModel rotor;                                   ///< One for all rotors.
   /// Four or more; commands and states count them in this order.
   std::vector<RotorPlacement> rotors;
-  /// The innermost command that its autopilot takes.
-  CommandLevel lowest_command = CommandLevel::kRotorSpeeds;
+  /// The innermost command that its autopilot takes (`setpoint_names`).
+  std::string lowest_command = "rotor_speeds";
   ControllerSettings controller;  ///< Loops and limits.
   ImuSettings imu;                ///< One on each vehicle.
   VibrationSettings vibration;    ///< At hover speed; grows with the square of the rotors'.
@@ -162,9 +152,6 @@ struct VehicleSettings {
   /// body frame, m/s^2.
   [[nodiscard]] Vector3d drag_in_still_air(const Vector3d& v_body) const;
 };
-
-/// As files have it: "rotor_speeds", ...
-std::string_view to_string(CommandLevel level);
 
 /// The one list of keys of a vehicle file.
 void describe(SettingsVisitor& visitor, VehicleSettings& settings);

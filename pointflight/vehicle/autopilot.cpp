@@ -2,31 +2,18 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <concepts>
 #include <type_traits>
 
 #include "pointflight/core/constants.hpp"
+#include "pointflight/core/registry.hpp"
 #include "pointflight/geometry/rotation.hpp"
 
 namespace pointflight {
 namespace {
-
-constexpr std::array<const char*, 13> kNames = {"rotor_speeds",
-                                                "body_rates",
-                                                "attitude",
-                                                "acceleration",
-                                                "velocity",
-                                                "position",
-                                                "trajectory",
-                                                "waypoints",
-                                                "take_off",
-                                                "land",
-                                                "hover",
-                                                "arm",
-                                                "disarm"};
-static_assert(kNames.size() == std::variant_size_v<Command>);
 
 constexpr std::size_t kRepeated = std::variant_size_v<Setpoint>;  // the first of Command
 constexpr double kSlow = 0.15;                                    // m/s: below, hover holds a place
@@ -137,6 +124,13 @@ VelocityCommand in_world(const VelocityCommand& command,
   return world;
 }
 
+std::size_t index_of_setpoint(std::string_view name) {
+  const auto names = setpoint_names();
+  const auto found = std::find(names.begin(), names.end(), name);
+  if (found == names.end()) throw_unknown("command", name, {names.begin(), names.end()});
+  return static_cast<std::size_t>(found - names.begin());
+}
+
 /// True for a take-off, landing or goal that is said again, as some programs do many times a
 /// second.
 bool is_under_way(const AutopilotState& state, const Command& command) {
@@ -155,10 +149,6 @@ bool is_under_way(const AutopilotState& state, const Command& command) {
 
 }  // namespace
 
-const char* name_of(const Command& command) {
-  return kNames[command.index()];
-}
-
 std::string AutopilotState::reject(std::string reason) {
   ++rejected;
   return last_rejection = std::move(reason);
@@ -167,6 +157,7 @@ std::string AutopilotState::reject(std::string reason) {
 Autopilot::Autopilot(const VehicleSettings& settings, Duration command_timeout)
     : settings_(settings),
       command_timeout_(command_timeout),
+      lowest_command_(index_of_setpoint(settings.lowest_command)),
       controller_(make_controller(settings.controller.kind, settings)) {}
 
 AutopilotState Autopilot::start(const RigidBodyState& body, bool landed) const {
@@ -192,11 +183,10 @@ std::optional<std::string> Autopilot::objection(const Command& command) const {
                          settings_.rotors.size());
     }
   }
-  // levels are in order, the innermost first
-  if (command.index() < static_cast<std::size_t>(settings_.lowest_command)) {
+  if (command.index() < lowest_command_) {
     return fmt::format("this vehicle takes no {} commands; the innermost are {}",
                        name_of(command),
-                       to_string(settings_.lowest_command));
+                       settings_.lowest_command);
   }
   return std::nullopt;
 }

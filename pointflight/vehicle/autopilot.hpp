@@ -33,7 +33,7 @@ struct AutopilotState {
 class Autopilot {
  public:
   /// Without a command for `command_timeout` (0: for ever) one that must be repeated ends in hover.
-  /// Throws InputError (unknown controller).
+  /// Throws InputError if the vehicle's innermost command is none of `setpoint_names`.
   Autopilot(const VehicleSettings& settings, Duration command_timeout);
 
   /// Hovering at a state, armed; or on the ground with rotors off.
@@ -66,6 +66,7 @@ class Autopilot {
 
   VehicleSettings settings_;
   Duration command_timeout_;
+  std::size_t lowest_command_;  ///< Index in `Setpoint`.
   std::unique_ptr<Controller> controller_;
 };
 

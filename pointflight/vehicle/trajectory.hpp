@@ -13,12 +13,13 @@ namespace pointflight {
 /// Where to be and how to move there (the fields of the planners' PositionCommand messages);
 /// derivatives are feed-forward and may stay zero.
 struct PositionCommand {
-  Vector3d p_world = Vector3d::Zero();     ///< m
-  Vector3d v_world = Vector3d::Zero();     ///< m/s
-  Vector3d a_world = Vector3d::Zero();     ///< m/s^2
-  Vector3d jerk_world = Vector3d::Zero();  ///< m/s^3
-  double yaw = 0.0;                        ///< rad, from world x towards y
-  double yaw_rate = 0.0;                   ///< rad/s
+  static constexpr std::string_view kName = "position";  ///< `name_of`
+  Vector3d p_world = Vector3d::Zero();                   ///< m
+  Vector3d v_world = Vector3d::Zero();                   ///< m/s
+  Vector3d a_world = Vector3d::Zero();                   ///< m/s^2
+  Vector3d jerk_world = Vector3d::Zero();                ///< m/s^3
+  double yaw = 0.0;                                      ///< rad, from world x towards y
+  double yaw_rate = 0.0;                                 ///< rad/s
 };
 
 /// A path in time. Immutable: shared by whoever follows it.

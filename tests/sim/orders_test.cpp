@@ -27,15 +27,15 @@ TEST(Commands, OfAScenarioTakeOffFlyAndLand) {
   v.landed = true;
   v.commands.resize(4);
   v.commands[0].time = 0.5;
-  v.commands[0].kind = CommandKind::kTakeOff;
+  v.commands[0].kind = "take_off";
   v.commands[0].height = 2.0;
   v.commands[1].time = 5.0;
-  v.commands[1].kind = CommandKind::kVelocity;
+  v.commands[1].kind = "velocity";
   v.commands[1].vector = {1, 0, 0};
   v.commands[2].time = 8.0;
-  v.commands[2].kind = CommandKind::kHover;
+  v.commands[2].kind = "hover";
   v.commands[3].time = 11.0;
-  v.commands[3].kind = CommandKind::kLand;
+  v.commands[3].kind = "land";
   scenario.duration = 20.0;
   ByteSink sink;
   const Simulation simulation = run(scenario, sink, Executor(1));
@@ -57,7 +57,7 @@ TEST(Commands, Slow_ALargeVehicleStaysOnTheGroundThatItHasLandedOn) {
   v.lidars.clear();
   v.start = {10, 6, 1.5};
   v.commands.resize(1);
-  v.commands[0].kind = CommandKind::kLand;
+  v.commands[0].kind = "land";
   scenario.air.wind.turbulence = Turbulence::kLight;
   scenario.duration = 8.0;
   ByteSink sink;
@@ -72,7 +72,7 @@ TEST(Commands, Slow_ALargeVehicleStaysOnTheGroundThatItHasLandedOn) {
 TEST(Commands, DisarmedInTheAirItFallsAndLiesWhereItFell) {
   Scenario scenario = hovering();
   scenario.vehicles[0].commands.resize(1);
-  scenario.vehicles[0].commands[0].kind = CommandKind::kDisarm;
+  scenario.vehicles[0].commands[0].kind = "disarm";
   ByteSink sink;
   const Simulation simulation = run(scenario, sink, Executor(1));
   EXPECT_TRUE(simulation.status(0).landed);

@@ -134,8 +134,8 @@ TEST(KeysWithoutEffect, AreNotWritten) {
   Scenario scenario;
   scenario.map = "m.pfmap";
   scenario.vehicles[0].lidars[0].renderer = "paper";
-  for (int kind = 0; kind <= static_cast<int>(CommandKind::kDisarm); ++kind) {
-    scenario.vehicles[0].commands.emplace_back().kind = static_cast<CommandKind>(kind);
+  for (const ScriptedCommand& kind : ScriptedCommand::table().rows()) {
+    scenario.vehicles[0].commands.emplace_back().kind = kind.name;
   }
   for (int kind = 0; kind <= static_cast<int>(FaultKind::kScanDrop); ++kind) {
     scenario.vehicles[0].faults.emplace_back().kind = static_cast<FaultKind>(kind);

@@ -78,9 +78,9 @@ TEST(Simulation, WhoHasLandedIsNoWreckWhereALogEnds) {
   v.mission.waypoints.clear();
   v.start.z() = 0.6;
   v.commands.resize(2);
-  v.commands[0].kind = CommandKind::kLand;
+  v.commands[0].kind = "land";
   v.commands[0].time = 0.5;
-  v.commands[1].kind = CommandKind::kTakeOff;
+  v.commands[1].kind = "take_off";
   v.commands[1].time = 9.0;
   scenario.duration = 14.0;
   const Executor executor(1);

@@ -74,7 +74,7 @@ TEST(Collisions, CrashTurnsTheRotorsOffAndTheWreckLiesOnTheGround) {
   scenario.vehicles[0].on_collision = CollisionReaction::kCrash;
   scenario.vehicles[0].commands.resize(1);  // a wreck does not start again
   scenario.vehicles[0].commands[0].time = 1.5;
-  scenario.vehicles[0].commands[0].kind = CommandKind::kTakeOff;
+  scenario.vehicles[0].commands[0].kind = "take_off";
   scenario.duration = 6.0;
   ByteSink sink;
   const Simulation simulation = run(scenario, sink, executor);

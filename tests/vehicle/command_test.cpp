@@ -212,7 +212,7 @@ TEST(Autopilot, HoversWhenCommandsStop) {
 
 TEST(Autopilot, RefusesWhatIsNotFiniteOrNotForThisVehicleAndCounts) {
   VehicleSettings settings = load_vehicle("quad_330");
-  settings.lowest_command = CommandLevel::kVelocity;
+  settings.lowest_command = "velocity";
   Flight flight(settings);
   const double nan = std::numeric_limits<double>::quiet_NaN();
   expect_contains(*flight.give(VelocityCommand{{nan, 0, 0}, 0.0, 0.0}), "velocity");
