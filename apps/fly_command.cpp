@@ -166,7 +166,7 @@ void print_vehicle(const Simulation& simulation, std::size_t v) {
              s.closest_approach ? fmt::format("{} m to {} at {}",
                                               fixed_text(*s.closest_approach, 2),
                                               label_name(simulation, s.closest_label),
-                                              point_text(s.closest_place_world))
+                                              point_text(s.closest_position_world))
                                 : std::string("over 10 m"));
   fmt::print("  collisions        {}\n", s.collisions);
   fmt::print("  tracking error    {:.0f} mm RMS, {:.0f} mm at most\n",

@@ -34,7 +34,7 @@ void TerminalLink::say(const CollisionEvent& event) {
                         simulation_.vehicle(event.vehicle).setup().name,
                         point_text(event.vehicle_world),
                         label_name(simulation_, event.partner),
-                        point_text(event.place_world)));
+                        point_text(event.position_world)));
 }
 
 void TerminalLink::say(const VehicleEvent& event) {

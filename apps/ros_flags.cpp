@@ -28,7 +28,7 @@ namespace fs = std::filesystem;
 constexpr double kEndless = 1e6;  // s
 
 /// Of a flag or a scenario's key: "now", or seconds since 1970.
-Duration epoch_from(const std::string& text, const std::string& place) {
+Duration epoch_from(const std::string& text, const std::string& location) {
   if (text == "now") {
     return std::chrono::duration_cast<Duration>(
         std::chrono::system_clock::now().time_since_epoch());
@@ -38,7 +38,7 @@ Duration epoch_from(const std::string& text, const std::string& place) {
   // a stamp has 31 bits of seconds
   if (end == text.c_str() || *end != '\0' || !(seconds >= 0.0) || !(seconds < 2.1e9)) {
     throw InputError(
-        fmt::format("{}: '{}'; 'now' or seconds since 1970, such as 1.7e9", place, text));
+        fmt::format("{}: '{}'; 'now' or seconds since 1970, such as 1.7e9", location, text));
   }
   return from_seconds(seconds);
 }
@@ -46,7 +46,7 @@ Duration epoch_from(const std::string& text, const std::string& place) {
 Duration epoch_of(const RosFlags& flags, const Scenario& scenario, const RosProfile& profile) {
   if (!flags.epoch.empty()) return epoch_from(flags.epoch, "--epoch");
   const std::string& own = ros_setup_of(scenario).epoch;
-  if (!own.empty()) return epoch_from(own, scenario.place("ros.epoch"));
+  if (!own.empty()) return epoch_from(own, scenario.location("ros.epoch"));
   // living nodes must not see time jump back after a restart; recordings by themselves and runs in
   // lockstep are the same each time
   const bool live = flags.is_live() && flags.lockstep <= 0.0;

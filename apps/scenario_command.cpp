@@ -145,7 +145,7 @@ void warn_about(const Scenario& scenario, const SurfelMap& map) {
         log(fmt::format(
             "{}: warning: {}'s leg to waypoint {} passes through the map; a collision is "
             "likely",
-            scenario.place(key),
+            scenario.location(key),
             setup.name,
             i + 1));
       }
@@ -162,7 +162,7 @@ void warn_of_starts_outside(const Scenario& scenario, const Aabb& box) {
     log(
         fmt::format("{}: warning: {} starts at ({:.2f}, {:.2f}, {:.2f}), which is not between {}: "
                     "the planner has no map there (--start-in)",
-                    scenario.place(scenario.vehicle_key(v, "start")),
+                    scenario.location(scenario.vehicle_key(v, "start")),
                     fleet[v].name,
                     p.x(),
                     p.y(),

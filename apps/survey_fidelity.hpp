@@ -32,7 +32,7 @@ struct SurveyFlags {
 /// --survey, --seconds, --shake, --tilt, --thin, --fit, --survey-out.
 void add_survey_flags(CLI::App& app, SurveyFlags& flags);
 
-/// Walks a LiDAR through the scene, maps what it saw and judges the map by an OS1-32 at places
+/// Walks a LiDAR through the scene, maps what it saw and judges the map by an OS1-32 at positions
 /// beside the walk. Prints tables, or appends to `cases`. Throws InputError.
 void measure_surveyed(const ExactScene& scene,
                       const SurveyFlags& flags,

@@ -39,14 +39,14 @@ struct ViewCommandFlags {
   int threads = 0;
 };
 
-ViewPlace place_of(const ViewCommandFlags& flags) {
+ViewAccess access_of(const ViewCommandFlags& flags) {
   return {flags.at, flags.control, flags.no_control};
 }
 
 /// A map alone, until it is interrupted.
 void view_map(const ViewCommandFlags& flags) {
   const auto map = SurfelMap::open(flags.input);
-  const auto server = serve_view(place_of(flags), map);
+  const auto server = serve_view(access_of(flags), map);
   catch_interrupts();
   while (!interrupted()) std::this_thread::sleep_for(std::chrono::milliseconds(50));
 }
@@ -58,7 +58,7 @@ void view_run(const ViewCommandFlags& flags) {
   const RunDescription& description = run.description();
   const Duration epoch = kFixedEpoch;
   const std::pair range(epoch.count(), (run.end().time_since_epoch() + epoch).count());
-  const auto server = serve_view(place_of(flags), description.map, range);
+  const auto server = serve_view(access_of(flags), description.map, range);
   RosLinkOptions options;
   options.epoch = epoch;
   options.log = [](const std::string& line) { log(line); };
@@ -80,7 +80,7 @@ void view_run(const ViewCommandFlags& flags) {
 void view_recording(const ViewCommandFlags& flags) {
   const auto map = flags.map.empty() ? nullptr : SurfelMap::open(flags.map);
   const auto recording = open_timed_mcap(flags.input, terminal_progress());
-  const auto server = serve_view(place_of(flags), map, recording->range());
+  const auto server = serve_view(access_of(flags), map, recording->range());
   catch_interrupts();
   play(*recording, *server, interrupted);
 }

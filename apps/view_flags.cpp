@@ -13,7 +13,7 @@ namespace pointflight::apps {
 namespace {
 
 /// "127.0.0.1:8765", "8765", "0.0.0.0", "[::1]:8765".
-void parse_place(const std::string& text, LiveServerOptions& options) {
+void parse_address(const std::string& text, LiveServerOptions& options) {
   if (text.empty()) return;
   const auto fail = [&] {
     throw InputError(
@@ -76,12 +76,12 @@ std::shared_ptr<LiveServer> start_viewing(const ViewFlags& flags,
 }
 
 std::shared_ptr<LiveServer> serve_view(
-    const ViewPlace& place,
+    const ViewAccess& access,
     const std::shared_ptr<const SurfelMap>& map,
     const std::optional<std::pair<std::int64_t, std::int64_t>>& range) {
   LiveServerOptions options;
-  parse_place(place.at, options);
-  options.control = place.control || (is_loopback(options.address) && !place.no_control);
+  parse_address(access.at, options);
+  options.control = access.control || (is_loopback(options.address) && !access.no_control);
   options.range = range;
   if (range) options.capabilities = {"playbackControl"};
   const std::string folder = page_folder();

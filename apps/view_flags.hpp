@@ -25,7 +25,7 @@ struct ViewFlags {
 };
 
 /// Where viewers connect and what they may.
-struct ViewPlace {
+struct ViewAccess {
   std::string at;           ///< ADDRESS:PORT; empty: 127.0.0.1:8765.
   bool control = false;     ///< As `ViewFlags`.
   bool no_control = false;  ///< As `ViewFlags`.
@@ -34,7 +34,7 @@ struct ViewPlace {
 /// Serves the page and the map and says its address; `range`: first and last time of what can be
 /// played back, ns. Throws InputError.
 std::shared_ptr<LiveServer> serve_view(
-    const ViewPlace& place,
+    const ViewAccess& access,
     const std::shared_ptr<const SurfelMap>& map,
     const std::optional<std::pair<std::int64_t, std::int64_t>>& range = std::nullopt);
 

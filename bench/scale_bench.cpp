@@ -1,5 +1,6 @@
 // How cost grows with the map: opening and the first scan with nothing in the page cache and with
-// everything there, scans from many places, and the memory of one and of ten processes on one map.
+// everything there, scans from many positions, and the memory of one and of ten processes on one
+// map.
 // `./dev bench scale MAP..`; see BENCHMARK.md.
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -38,7 +39,7 @@ void forget(const std::string& path) {
   ::close(file);
 }
 
-/// A free place in the map: 0.5 to 3 m from the nearest surfel.
+/// A free position in the map: 0.5 to 3 m from the nearest surfel.
 Vector3d place_in(const SurfelMap& map, std::uint64_t number) {
   const RandomStream random(1, StreamId::kTest, 0);
   const Aabb& b = map.bounds_world();
@@ -75,7 +76,7 @@ double kilobytes(const std::string& key) {
   return 0.0;
 }
 
-/// Memory of `count` processes that each scan from the same places: MB, on average. Pss is what
+/// Memory of `count` processes that each scan from the same positions: MB, on average. Pss is what
 /// each takes of what all share.
 nlohmann::ordered_json memory_of(const std::string& path, const BeamPlan& plan, int count) {
   int done[2];

@@ -29,7 +29,7 @@ class Nothing : public SampleSink {
   void on_sample(const Sample& /*sample*/) override {}
 };
 
-/// Vehicles at free places that fly 8 m and back, and obstacles.
+/// Vehicles at free positions that fly 8 m and back, and obstacles.
 Scenario scenario_for(const Flags& flags, const SurfelMap& map, int vehicles) {
   Scenario s;
   s.duration = flags.seconds;

@@ -17,7 +17,7 @@ using pointflight::quaternion_from_rotation_vector;
 using pointflight::rotation_vector;
 using pointflight::to_seconds;
 
-// places in the error state
+// positions in the error state
 constexpr int kRotation = 0, kPosition = 3, kVelocity = 6, kGyroBias = 9, kAccelBias = 12,
               kGravity = 15;
 constexpr double kGravityLength = 9.81;  // m/s^2

@@ -42,7 +42,7 @@ std::optional<Plane> PointMap::plane_at(const Vector3d& point) const {
     for (const Vector3d& other : voxel->second) {
       const double distance = (other - point).squaredNorm();
       if (distance >= distances.back()) continue;
-      // into its place among the nearest
+      // into its position among the nearest
       std::size_t at = std::min(found, kNearest - 1);
       for (; at > 0 && distances[at - 1] > distance; --at) {
         distances[at] = distances[at - 1];

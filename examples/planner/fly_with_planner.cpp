@@ -66,16 +66,16 @@ class Eyes : public SampleSink {
                  "  collision at %.2f s with %s at (%.2f, %.2f, %.2f)\n",
                  to_seconds(event.time),
                  event.partner == kMapLabel ? "the map" : "an obstacle",
-                 event.place_world.x(),
-                 event.place_world.y(),
-                 event.place_world.z());
+                 event.position_world.x(),
+                 event.position_world.y(),
+                 event.position_world.z());
   }
 
   FlightRecorder* recorder_;
 };
 
-/// A free place near x, y in the flight layer.
-Vector3d free_place(const SurfelMap& map, double x, double y, const RandomStream& random) {
+/// A free position near x, y in the flight layer.
+Vector3d free_position(const SurfelMap& map, double x, double y, const RandomStream& random) {
   for (std::uint64_t i = 0; i < 2000; ++i) {
     const double spread = 0.5 + 0.002 * static_cast<double>(i);
     const auto [u, v] = random.uniform2(i);
@@ -98,8 +98,8 @@ Scenario scenario_for(const Options& options, const SurfelMap& map, int seed, Ve
   s.seed = seed;
   s.duration = 120.0;
   VehicleSetup& drone = s.vehicles.front();
-  drone.start = free_place(map, along(0.08), across(0), places);
-  goal = free_place(map, along(0.92), across(1), random);
+  drone.start = free_position(map, along(0.08), across(0), places);
+  goal = free_position(map, along(0.92), across(1), random);
   // one looks up, one down: a Mid-360 alone is blind for what comes from below
   LidarMount up;
   LidarMount down;

@@ -58,7 +58,7 @@ double Planner::room(const Trajectory& trajectory, double time, double skip) con
   return least;
 }
 
-/// A* over cells towards the goal, or to the best place within the horizon.
+/// A* over cells towards the goal, or to the best position within the horizon.
 std::vector<Vector3d> Planner::search(const Vector3d& from, double time) const {
   struct Open {
     double estimate;
@@ -89,7 +89,7 @@ std::vector<Vector3d> Planner::search(const Vector3d& from, double time) const {
       best = node.cell;
       break;
     }
-    // should there be no way out: the place that promises most
+    // should there be no way out: the position that promises most
     const double score = left(p) + 0.3 * so_far;
     if (score < best_score) {
       best_score = score;
@@ -104,7 +104,7 @@ std::vector<Vector3d> Planner::search(const Vector3d& from, double time) const {
       const Vector3d q = p + LocalMap::kCell * d.cast<double>();
       if (!map_.contains(q) || q.z() < options_.height_min || q.z() > options_.height_max) continue;
       const double room = room_at(q, time, away / options_.speed);
-      // out of a tight place any way is good that leads to more room
+      // out of a tight position any way is good that leads to more room
       if (room < kMargin && room <= room_at(p, time, away / options_.speed)) continue;
       const double tight = std::clamp((kComfort - room) / kComfort, 0.0, 1.5);
       const double step = LocalMap::kCell *

@@ -23,14 +23,14 @@ class InputError : public std::runtime_error {
   }
 };
 
-/// Runs `action` for what the key of a settings file names; an InputError in it is given the place
-/// of the key ("scenario.yaml:7") in front.
+/// Runs `action` for what the key of a settings file names; an InputError in it is given the
+/// location of the key ("scenario.yaml:7") in front.
 template <class Action>
-auto at_key(const std::string& place, const std::string& key, const Action& action) {
+auto at_key(const std::string& location, const std::string& key, const Action& action) {
   try {
     return action();
   } catch (const InputError& error) {
-    throw InputError(place + ": " + key + ": " + error.what());
+    throw InputError(location + ": " + key + ": " + error.what());
   }
 }
 

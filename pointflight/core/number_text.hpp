@@ -13,7 +13,7 @@ std::string fixed_text(double value, int decimals);
 /// comes of arithmetic; 0, not -0. Files that are read again keep all digits.
 std::string plain_text(double value);
 
-/// A place for people: "(1.00, -2.50, 0.00)".
+/// A position for people: "(1.00, -2.50, 0.00)".
 std::string point_text(const Eigen::Vector3d& point, int decimals = 2);
 
 }  // namespace pointflight

@@ -15,7 +15,7 @@ enum class StreamId : std::uint32_t {
   kImuAccelBias = 5,     ///< index: sample * 3 + axis
   kForest = 6,           ///< layout of the parametric forest; index: draw number
   kCloudSampling = 7,    ///< points on analytic shapes; entity: shape, index: point
-  kMissionSearch = 8,    ///< candidate places in `scenario new`; index: candidate
+  kMissionSearch = 8,    ///< candidate positions in `scenario new`; index: candidate
   // 9: was blocks of a cloud, now a plain hash
   kScenePoses = 10,       ///< where sensors stand in an exact scene; index: try
   kAimedBeams = 11,       ///< beams at the targets of a small scene; entity: pose, index: beam

@@ -11,8 +11,8 @@ namespace pointflight {
 /// built from.
 std::string data_folder();
 
-/// One more place for `data_folder` to look. The CMake package calls this in programs that link it,
-/// so that they find the data of whatever prefix it lies in. Returns true.
+/// One more folder for `data_folder` to look in. The CMake package calls this in programs that link
+/// it, so that they find the data of whatever prefix it lies in. Returns true.
 bool add_data_folder(const std::string& folder);
 
 /// True for what `find_model` takes as a path: it contains '/' or ends in ".yaml", or in ".json" or

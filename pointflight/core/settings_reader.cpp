@@ -59,7 +59,7 @@ std::string closest_word(std::string_view word, const std::vector<std::string>& 
   return best;
 }
 
-/// The parsed file and the place in it where the visitor stands.
+/// The parsed file and the location in it where the visitor stands.
 struct SettingsReader::Document {
   struct Level {
     YAML::Node node;
@@ -83,14 +83,14 @@ struct SettingsReader::Document {
   };
   std::vector<Condition> conditions;
 
-  [[nodiscard]] std::string place(const YAML::Node& node) const {
+  [[nodiscard]] std::string location(const YAML::Node& node) const {
     return fmt::format("{}:{}", name, node.Mark().line + 1);
   }
 
   [[noreturn]] void fail(const YAML::Node& node,
                          const std::string& path,
                          const std::string& what) const {
-    throw InputError(fmt::format("{}: {}: {}", place(node), path, what));
+    throw InputError(fmt::format("{}: {}: {}", location(node), path, what));
   }
 
   void parse(std::string_view text) {

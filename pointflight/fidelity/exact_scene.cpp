@@ -76,13 +76,13 @@ std::vector<std::string_view> fields_of(std::string_view line) {
   }
 }
 
-Row row_of(std::string_view line, const std::string& place) {
+Row row_of(std::string_view line, const std::string& location) {
   const auto fields = fields_of(line);
   Row row;
   if (fields.size() < 3 || fields.size() > 2 + row.v.size()) {
     throw InputError(
         fmt::format("{}: {} columns; it takes shape,tag,x0,y0,z0,x1,y1,z1,x2,y2,z2,r0,r1",
-                    place,
+                    location,
                     fields.size()));
   }
   row.shape = fields[0];
@@ -90,41 +90,41 @@ Row row_of(std::string_view line, const std::string& place) {
   for (std::size_t i = 2; i < fields.size(); ++i) {
     if (fields[i].empty()) continue;
     if (!parse_number(fields[i], row.v[i - 2]) || !(std::abs(row.v[i - 2]) < 1e9)) {
-      throw InputError(fmt::format("{}: '{}' is not a number", place, excerpt(fields[i])));
+      throw InputError(fmt::format("{}: '{}' is not a number", location, excerpt(fields[i])));
     }
   }
   return row;
 }
 
-Shape shape_of(const Row& row, const std::string& place) {
+Shape shape_of(const Row& row, const std::string& location) {
   if (row.shape == "triangle") return Triangle{row.point(0), row.point(3), row.point(6)};
   if (row.shape == "cone") {
     if (row.v[9] < 0.0 || row.v[10] < 0.0 || row.v[9] + row.v[10] <= 0.0 ||
         (row.point(3) - row.point(0)).norm() < 1e-6) {
       throw InputError(
-          fmt::format("{}: a cone needs an axis and a radius r0 or r1 above 0", place));
+          fmt::format("{}: a cone needs an axis and a radius r0 or r1 above 0", location));
     }
     return Cone{row.point(0), row.point(3), row.v[9], row.v[10]};
   }
   if (row.shape == "disc") {
     if (row.v[9] <= 0.0 || row.point(3).norm() < 1e-6) {
       throw InputError(
-          fmt::format("{}: a disc needs a normal x1,y1,z1 and a radius r0 above 0", place));
+          fmt::format("{}: a disc needs a normal x1,y1,z1 and a radius r0 above 0", location));
     }
     return Disc{row.point(0), row.point(3).normalized(), row.v[9]};
   }
-  throw InputError(
-      fmt::format("{}: '{}' is no shape; known: triangle, cone, disc", place, excerpt(row.shape)));
+  throw InputError(fmt::format(
+      "{}: '{}' is no shape; known: triangle, cone, disc", location, excerpt(row.shape)));
 }
 
 void read_shapes(std::string_view text, const std::string& path, ExactScene& scene) {
   LineCursor lines(text);
   for (std::string_view line; lines.next(line);) {
     if (line.empty() || line.starts_with('#') || line.starts_with("shape,")) continue;
-    const std::string place = fmt::format("{}: line {}", path, lines.number());
-    const Row row = row_of(line, place);
+    const std::string location = fmt::format("{}: line {}", path, lines.number());
+    const Row row = row_of(line, location);
     const std::size_t first = scene.geometry.shapes.size();
-    scene.geometry.shapes.push_back(shape_of(row, place));
+    scene.geometry.shapes.push_back(shape_of(row, location));
     scene.tag_from(first, row.tag);
   }
   if (scene.geometry.shapes.empty()) throw InputError(fmt::format("{}: no shapes", path));

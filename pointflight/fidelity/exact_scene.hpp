@@ -20,7 +20,7 @@ struct ExactScene {
   /// Points of each shape relative to the rest of the cloud; empty: all 1.
   std::vector<float> shape_density;
   std::vector<bool> is_target;  ///< Of each shape: small scenes aim their beams at these.
-  std::vector<Pose> poses;      ///< Where sensors stand; empty: random places in `free`.
+  std::vector<Pose> poses;      ///< Where sensors stand; empty: random positions in `free`.
   Aabb free;                    ///< Sensors stand in it, at least 0.3 m from every shape.
 
   /// Adds a tag for the shapes from number `first` on. `density` and `target` as above.

@@ -6,9 +6,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <nanoflann.hpp>
 
 #include "pointflight/core/input_error.hpp"
+#include "pointflight/geometry/internal/point_tree.hpp"
 #include "pointflight/io/cloud_reader.hpp"
 
 namespace pointflight {
@@ -18,78 +18,7 @@ constexpr double kSupportRadius = 0.25;  // m
 constexpr std::size_t kSupportPoints = 16;
 constexpr float kRangeMax = 1000.0f;  // a late hit must be seen as late
 
-/// Points in nanoflann's tree, as it asks for them.
-struct PointTree {
-  std::vector<Vector3f> points;  ///< World, from `origin`.
-  Vector3d origin = Vector3d::Zero();
-
-  [[nodiscard]] std::size_t kdtree_get_point_count() const { return points.size(); }
-  [[nodiscard]] double kdtree_get_pt(std::size_t i, std::size_t axis) const {
-    return static_cast<double>(points[i][static_cast<int>(axis)]);
-  }
-  template <class Bounds>
-  bool kdtree_get_bbox(Bounds& /*box*/) const {
-    return false;
-  }
-  using Index = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, PointTree>,
-                                                    PointTree,
-                                                    3,
-                                                    std::uint32_t>;
-  std::unique_ptr<Index> index;
-
-  void build() {
-    index = std::make_unique<Index>(3, *this, nanoflann::KDTreeSingleIndexAdaptorParams(16));
-  }
-};
-
-/// nanoflann's result set that stops once enough points are found.
-// NOLINTBEGIN(readability-identifier-naming): nanoflann asks for these names
-class EnoughPoints {
- public:
-  using DistanceType = double;
-  EnoughPoints(double radius, std::size_t wanted) : squared_(radius * radius), wanted_(wanted) {}
-  [[nodiscard]] bool addPoint(double squared, std::uint32_t /*index*/) {
-    count_ += squared < squared_ ? 1 : 0;
-    return count_ < wanted_;
-  }
-  [[nodiscard]] double worstDist() const { return squared_; }
-  [[nodiscard]] bool full() const { return true; }
-  [[nodiscard]] std::size_t size() const { return count_; }
-  void sort() {}
-  [[nodiscard]] bool enough() const { return count_ >= wanted_; }
-
- private:
-  double squared_;
-  std::size_t wanted_;
-  std::size_t count_ = 0;
-};
-
-/// nanoflann's result set of all points within a radius, by their distance. (Its own one holds
-/// pairs up to version 1.4 and a type of its own from 1.5 on.)
-class PointsWithin {
- public:
-  using DistanceType = double;
-  struct Item {
-    std::uint32_t index;
-    double squared;
-  };
-  explicit PointsWithin(double radius) : squared_(radius * radius) {}
-  bool addPoint(double squared, std::uint32_t index) {
-    if (squared < squared_) items_.push_back({index, squared});
-    return true;
-  }
-  [[nodiscard]] double worstDist() const { return squared_; }
-  [[nodiscard]] bool full() const { return true; }
-  [[nodiscard]] std::size_t size() const { return items_.size(); }
-  void sort() { std::ranges::sort(items_, {}, &Item::squared); }
-  void clear() { items_.clear(); }
-  [[nodiscard]] const std::vector<Item>& items() const { return items_; }
-
- private:
-  double squared_;
-  std::vector<Item> items_;
-};
-// NOLINTEND(readability-identifier-naming)
+using FloatTree = PointTree<Vector3f>;
 
 }  // namespace
 
@@ -110,29 +39,31 @@ std::vector<RealScan> read_real_scans(const SurveySource& survey, const Progress
   return scans;
 }
 
-struct SupportCloud::Tree : PointTree {};
+struct SupportCloud::Tree {
+  Vector3d origin;  ///< World; the points are given from here.
+  FloatTree points;
+};
 
-SupportCloud::SupportCloud(const std::string& path) : tree_(std::make_unique<Tree>()) {
+SupportCloud::SupportCloud(const std::string& path) {
   const auto reader = open_cloud(path);
   std::vector<CloudPoint> batch;
+  Vector3d origin = Vector3d::Zero();
+  std::vector<Vector3f> points;
   while (reader->read(batch)) {
     for (const CloudPoint& point : batch) {
       if (!point.position.allFinite()) continue;
-      if (tree_->points.empty()) tree_->origin = point.position;
-      tree_->points.emplace_back((point.position - tree_->origin).cast<float>());
+      if (points.empty()) origin = point.position;
+      points.emplace_back((point.position - origin).cast<float>());
     }
   }
-  if (tree_->points.empty()) throw InputError(fmt::format("{}: no points", path));
-  tree_->build();
+  if (points.empty()) throw InputError(fmt::format("{}: no points", path));
+  tree_ = std::make_unique<Tree>(Tree{origin, FloatTree(std::move(points))});
 }
 
 SupportCloud::~SupportCloud() = default;
 
 bool SupportCloud::supports(const Vector3d& point_world) const {
-  EnoughPoints result(kSupportRadius, kSupportPoints);
-  const Vector3d query = point_world - tree_->origin;
-  tree_->index->findNeighbors(result, query.data(), {});
-  return result.enough();
+  return tree_->points.has_within(point_world - tree_->origin, kSupportRadius, kSupportPoints);
 }
 
 std::vector<ComparedRay> compare_scan(const RealScan& scan,
@@ -162,20 +93,24 @@ std::vector<ComparedRay> compare_scan(const RealScan& scan,
   return compared;
 }
 
-struct ScanPlanes::Tree : PointTree {
+struct ScanPlanes::Tree {
+  Vector3d origin;  ///< World; the points are given from here.
+  FloatTree points;
   std::vector<std::uint32_t> scan;  ///< Of each point.
 };
 
-ScanPlanes::ScanPlanes(const std::vector<RealScan>& scans)
-    : scans_(scans), tree_(std::make_unique<Tree>()) {
-  if (!scans.empty()) tree_->origin = scans.front().T_world_sensor.translation;
+ScanPlanes::ScanPlanes(const std::vector<RealScan>& scans) : scans_(scans) {
+  Vector3d origin = Vector3d::Zero();
+  if (!scans.empty()) origin = scans.front().T_world_sensor.translation;
+  std::vector<Vector3f> points;
+  std::vector<std::uint32_t> scan_of;
   for (std::uint32_t i = 0; i < scans.size(); ++i) {
     for (const SurveyRay& ray : scans[i].rays) {
-      tree_->points.emplace_back((ray.point_world() - tree_->origin).cast<float>());
-      tree_->scan.push_back(i);
+      points.emplace_back((ray.point_world() - origin).cast<float>());
+      scan_of.push_back(i);
     }
   }
-  tree_->build();
+  tree_ = std::make_unique<Tree>(Tree{origin, FloatTree(std::move(points)), std::move(scan_of)});
 }
 
 ScanPlanes::~ScanPlanes() = default;
@@ -188,19 +123,15 @@ ErrorCollector ScanPlanes::compare(std::size_t scan, const Executor& executor) c
   // NaN if there is no plane
   std::vector<double> ranges(count, std::numeric_limits<double>::quiet_NaN());
   executor.parallel_for(count, 256, [&](std::size_t begin, std::size_t end) {
-    PointsWithin near(kSupportRadius);
     for (std::size_t i = begin; i < end; ++i) {
       const SurveyRay& ray = own.rays[i * kStride];
-      const Vector3d place = ray.point_world() - tree_->origin;
-      near.clear();
-      tree_->index->findNeighbors(near, place.data(), {});
-      near.sort();
+      const Vector3d position = ray.point_world() - tree_->origin;
       Vector3d sum = Vector3d::Zero();
       Matrix3d products = Matrix3d::Zero();
       double n = 0.0;
-      for (const auto& [index, squared] : near.items()) {
+      for (const auto& [index, squared] : tree_->points.within(position, kSupportRadius)) {
         if (tree_->scan[index] == scan) continue;
-        const Vector3d q = tree_->points[index].cast<double>() - place;
+        const Vector3d q = tree_->points.points()[index].cast<double>() - position;
         sum += q;
         products += q * q.transpose();
         n += 1.0;

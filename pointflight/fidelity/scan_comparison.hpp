@@ -29,7 +29,7 @@ struct RealScan {
 /// All scans of a survey. Throws InputError.
 std::vector<RealScan> read_real_scans(const SurveySource& survey, const Progress& progress = {});
 
-/// Which places a cloud supports: those with 16 or more of its points within 25 cm.
+/// Which positions a cloud supports: those with 16 or more of its points within 25 cm.
 class SupportCloud {
  public:
   /// Reads the whole cloud. Throws InputError.

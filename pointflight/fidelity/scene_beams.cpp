@@ -19,7 +19,7 @@ namespace {
 constexpr double kFreeRadius = 0.3;                // m
 constexpr double kBeside = 0.2 * kDegree;          // where silhouettes are looked for
 constexpr double kJump = ErrorStatistics::kRight;  // m
-constexpr double kAimSpread = 0.1;                 // m, around the places aimed at
+constexpr double kAimSpread = 0.1;                 // m, around the positions aimed at
 
 BeamPlan grid_plan(const std::string& name,
                    std::array<int, 2> size,

@@ -54,7 +54,7 @@ struct SceneBeams {
 
 /// Casts the beams into the exact shapes. A silhouette is where one of sixteen rays 0.1 and
 /// 0.2 degrees around the beam ends more than 0.1 m off the plane that the beam hits. Throws
-/// InputError if no free place for a sensor is found.
+/// InputError if no free position for a sensor is found.
 SceneBeams cast_exactly(const ExactScene& scene,
                         const BeamPlan& plan,
                         const Executor& executor,

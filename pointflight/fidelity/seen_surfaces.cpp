@@ -2,21 +2,21 @@
 
 #include <algorithm>
 
-#include "pointflight/survey/place_cells.hpp"
+#include "pointflight/survey/grid_cells.hpp"
 
 namespace pointflight {
 namespace {
 
 constexpr double kReach = 1e4;  // m from the origin: whole numbers of cells
 
-Vector3d corner_of(const PlaceCell& cell) {
+Vector3d corner_of(const GridCell& cell) {
   return SeenSurfaces::kNear * Vector3d(static_cast<double>(cell[0]),
                                         static_cast<double>(cell[1]),
                                         static_cast<double>(cell[2]));
 }
 
-/// Eighth of a cell that a place lies in, and quarter of a face of the cube around that a direction
-/// goes through: 0 to 191.
+/// Eighth of a cell that a position lies in, and quarter of a face of the cube around that a
+/// direction goes through: 0 to 191.
 std::uint8_t kind_of(const Vector3f& from_corner, const Vector3f& direction) {
   int axis = 0;
   direction.cwiseAbs().maxCoeff(&axis);
@@ -37,10 +37,10 @@ void SeenSurfaces::add(const SurveyRay& ray) {
   if (!ray.is_return) return;
   const Vector3d p = ray.point_world();
   if (!is_in_reach(p)) return;
-  const PlaceCell cell = place_cell(p, kNear);
+  const GridCell cell = grid_cell(p, kNear);
   const Vector3f from_corner = (p - corner_of(cell)).cast<float>();
   const std::uint8_t kind = kind_of(from_corner, ray.direction_world);
-  std::vector<Return>& returns = cells_[place_key(cell)];
+  std::vector<Return>& returns = cells_[grid_key(cell)];
   const bool known = std::any_of(
       returns.begin(), returns.end(), [&](const Return& other) { return other.kind == kind; });
   if (!known) returns.push_back({from_corner, ray.direction_world, kind});
@@ -48,10 +48,10 @@ void SeenSurfaces::add(const SurveyRay& ray) {
 
 bool SeenSurfaces::has(const Vector3d& point_world, const Vector3f& normal_world) const {
   if (!is_in_reach(point_world)) return false;
-  const PlaceCell middle = place_cell(point_world, kNear);
+  const GridCell middle = grid_cell(point_world, kNear);
   for (std::int64_t i = 0; i < 27; ++i) {
-    const PlaceCell near = neighbour(middle, i);
-    const auto cell = cells_.find(place_key(near));
+    const GridCell near = neighbour(middle, i);
+    const auto cell = cells_.find(grid_key(near));
     if (cell == cells_.end()) continue;
     const Vector3f p = (point_world - corner_of(near)).cast<float>();
     const bool seen =

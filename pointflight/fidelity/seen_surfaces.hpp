@@ -12,7 +12,7 @@ namespace pointflight {
 /// its front says nothing about its back, however thin it is.
 class SeenSurfaces {
  public:
-  static constexpr double kNear = 0.1;  ///< m: a return so near has seen a place.
+  static constexpr double kNear = 0.1;  ///< m: a return so near has seen a position.
 
   /// Adds a return; rays without one show no surface.
   void add(const SurveyRay& ray);
@@ -25,7 +25,7 @@ class SeenSurfaces {
   struct Return {
     Vector3f from_corner;      ///< Of its cell, m.
     Vector3f direction_world;  ///< Of the ray.
-    std::uint8_t kind;         ///< Same place and direction, roughly: one stands for all.
+    std::uint8_t kind;         ///< Same position and direction, roughly: one stands for all.
   };
   std::unordered_map<std::uint64_t, std::vector<Return>> cells_;
 };

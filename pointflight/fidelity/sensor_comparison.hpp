@@ -1,4 +1,4 @@
-// Real scans beside what a sensor file makes of the same place: how many beams come back from
+// Real scans beside what a sensor file makes of the same scene: how many beams come back from
 // where, and where returns lie at edges.
 #pragma once
 

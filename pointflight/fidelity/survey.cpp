@@ -15,7 +15,7 @@
 #include "pointflight/io/pcd_writer.hpp"
 #include "pointflight/io/pose_files.hpp"
 #include "pointflight/lidar/lidar.hpp"
-#include "pointflight/survey/place_cells.hpp"
+#include "pointflight/survey/grid_cells.hpp"
 
 namespace pointflight {
 namespace {
@@ -121,7 +121,7 @@ class ThinnedCloud : public CloudReader {
     batch.clear();
     while (batch.empty() && cloud_->read(read_)) {
       for (const CloudPoint& point : read_) {
-        if (kept_.insert(place_key(place_cell(point.position, width_))).second)
+        if (kept_.insert(grid_key(grid_cell(point.position, width_))).second)
           batch.push_back(point);
       }
     }

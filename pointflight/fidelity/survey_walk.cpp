@@ -16,9 +16,9 @@ namespace pointflight {
 namespace {
 
 constexpr double kWalkFree = 0.4;   // m around the sensor on its way
-constexpr double kPlaceFree = 0.3;  // m around a place to look from
+constexpr double kPlaceFree = 0.3;  // m around a position to look from
 constexpr std::size_t kLooks = 200;
-constexpr double kStep = 0.2;     // m between places of a leg that are looked at
+constexpr double kStep = 0.2;     // m between positions of a leg that are looked at
 constexpr double kLegMin = 2.0;   // m
 constexpr double kLegMax = 15.0;  // m
 constexpr double kSway = 3.0 * kDegree;
@@ -46,7 +46,7 @@ Aabb bounds_of(const ExactScene& scene) {
   return box;
 }
 
-/// Straight legs through free places.
+/// Straight legs through free positions.
 class Way {
  public:
   Way(const ExactScene& scene, const SceneTree& tree, const SurveyOptions& options)
@@ -66,7 +66,7 @@ class Way {
     }
   }
 
-  /// Corners of a walk of at least `length` m, or the only place that can be stood at.
+  /// Corners of a walk of at least `length` m, or the only position that can be stood at.
   [[nodiscard]] std::vector<Vector3d> corners(double length) const {
     std::vector<Vector3d> best;
     double best_length = -1.0;
@@ -99,7 +99,7 @@ class Way {
     return place;
   }
 
-  /// To the place that was visited least among those in reach, the nearest first.
+  /// To the position that was visited least among those in reach, the nearest first.
   double walk(std::size_t at, double length, std::vector<Vector3d>& way) const {
     std::vector<int> visits(places_.size(), 0);
     std::vector<std::int8_t> legs(places_.size() * places_.size(), -1);

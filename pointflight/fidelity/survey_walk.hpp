@@ -16,7 +16,7 @@ struct SurveyOptions {
   double speed = 1.0;       ///< m/s
   double tilt_deg = 15.0;   ///< The sensor looks down ahead: level, it would miss the near ground.
   double noise = 0.01;      ///< Deviation of the ranges, m.
-  double shake = 0.005;     ///< Deviation of each scan's believed place, per axis, m.
+  double shake = 0.005;     ///< Deviation of each scan's believed position, per axis, m.
   double shake_deg = 0.03;  ///< Of its believed attitude, about each axis.
   std::uint64_t seed = 1;   ///< Of the way and all noise.
 };
@@ -37,7 +37,7 @@ std::vector<TimedPose> make_walk(const ExactScene& scene,
                                  const SurveyOptions& options,
                                  Duration scan_period);
 
-/// Free places near a walk: 0.5 to 1.5 m beside it, up to 0.5 m above or below, 0.3 m from
+/// Free positions near a walk: 0.5 to 1.5 m beside it, up to 0.5 m above or below, 0.3 m from
 /// everything, level, with any heading. Throws InputError if there are not as many.
 std::vector<Pose> places_near(const ExactScene& scene,
                               const SceneTree& tree,

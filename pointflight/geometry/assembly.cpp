@@ -30,7 +30,7 @@ Blade blade_at(const Propeller& propeller, int number, SimTime time) {
   return blade;
 }
 
-/// False if a ray stays farther than `radius` from a place, or has it behind.
+/// False if a ray stays farther than `radius` from a position, or has it behind.
 bool comes_near(const Vector3d& place, double radius, const Vector3d& o, const Vector3d& d) {
   const Vector3d way = place - o;
   const double along = way.dot(d);

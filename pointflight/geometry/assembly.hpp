@@ -29,7 +29,7 @@ struct Propeller {
   double phase = 0.0;  ///< Angle of the first blade from x at time zero, rad.
 };
 
-/// Solids and propellers that keep their places in one frame.
+/// Solids and propellers that keep their positions in one frame.
 struct Assembly {
   std::vector<AssemblyPart> parts;    ///< In any order.
   std::vector<Propeller> propellers;  ///< In any order.

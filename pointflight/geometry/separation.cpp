@@ -236,7 +236,7 @@ Separation separation(const Solid& a,
   if (std::holds_alternative<Sphere>(a)) {
     const Vector3d center = T_world_b.inverse() * T_world_a.translation;
     Separation s = ball_to_core(center, core_a.radius, core_b, b);
-    s.place = T_world_b * s.place;
+    s.point = T_world_b * s.point;
     return s;
   }
   const Pose T_a_b = T_world_a.inverse() * T_world_b;

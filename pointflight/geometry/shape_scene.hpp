@@ -99,7 +99,7 @@ struct ForestOptions {
   double height_min = 6.0;           ///< Of a trunk, m.
   double height_max = 14.0;          ///< Of a trunk, m.
   double min_spacing = 2.0;          ///< Least distance between trunks, m.
-  std::uint64_t seed = 1;            ///< Of places, sizes and branches.
+  std::uint64_t seed = 1;            ///< Of positions, sizes and branches.
 };
 
 /// A forest from x, y = 0 to (size_x, size_y), ground around z = 0. Deterministic in the options.

@@ -69,7 +69,7 @@ struct Separation {
   /// m; if they overlap, minus the shortest way that takes them apart (with a cylinder against
   /// anything but a ball: at most a little longer than the shortest).
   double distance;
-  Vector3d place;  ///< A point of the second solid nearest to the first one.
+  Vector3d point;  ///< A point of the second solid nearest to the first one.
 };
 
 /// Distance between solids a and b at their poses: closed form if one is a ball, else the

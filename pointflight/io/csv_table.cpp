@@ -73,7 +73,7 @@ void CsvTable::parse(std::string_view text) {
   if (rows_ == 0) throw InputError(fmt::format("{}: no rows; names, then numbers", name_));
 }
 
-std::string CsvTable::place(std::size_t row) const {
+std::string CsvTable::location(std::size_t row) const {
   return fmt::format("{}:{}", name_, lines_.at(row));
 }
 

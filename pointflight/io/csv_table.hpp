@@ -30,7 +30,7 @@ class CsvTable {
   [[nodiscard]] int require(std::string_view prefix) const;
 
   /// "file:line" of a row, for messages. Throws std::out_of_range if there is no such row.
-  [[nodiscard]] std::string place(std::size_t row) const;
+  [[nodiscard]] std::string location(std::size_t row) const;
 
   /// NaN for an empty cell. `row` below rows(), `column` as `find` or `require` gave it and not -1:
   /// debug builds assert it.

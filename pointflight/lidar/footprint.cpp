@@ -59,7 +59,7 @@ bool lie_in_plane(std::span<const BeamPart> parts, const SubRays& sub_rays) {
     mean += inverse / static_cast<float>(parts.size());
     along_x += inverse * sub_rays[i].x;
     along_y += inverse * sub_rays[i].y;
-    xx += sub_rays[i].x * sub_rays[i].x;  // the same in y, and none in x y: places on a circle
+    xx += sub_rays[i].x * sub_rays[i].x;  // the same in y, and none in x y: positions on a circle
   }
   for (std::size_t i = 0; i < parts.size(); ++i) {
     const float inverse = mean + (along_x * sub_rays[i].x + along_y * sub_rays[i].y) / xx;

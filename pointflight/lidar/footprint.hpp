@@ -48,7 +48,7 @@ class Footprint {
              const Executor& executor) const;
 
  private:
-  /// A sub-ray: its place across the beam in sigmas, and its share of the light.
+  /// A sub-ray: its position across the beam in sigmas, and its share of the light.
   struct SubRay {
     float x, y, share;
   };

@@ -20,7 +20,7 @@ namespace pointflight {
 
 /// Which scan to take.
 struct ScanRequest {
-  std::uint64_t index = 0;  ///< Scan number: `Lidar::pattern_scan`, and its place among draws.
+  std::uint64_t index = 0;  ///< Scan number: `Lidar::pattern_scan`, and its number among draws.
   SimTime start;            ///< When it starts in the run.
   bool snapshot = false;    ///< All beams from the pose at the scan's middle, as in the paper.
   bool noise = true;        ///< Of ranges and directions, by the sensor file.
@@ -70,7 +70,7 @@ class Lidar {
 
   /// Which scan of its pattern is scan `index` of a run with this seed. Where returns are modelled
   /// a run starts anywhere in a pattern that does not repeat: all sensors of one model at the same
-  /// place.
+  /// scan.
   [[nodiscard]] std::uint64_t pattern_scan(std::uint64_t index, std::uint64_t seed) const;
   /// The beams of a scan of the pattern.
   [[nodiscard]] std::vector<Beam> beams(std::uint64_t pattern_scan,

@@ -92,7 +92,7 @@ double beams_a_scan(const LidarSettings& s) {
 
 void check(const LidarSettings& settings) {
   const auto fail = [&](const char* key, const std::string& what) {
-    throw InputError(fmt::format("{}: {}: {}", settings.place(key), key, what));
+    throw InputError(fmt::format("{}: {}: {}", settings.location(key), key, what));
   };
   if (settings.range_min >= settings.range_max) {
     fail("range_min",

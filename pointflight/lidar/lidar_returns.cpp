@@ -64,7 +64,7 @@ void mark_unknown(const KnownSpace& known,
       });
 }
 
-/// `Scan::truth` of its points. `returns`: those of all beams, `most` places each.
+/// `Scan::truth` of its points. `returns`: those of all beams, room for `most` each.
 void add_truth(std::span<const Return> returns, const PoseTrack& T_world_sensor, Scan& scan) {
   scan.marks.truth = true;
   scan.truth.reserve(scan.points.size());
@@ -122,9 +122,9 @@ Lidar::Received Lidar::received(const Aimed& aimed,
       chance.normal = request.noise ? own.normal(2 * address) : 0.0;
       chance.detection = own.uniform(2 * address + 1);
       if (echo == Echoes::kMost) {
-        const auto [drop, drop_place] = weather.uniform2(address);
+        const auto [drop, drop_position] = weather.uniform2(address);
         chance.drop = drop;
-        chance.drop_place = drop_place;
+        chance.drop_position = drop_position;
       }
       return chance;
     };

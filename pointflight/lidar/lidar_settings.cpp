@@ -252,7 +252,7 @@ std::string lidar_reference() {
   return table.text();
 }
 
-std::string LidarSettings::place(const std::string& key) const {
+std::string LidarSettings::location(const std::string& key) const {
   const auto line = lines.find(key);
   return line == lines.end() ? path : fmt::format("{}:{}", path, line->second);
 }

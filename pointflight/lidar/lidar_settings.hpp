@@ -163,12 +163,12 @@ struct LidarSettings {
   std::map<std::string, int> lines;           ///< Of each key in the file, for messages.
 
   /// "mid360.yaml:12" for a key, or the path where the key is not in the file.
-  [[nodiscard]] std::string place(const std::string& key) const;
+  [[nodiscard]] std::string location(const std::string& key) const;
 
   /// Runs `action` for what a key names; an InputError in it also says where the key stands.
   template <class Action>
   auto at(const std::string& key, const Action& action) const {
-    return at_key(place(key), key, action);
+    return at_key(location(key), key, action);
   }
 };
 
@@ -181,7 +181,7 @@ void describe(SettingsVisitor& visitor, LidarSettings& settings);
 /// Markdown table of all keys.
 std::string lidar_reference();
 
-/// Refuses settings whose parts do not fit together. Throws InputError with the key's place.
+/// Refuses settings whose parts do not fit together. Throws InputError with the key's location.
 void check(const LidarSettings& settings);
 
 /// Reads a sensor by name ("mid360") or path; relative paths are taken from `base`. Beside sensor

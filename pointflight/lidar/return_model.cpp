@@ -157,7 +157,7 @@ Return ReturnModel::from_surface(const Echo& echo, const BeamChance& chance) con
 /// rated target on: sheets say nothing of signals so near and so weak, and their own law, which the
 /// sun flattens, would let a sensor see every wisp of haze.
 Return ReturnModel::from_air(double range, const BeamChance& chance) const {
-  const auto soft = weather_.soft(range, chance.drop, chance.drop_place);
+  const auto soft = weather_.soft(range, chance.drop, chance.drop_position);
   if (!soft || soft->range < range_min_) return {};
   const double margin = soft->strength / detection_.least_strength();
   if (chance.detection >= detection_.probability(margin)) return {};

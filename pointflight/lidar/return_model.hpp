@@ -38,11 +38,11 @@ Surroundings surroundings_in(const SurfelMap& map, Surroundings surroundings);
 
 /// The random part of one beam.
 struct BeamChance {
-  double normal = 0.0;      ///< Standard normal, of the range.
-  double detection = 0.0;   ///< Uniform in [0, 1): whether it comes back.
-  double place = 0.0;       ///< Uniform in [0, 1): where a false return lies.
-  double drop = 0.0;        ///< Uniform in [0, 1): what the air gives back (`Weather::soft`).
-  double drop_place = 0.0;  ///< Uniform in [0, 1).
+  double normal = 0.0;         ///< Standard normal, of the range.
+  double detection = 0.0;      ///< Uniform in [0, 1): whether it comes back.
+  double place = 0.0;          ///< Uniform in [0, 1): where a false return lies.
+  double drop = 0.0;           ///< Uniform in [0, 1): what the air gives back (`Weather::soft`).
+  double drop_position = 0.0;  ///< Uniform in [0, 1).
 };
 
 /// The random part of each echo of a beam; that of the air is `Echoes::kMost`.

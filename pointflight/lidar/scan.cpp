@@ -140,7 +140,7 @@ void read_scan_points(const std::string& path, std::span<const Beam> beams, Scan
     point.range = values[4];
     point.ring = integers[0];
     point.label = integers[1];
-    // in firing order: the next beam whose time and place are the point's
+    // in firing order: the next beam whose time and position are the point's
     const auto fits = [&](const Beam& b) {
       return static_cast<float>(to_seconds(b.time_offset)) == values[5] && b.ring == point.ring &&
              (b.origin_sensor + point.range * b.direction_sensor - point.position_sensor).norm() <=

@@ -15,7 +15,7 @@ namespace pointflight {
 
 /// Makes depths of what the left imager sees. With d = f B / z (pixels; f: `GridSettings::fx`, B:
 /// the baseline), a pixel in column u has no depth if
-/// - its place in the right image, u - d, lies outside of that: a band of d columns on the left,
+/// - its position in the right image, u - d, lies outside of that: a band of d columns on the left,
 /// - something nearer hides it from the right imager: a shadow on the left of what stands in front,
 /// - d is more than `StereoSettings::disparities`, or the surface is seen at a grazing angle,
 /// - the depth lies beyond the camera's limits.

@@ -10,10 +10,10 @@
 
 namespace pointflight {
 
-/// How high the ground is under each place of a streamed cloud: the lowest points of each column,
-/// without strays below, opened by a window (Zhang et al. 2003, with one window): what is narrower
-/// than the window and stands on the ground is no ground. Memory grows with the area, at most 1 GB:
-/// then columns grow.
+/// How high the ground is under each position of a streamed cloud: the lowest points of each
+/// column, without strays below, opened by a window (Zhang et al. 2003, with one window): what is
+/// narrower than the window and stands on the ground is no ground. Memory grows with the area, at
+/// most 1 GB: then columns grow.
 class GroundHeight {
  public:
   /// `window`: width of the widest thing that hides the ground, m.
@@ -25,7 +25,7 @@ class GroundHeight {
   /// To be called once, when all points are there. Throws InputError if there were none.
   void finish();
 
-  /// Height of the ground under a place; that of the nearest column if the place has none.
+  /// Height of the ground under a position; that of the nearest column if the position has none.
   [[nodiscard]] double at(double x, double y) const;
 
  private:
@@ -57,7 +57,7 @@ class GroundHeight {
   double column_;
   std::unordered_map<Cell, Column, HashCell> columns_;
   Heights ground_;
-  float usual_ = 0.0f;  ///< Median, for places far from all columns.
+  float usual_ = 0.0f;  ///< Median, for positions far from all columns.
 };
 
 }  // namespace pointflight

@@ -29,7 +29,7 @@ struct CellGrid {
 };
 
 /// The cells of a grid that rays of a survey crossed or ended in. Beside a map it lies as the
-/// section `known_space`: cell width, place and size of the grid, then a bit for each cell.
+/// section `known_space`: cell width, position and size of the grid, then a bit for each cell.
 class KnownSpace {
  public:
   /// Of sections in a map file.

@@ -129,7 +129,7 @@ QuaternionSteps steps_for_normal(const Eigen::Quaternionf& q) {
 }
 
 /// Steps of a centre along one axis, from 0 to 1023.
-int nearest_place(float center_voxels) {
+int nearest_position(float center_voxels) {
   return static_cast<int>(std::clamp(center_voxels * kPlaceSteps, 0.0f, 1023.0f));
 }
 
@@ -143,7 +143,7 @@ std::array<int, 3> place_for_plane(const Vector3f& center_voxels, const Vector3f
   std::array<int, 3> high{};
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const float at = center_voxels[static_cast<int>(axis)];
-    const int place = nearest_place(at);
+    const int place = nearest_position(at);
     nearest[axis] = place;
     off[axis] = static_cast<float>(place) + 0.5f - at * kPlaceSteps;
     low[axis] = place % kPlaceSteps == 0 ? 0 : -1;
@@ -177,9 +177,9 @@ SurfelWord encode(const Surfel& surfel) {
   const QuaternionSteps turn = planar ? steps_for_normal(q) : nearest_steps(q);
   const std::array<int, 3> place = planar
                                        ? place_for_plane(surfel.center_voxels, surfel.axes.col(0))
-                                       : std::array{nearest_place(surfel.center_voxels.x()),
-                                                    nearest_place(surfel.center_voxels.y()),
-                                                    nearest_place(surfel.center_voxels.z())};
+                                       : std::array{nearest_position(surfel.center_voxels.x()),
+                                                    nearest_position(surfel.center_voxels.y()),
+                                                    nearest_position(surfel.center_voxels.z())};
   SurfelWord word = thickness << 30;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     word |= static_cast<SurfelWord>(place[axis]) << (10 * axis);

@@ -8,7 +8,7 @@ namespace pointflight {
 struct SurfelScale {
   SurfelScale() : SurfelScale(1.0f) {}
   /// `r`: the map's resolution, m.
-  explicit SurfelScale(float r) : r_squared(r * r), place_step(r / 64.0f) {
+  explicit SurfelScale(float r) : r_squared(r * r), position_step(r / 64.0f) {
     for (int i = 0; i < 4; ++i) {
       thickness[i] = kThicknessClasses[i] * r;
       inverse_thickness[i] = 1.0f / thickness[i];
@@ -22,7 +22,7 @@ struct SurfelScale {
   }
 
   float r_squared;                      ///< r^2, m^2.
-  float place_step;                     ///< Of the surfels' places, m.
+  float position_step;                  ///< Of the surfels' positions, m.
   alignas(16) float thickness[4] = {};  ///< s0 of each class, m.
   /// 1 / thickness.
   alignas(16) float inverse_thickness[4] = {};

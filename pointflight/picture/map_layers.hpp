@@ -20,7 +20,7 @@ class MapLayers {
   /// True for what belongs to the ceiling, or hangs from it.
   [[nodiscard]] bool is_ceiling(const Vector3d& p_world) const;
 
-  /// Height of the floor near a place, m.
+  /// Height of the floor near a position, m.
   [[nodiscard]] double floor_at(const Vector3d& p_world) const;
 
   /// What holds nearly all surfels, world, m: stray points do not count.

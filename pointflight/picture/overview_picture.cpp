@@ -19,7 +19,8 @@ constexpr Color kSeen{0.25, 0.55, 0.95};
 constexpr Color kMoving{0.45, 0.2, 0.6};
 constexpr Color kNearFloor{0.93, 0.93, 0.93};
 constexpr Color kHighUp{0.45, 0.45, 0.47};
-constexpr double kAboveFlight = 1.0;  // m over the highest place of the flight that is still shown
+constexpr double kAboveFlight =
+    1.0;  // m over the highest position of the flight that is still shown
 
 /// What must be in the picture of a run.
 Aabb flight_box(const RunPicture& run) {
@@ -286,7 +287,7 @@ void draw_marks(Canvas& canvas, const Page& page, const RunPicture& run) {
   }
 }
 
-/// The same place as an eye sees it, with the flown ways.
+/// The same in perspective, with the flown paths.
 void draw_perspective(Canvas& canvas,
                       const Page& page,
                       const SurfelMap& map,

@@ -18,7 +18,7 @@ namespace pointflight::picture {
 void draw_map(const SurfelMap& map, const std::string& title, const std::string& path);
 
 /// Where a scan was taken.
-struct ScanPlace {
+struct ScanSetting {
   const SurfelMap& map;  ///< The map.
   Pose T_world_sensor;   ///< For all of the scan.
 };
@@ -28,7 +28,7 @@ struct ScanPlace {
 void draw_scan(const std::vector<Beam>& beams,
                const Scan& scan,
                const LidarSettings& lidar,
-               const ScanPlace& place,
+               const ScanSetting& place,
                const std::string& path);
 
 /// Top and side view of map, flown paths, obstacles, waypoints and what the LiDARs saw. The map

@@ -49,7 +49,7 @@ void RunPicture::on_sample(const Sample& sample) {
                  },
                  [&](const ScanSample& s) { add_scan(s); },
                  [&](const CollisionEvent& s) {
-                   if (s.entered) collisions.add(s.place_world);
+                   if (s.entered) collisions.add(s.position_world);
                  },
                  [&](const ObstacleSample& s) {
                    for (const auto& [label, pose, shape] : s.obstacles) {

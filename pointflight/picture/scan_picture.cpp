@@ -102,12 +102,12 @@ Aabb seen_box(const Scan& scan, const Pose& T_world_sensor) {
   return box;
 }
 
-/// The place around the sensor from the south west and above, with the scan's points as the sensor
-/// measured them, and the sensor's axes.
+/// The surroundings of the sensor from the south west and above, with the scan's points as the
+/// sensor measured them, and the sensor's axes.
 void draw_in_place(Canvas& canvas,
                    const Frame& frame,
                    const Scan& scan,
-                   const ScanPlace& place,
+                   const ScanSetting& place,
                    const std::function<Color(double range)>& color_of) {
   constexpr double kAxis = 0.06;  // of the picture's depth
   constexpr std::array<Color, 3> kAxes = {{{0.8, 0.1, 0.1}, {0.1, 0.55, 0.1}, {0.1, 0.25, 0.85}}};
@@ -134,7 +134,7 @@ void draw_in_place(Canvas& canvas,
 void draw_scan(const std::vector<Beam>& beams,
                const Scan& scan,
                const LidarSettings& lidar,
-               const ScanPlace& place,
+               const ScanSetting& place,
                const std::string& path) {
   constexpr double kHeader = 72.0;
   AngleRange range;

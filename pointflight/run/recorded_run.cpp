@@ -129,7 +129,7 @@ struct RecordedRun::Files {
     for (std::size_t row = 0; row < t->rows(); ++row) {
       const SimTime time = time_at(*t, row, 0);
       if (!poses.empty() && time <= poses.back().time) {
-        throw InputError(fmt::format("{}: times must ascend", t->place(row)));
+        throw InputError(fmt::format("{}: times must ascend", t->location(row)));
       }
       poses.push_back({time, body_at(*t, row, 1).T_world_body()});
     }
@@ -284,7 +284,7 @@ struct RecordedRun::Files {
       event.time = time;
       event.entered = words[1] == "collision";
       event.vehicle_world = here;
-      event.place_world = {value(7), value(8), value(9)};
+      event.position_world = {value(7), value(8), value(9)};
       event.penetration = value(10);
       add(Phase::kSamples, time, kCollisionRank, v, true, [event] { return Sample(event); });
     }

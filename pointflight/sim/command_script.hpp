@@ -19,7 +19,7 @@ struct CommandSettings;
 /// What a line's command is made with beside its own keys.
 struct CommandContext {
   const VehicleSettings& vehicle;  ///< Who gets it.
-  const MotionLimits& motion;      ///< How it flies to places.
+  const MotionLimits& motion;      ///< How it flies to positions.
   const std::string& folder;       ///< That relative paths of files start from.
 };
 
@@ -60,7 +60,7 @@ struct CommandSettings {
 /// The keys of one entry of `commands`.
 void describe(SettingsVisitor& visitor, CommandSettings& settings);
 
-/// True if the line's `vector` is a place, which moves with the vehicle's copies.
+/// True if the line's `vector` is a position, which moves with the vehicle's copies.
 bool has_place(const CommandSettings& settings);
 
 }  // namespace pointflight

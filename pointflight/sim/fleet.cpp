@@ -90,7 +90,7 @@ void Fleet::place(std::span<VehicleStatus> statuses, SimTime now) const {
 void Fleet::integrate(std::span<VehicleStatus> statuses,
                       SimTime now,
                       double dt,
-                      const std::string& place,
+                      const std::string& location,
                       const Executor& executor) const {
   std::vector<char> fine(size(), 1);
   for_each_here(executor, [&](std::size_t i) {
@@ -100,7 +100,7 @@ void Fleet::integrate(std::span<VehicleStatus> statuses,
     if (fine[i] != 0) continue;
     throw InputError(fmt::format(
         "{}: the dynamics of {} diverged at {:.3f} s; give a smaller physics_step or softer loops",
-        place,
+        location,
         vehicles_[i]->setup().name,
         to_seconds(now)));
   }

@@ -42,11 +42,11 @@ class Fleet {
   /// At the start of a step: vehicles with a source are where it says.
   void place(std::span<VehicleStatus> statuses, SimTime now) const;
   /// The end of a step: own dynamics go on by `dt` seconds. Throws InputError if they diverge;
-  /// `place` is where users can mend that.
+  /// `location` is where users can mend that.
   void integrate(std::span<VehicleStatus> statuses,
                  SimTime now,
                  double dt,
-                 const std::string& place,
+                 const std::string& location,
                  const Executor& executor) const;
 
   /// Where a vehicle was in [from, until]; at the origin if it is not there.

@@ -271,12 +271,12 @@ void FlightRecorder::write(const CollisionEvent& event) {
                             names_[event.vehicle],
                             partner_name(event.partner),
                             csv(event.vehicle_world),
-                            csv(event.place_world),
+                            csv(event.position_world),
                             event.penetration));
 }
 
 void FlightRecorder::write(const VehicleEvent& event) {
-  // no place; mostly no partner and no depth
+  // no position; mostly no partner and no depth
   events_.write(fmt::format("{},{},{},{},{},,,,{}\n",
                             seconds(event.time),
                             event.kind,

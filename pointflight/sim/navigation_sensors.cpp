@@ -106,7 +106,7 @@ class Gnss : public InstantSensor {
     const RigidBodyState& body = input.state.body;
     const Vector3d seen = body.p_world + slow + s.noise * draws_.normals(input.index, 3);
     const Vector3d v = body.v_world + s.velocity_noise * draws_.normals(input.index, 6);
-    const GeodeticPlace place = geodetic({s.latitude, s.longitude, s.altitude}, seen);
+    const GeodeticPosition place = geodetic({s.latitude, s.longitude, s.altitude}, seen);
     const double horizontal = std::sqrt(s.horizontal * s.horizontal + s.noise * s.noise);
     const double vertical = std::sqrt(s.vertical * s.vertical + s.noise * s.noise);
     return Measurement{site_.vehicle,
@@ -172,7 +172,7 @@ double standard_pressure(double altitude, double sea_pressure) {
   return sea_pressure * math::pow(std::max(0.0, 1.0 - 2.25577e-5 * altitude), 5.25588);
 }
 
-GeodeticPlace geodetic(const GeodeticPlace& origin, const Vector3d& p_world) {
+GeodeticPosition geodetic(const GeodeticPosition& origin, const Vector3d& p_world) {
   const auto latitude = math::sincos(origin.latitude * kDegree);
   const double e2 = kFlattening * (2.0 - kFlattening);
   const double w2 = 1.0 - e2 * latitude.sin * latitude.sin;

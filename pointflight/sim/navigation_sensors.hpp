@@ -64,15 +64,15 @@ struct GnssSettings {
 /// Its keys.
 void describe(SettingsVisitor& visitor, GnssSettings& settings);
 
-/// A place on the earth (WGS 84).
-struct GeodeticPlace {
+/// A position on the earth (WGS 84).
+struct GeodeticPosition {
   double latitude = 0.0;   ///< deg
   double longitude = 0.0;  ///< deg
   double altitude = 0.0;   ///< Above the ellipsoid, m.
 };
-/// Of a place in a world whose x is east, y north at an origin; by the radii of curvature there:
+/// Of a position in a world whose x is east, y north at an origin; by the radii of curvature there:
 /// within 1 cm up to some 2 km from it.
-GeodeticPlace geodetic(const GeodeticPlace& origin, const Vector3d& p_world);
+GeodeticPosition geodetic(const GeodeticPosition& origin, const Vector3d& p_world);
 
 /// Distance to the map along one ray. Defaults: Benewake TFmini Plus (0.1 to 12 m, 100 Hz, 5 cm up
 /// to 6 m and 1 % beyond, taken as two deviations), looking down.

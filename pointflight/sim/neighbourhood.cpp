@@ -65,7 +65,7 @@ void note_closest(VehicleStatus& status) {
   if (!nearest || status.crashed) return;
   if (summary.closest_approach && nearest->distance >= *summary.closest_approach) return;
   summary.closest_approach = nearest->distance;
-  summary.closest_place_world = nearest->place_world;
+  summary.closest_position_world = nearest->position_world;
   summary.closest_label = nearest->label;
 }
 

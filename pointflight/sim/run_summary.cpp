@@ -38,7 +38,7 @@ nlohmann::ordered_json json_of(const Simulation& simulation, std::size_t number)
   json["crashed"] = status.crashed;
   if (s.closest_approach) {
     json["closest_approach"] = *s.closest_approach;
-    json["closest_place"] = json_of(s.closest_place_world);
+    json["closest_place"] = json_of(s.closest_position_world);
     json["closest_to"] = label_name(simulation, s.closest_label);
   } else {
     json["closest_approach"] = nullptr;

@@ -63,9 +63,9 @@ struct CollisionEvent {
   Label partner = kMapLabel;  ///< What it hit: the map, another vehicle or an obstacle.
   SimTime time;               ///< Within the step, if it was found.
   bool entered = true;        ///< False: it came free again.
-  Vector3d vehicle_world = Vector3d::Zero();  ///< The body's origin, m.
-  Vector3d place_world = Vector3d::Zero();    ///< Where it hit.
-  double penetration = 0.0;                   ///< At the end of the step, m.
+  Vector3d vehicle_world = Vector3d::Zero();   ///< The body's origin, m.
+  Vector3d position_world = Vector3d::Zero();  ///< Where it hit.
+  double penetration = 0.0;                    ///< At the end of the step, m.
 };
 
 /// Something that happened on board a vehicle: batteries, demands beyond limits.

@@ -61,7 +61,7 @@ void describe_lidar(SettingsVisitor& v, LidarMount& s) {
   v.value({"truth",
            "",
            "its files also say what the simulator knows of each point: true range, incidence, "
-           "surfel, sub-ray, deskewed place"},
+           "surfel, sub-ray, deskewed position"},
           s.truth);
 }
 
@@ -249,7 +249,7 @@ std::string Scenario::folder() const {
   return std::filesystem::path(path).parent_path().string();
 }
 
-std::string Scenario::place(const std::string& key) const {
+std::string Scenario::location(const std::string& key) const {
   const auto line = lines.find(key);
   if (path.empty()) return "the scenario";  // made up by a program
   return line == lines.end() ? path : fmt::format("{}:{}", path, line->second);
@@ -261,7 +261,7 @@ std::shared_ptr<const SurfelMap> Scenario::open_map() const {
   throw InputError(fmt::format(
       "{}: map_hash: {} is another map than this scenario was flown in (its hash is {}, "
       "not {}); give that one, or take the key away",
-      place("map_hash"),
+      location("map_hash"),
       map,
       opened->hash(),
       map_hash));

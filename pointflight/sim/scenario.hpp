@@ -142,12 +142,12 @@ struct Scenario {
   [[nodiscard]] std::string vehicle_key(std::size_t number, const std::string& key) const;
 
   /// "scenario.yaml:12" for a key, or the path where the key is not in the file.
-  [[nodiscard]] std::string place(const std::string& key) const;
+  [[nodiscard]] std::string location(const std::string& key) const;
 
   /// Runs `action` for what a key names; an InputError in it also says where the key stands.
   template <class Action>
   auto at(const std::string& key, const Action& action) const {
-    return at_key(place(key), key, action);
+    return at_key(location(key), key, action);
   }
 
   /// Opens the map. Throws InputError if it is another than `map_hash` says.

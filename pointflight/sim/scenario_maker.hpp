@@ -16,13 +16,13 @@ struct ScenarioRequest {
   std::string vehicle = "quad_330";  ///< Name or path of a vehicle file.
   double length = 60.0;              ///< Of the mission, if the map allows, m.
   double speed = 2.0;                ///< m/s
-  std::optional<Vector3d> start;     ///< World, m; else a free place.
+  std::optional<Vector3d> start;     ///< World, m; else a free position.
   std::optional<Aabb> bounds;        ///< World, m: start and waypoints lie inside.
   bool mission = true;               ///< Else nothing is looked for if there is a start.
 };
 
 /// A scenario for a map: a free start, waypoints and a heading along the first leg. Throws
-/// InputError if no free place is found.
+/// InputError if no free position is found.
 Scenario make_scenario(const ScenarioRequest& wish, const Executor& executor);
 
 /// "1.0, 2.0, 3.0 and 4.0, 5.0, 6.0": the corners of a box, for messages.

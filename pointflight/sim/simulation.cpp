@@ -46,8 +46,10 @@ Simulation::Simulation(const Scenario& scenario,
   SharedParts shared(setup->map, scenario.folder());
   const auto fleet = scenario.fleet();
   if (fleet.empty() || fleet.size() >= kFirstObstacle) {
-    throw InputError(fmt::format(
-        "{}: {} vehicles; 1 to {}", scenario.place("vehicles"), fleet.size(), kFirstObstacle - 1));
+    throw InputError(fmt::format("{}: {} vehicles; 1 to {}",
+                                 scenario.location("vehicles"),
+                                 fleet.size(),
+                                 kFirstObstacle - 1));
   }
   check_names(scenario, fleet);
   check_reach(scenario, fleet);
@@ -55,10 +57,10 @@ Simulation::Simulation(const Scenario& scenario,
   world.map = setup->map;
   world.seed = static_cast<std::uint64_t>(scenario.seed);
   world.folder = scenario.folder();
-  world.place = [&](std::size_t entry, const char* key) {
+  world.location = [&](std::size_t entry, const char* key) {
     const std::string name = fmt::format("obstacles[{}].{}", entry, key);
     const std::string item = fmt::format("obstacles[{}]", entry);
-    return scenario.place(scenario.lines.contains(name) ? name : item) + ": " + name;
+    return scenario.location(scenario.lines.contains(name) ? name : item) + ": " + name;
   };
   double busy = 0.0;
   std::vector<std::shared_ptr<const VehicleAgent>> agents;
@@ -246,7 +248,7 @@ void Simulation::advance() {
   fleet_.integrate(state_.vehicles,
                    state_.time,
                    to_seconds(setup_->step),
-                   setup_->scenario.place("physics_step"),
+                   setup_->scenario.location("physics_step"),
                    *executor_);
   state_.time += setup_->step;
   ++state_.step_number;

@@ -23,8 +23,8 @@ std::string free_place_text(const SurfelMap& map,
                             const VehicleAgent& agent,
                             const Vector3d& p,
                             const Executor& executor) {
-  const auto place = nearest_free_place(map, p, bounding_radius(agent.hull()), executor);
-  return place ? "; the nearest free place found is " + point_text(*place) : std::string();
+  const auto place = nearest_free_position(map, p, bounding_radius(agent.hull()), executor);
+  return place ? "; the nearest free position found is " + point_text(*place) : std::string();
 }
 
 /// How far the map is along the vertical, by rays side by side: a surface may have holes.
@@ -65,7 +65,7 @@ void check_names(const Scenario& scenario, const std::vector<VehicleSetup>& flee
     });
     if (plain && names.insert(name).second) continue;
     throw InputError(fmt::format("{}: '{}' {}",
-                                 scenario.place(scenario.vehicle_key(i, "name")),
+                                 scenario.location(scenario.vehicle_key(i, "name")),
                                  name,
                                  plain ? "is the name of two vehicles; give each its own"
                                        : "names a folder: letters, digits, _ and - only"));
@@ -81,7 +81,7 @@ void check_reach(const Scenario& scenario, const std::vector<VehicleSetup>& flee
       if (p.cwiseAbs().maxCoeff() <= kFarthest) continue;
       throw InputError(fmt::format(
           "{}: copy_offset takes {} to ({:g}, {:g}, {:g}); {:g} m from the origin at most",
-          scenario.place(scenario.vehicle_key(i, "copy_offset")),
+          scenario.location(scenario.vehicle_key(i, "copy_offset")),
           fleet[i].name,
           p.x(),
           p.y(),
@@ -102,7 +102,7 @@ void check_start_is_free(const Scenario& scenario,
   const Vector3d& p = pose.translation;
   const std::string key = scenario.vehicle_key(agent.number(), "start");
   const auto fail = [&](const std::string& what) {
-    throw InputError(fmt::format("{}: {}: {}", scenario.place(key), key, what));
+    throw InputError(fmt::format("{}: {}: {}", scenario.location(key), key, what));
   };
   const std::string& name = agent.setup().name;
   if (is_lost(map, p)) {
@@ -118,7 +118,7 @@ void check_start_is_free(const Scenario& scenario,
   if (here && here->distance < 0.0) {
     fail(fmt::format(
         "({}, {}, {}) of {} is {:.2f} m inside the map for a hull that "
-        "reaches {:.2f} m; move it, or let `pointflight scenario new` find a free place",
+        "reaches {:.2f} m; move it, or let `pointflight scenario new` find a free position",
         fixed_text(p.x(), 2),
         fixed_text(p.y(), 2),
         fixed_text(p.z(), 2),
@@ -166,7 +166,7 @@ std::vector<std::string> start_warnings(const Simulation& simulation, const Exec
     const std::string place =
         warnings.size() < 3 ? free_place_text(map, agent, p, executor) : std::string();
     warnings.push_back(fmt::format("{}: warning: {} of {} {}{}",
-                                   scenario.place(scenario.vehicle_key(i, "start")),
+                                   scenario.location(scenario.vehicle_key(i, "start")),
                                    point_text(p),
                                    agent.setup().name,
                                    what,

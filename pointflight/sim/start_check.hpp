@@ -23,8 +23,8 @@ struct StartingVehicle {
   Pose T_world_body;                    ///< Its pose at time zero.
 };
 
-/// True for places so far outside of the map's bounds that nobody means to be there: 50 m beside or
-/// below, 500 m above. A run ends there.
+/// True for positions so far outside of the map's bounds that nobody means to be there: 50 m beside
+/// or below, 500 m above. A run ends there.
 bool is_lost(const SurfelMap& map, const Vector3d& p_world);
 
 /// Throws InputError if a vehicle starts inside the map, another vehicle or an obstacle (which

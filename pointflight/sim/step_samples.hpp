@@ -16,8 +16,8 @@ inline constexpr std::size_t kSensorRank = 3;  ///< Of the first sensor; the oth
 
 /// What one vehicle says within a step.
 struct StepSamples {
-  /// A sample and its place among those of its instant: what happened first, then what happened on
-  /// board, the truth, sensors in their order.
+  /// A sample and its position among those of its instant: what happened first, then what happened
+  /// on board, the truth, sensors in their order.
   struct Item {
     SimTime time;          ///< When it arrives.
     std::size_t rank = 0;  ///< Among those of its instant.

@@ -206,7 +206,7 @@ bool VehicleAgent::touches_down(const VehicleStatus& status) const {
   if (!nearest || nearest->label != kMapLabel || nearest->distance > (gently ? kTouchdown : 0.0)) {
     return false;
   }
-  const double below = body.p_world.z() - nearest->place_world.z();
+  const double below = body.p_world.z() - nearest->position_world.z();
   if (below < 0.5 * half_extent(hull_).z() || body.v_world.z() > 0.0) return false;
   return !status.autopilot.armed ||
          (gently && std::holds_alternative<LandCommand>(status.autopilot.command));

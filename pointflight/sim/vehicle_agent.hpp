@@ -43,7 +43,7 @@ struct VehicleSummary {
   std::optional<SimTime> rotor_lost;       ///< When it began to come down without one.
   std::optional<double> closest_approach;  ///< Of the hull to anything, m; negative inside.
   /// Of the other thing, m; as below, at the closest approach.
-  Vector3d closest_place_world = Vector3d::Zero();
+  Vector3d closest_position_world = Vector3d::Zero();
   Label closest_label = kMapLabel;  ///< What it came closest to.
 };
 

@@ -41,14 +41,14 @@ VehicleSettings settings_of(const Scenario& scenario,
   if (c.tilt_max_deg > c.kind->tilt_max_deg) {
     throw InputError(
         fmt::format("{}: a tilt of {} degrees; `controller: {}` flies up to {}, geometric beyond",
-                    scenario.place(scenario.vehicle_key(number, "limits.tilt_max_deg")),
+                    scenario.location(scenario.vehicle_key(number, "limits.tilt_max_deg")),
                     c.tilt_max_deg,
                     c.kind->name,
                     c.kind->tilt_max_deg));
   }
   if (setup.battery && s.battery.cells <= 0.0) {
     throw InputError(fmt::format("{}: {} has no battery; write one into its file",
-                                 scenario.place(scenario.vehicle_key(number, "battery")),
+                                 scenario.location(scenario.vehicle_key(number, "battery")),
                                  s.path));
   }
   return s;
@@ -86,13 +86,13 @@ VehicleAgent::VehicleAgent(const Scenario& scenario,
 void VehicleAgent::mount_sensors(const Scenario& scenario, SharedParts& shared) {
   if (setup_.sensors.size() > kLidarsMax - 2) {
     throw InputError(fmt::format("{}: {} sensors on one vehicle; {} at most",
-                                 scenario.place(scenario.vehicle_key(number_, "sensors")),
+                                 scenario.location(scenario.vehicle_key(number_, "sensors")),
                                  setup_.sensors.size(),
                                  kLidarsMax - 2));
   }
   if (setup_.lidars.size() > kLidarsMax) {
     throw InputError(fmt::format("{}: {} lidars on one vehicle; {} at most",
-                                 scenario.place(scenario.vehicle_key(number_, "lidars")),
+                                 scenario.location(scenario.vehicle_key(number_, "lidars")),
                                  setup_.lidars.size(),
                                  kLidarsMax));
   }
@@ -148,7 +148,7 @@ void VehicleAgent::check_faults(const Scenario& scenario) const {
     if (static_cast<std::size_t>(setup_.faults[fault].index) < count) return;
     throw InputError(fmt::format(
         "{}: {} {} of a vehicle with {}",
-        scenario.place(scenario.vehicle_key(number_, fmt::format("faults[{}].index", fault))),
+        scenario.location(scenario.vehicle_key(number_, fmt::format("faults[{}].index", fault))),
         what,
         setup_.faults[fault].index,
         count));
@@ -156,7 +156,7 @@ void VehicleAgent::check_faults(const Scenario& scenario) const {
   for (std::size_t i = 0; i < setup_.faults.size(); ++i) {
     const std::string name = scenario.vehicle_key(number_, fmt::format("faults[{}].", i));
     check(setup_.faults[i], [&](const char* key, const std::string& what) {
-      throw InputError(fmt::format("{}: {}{}: {}", scenario.place(name + key), name, key, what));
+      throw InputError(fmt::format("{}: {}{}: {}", scenario.location(name + key), name, key, what));
     });
     const FaultKind kind = setup_.faults[i].kind;
     if (kind == FaultKind::kRotor) check_index(i, "rotor", settings().rotors.size());
@@ -177,7 +177,7 @@ void VehicleAgent::read_commands(const Scenario& scenario) {
     };
     if (s.kind->name == BodyRateCommand::kName && !s.vector.isZero(0.0)) {
       throw InputError(fmt::format("{}: {}: body rates are given as rates_deg: [x, y, z], in deg/s",
-                                   scenario.place(key("vector")),
+                                   scenario.location(key("vector")),
                                    key("vector")));
     }
     const Command command = scenario.at(key(s.file.empty() ? "kind" : "file"), [&] {
@@ -188,7 +188,7 @@ void VehicleAgent::read_commands(const Scenario& scenario) {
     const SimTime time{from_seconds(s.time)};
     if (!commands_.empty() && time < commands_.back().time) {
       throw InputError(fmt::format("{}: {} s comes before the command above it; sort them by time",
-                                   scenario.place(key("time")),
+                                   scenario.location(key("time")),
                                    s.time));
     }
     commands_.push_back({time, command});

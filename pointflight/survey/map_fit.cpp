@@ -65,7 +65,7 @@ class FateCounts {
   std::array<std::atomic<std::uint64_t>, 8> counts_{};
 };
 
-/// A surfel with its standard deviations scaled, its place as it was.
+/// A surfel with its standard deviations scaled, its position as it was.
 SurfelWord resized(SurfelWord word, const std::array<double, 3>& factors) {
   if (factors == std::array{1.0, 1.0, 1.0}) return word;  // encoding would round the axes
   Surfel surfel = decode(word);
@@ -81,7 +81,7 @@ SurfelWord resized(SurfelWord word, const std::array<double, 3>& factors) {
   for (const int k : {1, 2}) surfel.s[k] = std::clamp(surfel.s[k], kMinSpread, kWidest);
   surfel.s[0] =
       is_planar(word) ? kPlanarThickness : std::clamp(surfel.s[0], kThinnestVolume, surfel.s[1]);
-  surfel.center_voxels = Vector3f::Constant(0.5f);  // any: the old place is put back
+  surfel.center_voxels = Vector3f::Constant(0.5f);  // any: the old position is put back
   return (encode(surfel) & ~kPlaceBits) | (word & kPlaceBits);
 }
 

@@ -66,7 +66,7 @@ struct FitReport {
 /// renders the rays and sums for each surfel that had a part in it dw / d(ln s_k), of rays rendered
 /// early, right, and late or not at all: ln s_k changes by -step (E - L) / (E + L + C + doubt) with
 /// the leaks L weighed. Planar surfels stay planar. Pass 2 also marks the space that rays crossed,
-/// in the box of the surfels and the sensor's places, beside what the map knew. All sums are of
+/// in the box of the surfels and the sensor's positions, beside what the map knew. All sums are of
 /// whole numbers: the same bytes for any number of threads and any order of the rays.
 EditedMap fit_map(const SurfelMap& map,
                   const SurveyOpener& survey,

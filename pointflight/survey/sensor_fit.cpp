@@ -48,7 +48,7 @@ struct Patch {
 };
 
 struct PlaneFit {
-  Eigen::Vector3d c;     ///< 1 / range over d·m, linear in the place across the middle direction.
+  Eigen::Vector3d c;  ///< 1 / range over d·m, linear in the position across the middle direction.
   bool is_firm = false;  ///< It is fixed in both directions.
 };
 

@@ -40,7 +40,7 @@ struct SensorFit {
   double range_min = 0.0;      ///< Of all returns, m.
   double range_max = 0.0;      ///< Of all returns, m.
   /// Root mean square of what patches move from scan to scan, by what their noise explains: 1 for a
-  /// sensor and a place at rest. 0: too few scans to tell.
+  /// sensor and a position at rest. 0: too few scans to tell.
   double unrest = 0.0;
   std::vector<NoiseBin> noise;  ///< Of bins with three patches or more.
   std::optional<double> rate;   ///< Scans per second, by their stamps.

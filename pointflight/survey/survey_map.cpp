@@ -10,7 +10,7 @@
 #include "pointflight/core/argument.hpp"
 #include "pointflight/map/import/import_check.hpp"
 #include "pointflight/map/map_file.hpp"
-#include "pointflight/survey/surveyed_places.hpp"
+#include "pointflight/survey/surveyed_cells.hpp"
 
 namespace pointflight {
 namespace {
@@ -33,7 +33,7 @@ std::shared_ptr<const SurfelMap> opened(const Bvh8& tree, const MapDescription& 
 /// The points of a cloud beside which a survey saw something.
 class SeenCloud : public CloudReader {
  public:
-  SeenCloud(std::unique_ptr<CloudReader> cloud, const SurveyedPlaces& seen)
+  SeenCloud(std::unique_ptr<CloudReader> cloud, const SurveyedCells& seen)
       : cloud_(std::move(cloud)), seen_(seen) {}
 
   bool read(std::vector<CloudPoint>& batch) override {
@@ -50,13 +50,13 @@ class SeenCloud : public CloudReader {
 
  private:
   std::unique_ptr<CloudReader> cloud_;
-  const SurveyedPlaces& seen_;
+  const SurveyedCells& seen_;
 };
 
-/// Of the points, or of the survey's returns; with `seen` of those that lie beside its places.
+/// Of the points, or of the survey's returns; with `seen` of those that lie beside its positions.
 ImportedMap import_points(const SurveyPoints& points,
                           const SurveyOpener& survey,
-                          const SurveyedPlaces* seen,
+                          const SurveyedCells* seen,
                           const ImportOptions& options,
                           const Executor& executor,
                           const Progress& progress) {
@@ -88,7 +88,7 @@ std::vector<TriedResolution> try_resolutions(const ScanOpener& survey,
     return survey([&](std::size_t scan) { return !is_left_out(scan); });
   };
   const SurveyOpener judges = [&] { return survey(is_left_out); };
-  const SurveyedPlaces seen = places_of(learnt);
+  const SurveyedCells seen = surveyed_cells(learnt);
   const auto counts = [&](const SurveyRay& ray) {
     return !ray.is_return || seen.has(ray.point_world());
   };

@@ -17,9 +17,9 @@ constexpr double kOffsetsEnd = 1000;  // s: larger times of points are no offset
 
 }  // namespace
 
-SimTime time_of(double seconds, const std::string& place) {
+SimTime time_of(double seconds, const std::string& location) {
   if (!(std::abs(seconds) < kLatest)) {
-    throw InputError(fmt::format("{}: {} is no time in seconds", place, seconds));
+    throw InputError(fmt::format("{}: {} is no time in seconds", location, seconds));
   }
   return SimTime(from_seconds(seconds));
 }
@@ -63,7 +63,7 @@ SurveyPoses read_survey_poses(const std::string& path, const Pose& T_pose_sensor
 SimTime time_of_point(const std::vector<TimedPose>& poses,
                       SimTime scan_start,
                       double time,
-                      const std::string& place) {
+                      const std::string& location) {
   const bool is_offset = std::abs(time) < kOffsetsEnd;
   const double at = is_offset ? to_seconds(scan_start) + time : time;
   const Duration last =
@@ -74,7 +74,7 @@ SimTime time_of_point(const std::vector<TimedPose>& poses,
     throw InputError(fmt::format(
         "{}: a point's time, {} s, is not within the poses ({} to {} s); --deskewed leaves times "
         "of points aside",
-        place,
+        location,
         time,
         to_seconds(poses.front().time),
         to_seconds(poses.back().time)));

@@ -24,15 +24,15 @@ SurveyPoses read_survey_poses(const std::string& path, const Pose& T_pose_sensor
 /// Throws InputError if poses are none, not in this world or do not ascend; `name` is theirs.
 void check_survey_poses(const std::vector<TimedPose>& poses, const std::string& name);
 
-/// Seconds as a time; `place` is theirs. Throws InputError if they are none.
-SimTime time_of(double seconds, const std::string& place);
+/// Seconds as a time; `location` is theirs. Throws InputError if they are none.
+SimTime time_of(double seconds, const std::string& location);
 
 /// When a point was measured that carries a time of its own, s: since its scan's start, or, if
-/// that is 1000 s or more, by the poses' clock. Throws InputError that names `place` if the
+/// that is 1000 s or more, by the poses' clock. Throws InputError that names `location` if the
 /// trajectory does not reach there.
 SimTime time_of_point(const std::vector<TimedPose>& poses,
                       SimTime scan_start,
                       double time,
-                      const std::string& place);
+                      const std::string& location);
 
 }  // namespace pointflight

@@ -16,8 +16,8 @@ namespace pointflight {
 namespace {
 
 constexpr std::size_t kRepeated = std::variant_size_v<Setpoint>;  // the first of Command
-constexpr double kSlow = 0.15;                                    // m/s: below, hover holds a place
-constexpr double kDescent = 1e4;                                  // m: a landing ends before
+constexpr double kSlow = 0.15;    // m/s: below, hover holds a position
+constexpr double kDescent = 1e4;  // m: a landing ends before
 
 constexpr double kLargest =
     1e9;  // of any number in a command: squares of larger ones overflow soon
@@ -81,7 +81,7 @@ struct Finite {
   }
 };
 
-/// A vertical move from a place.
+/// A vertical move from a position.
 class Climb : public Trajectory {
  public:
   Climb(const Vector3d& from, double height, double yaw, double speed)

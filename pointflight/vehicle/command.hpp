@@ -70,10 +70,10 @@ struct WaypointCommand {
   /// Two that are equal are one order said twice.
   bool operator==(const WaypointCommand&) const = default;
 };
-/// Rise by `height` (m) from the present place; arms.
+/// Rise by `height` (m) from the present position; arms.
 struct TakeOffCommand {
   static constexpr std::string_view kName = "take_off";  ///< `name_of`
-  double height = 1.5;                                   ///< Above the present place, m.
+  double height = 1.5;                                   ///< Above the present position, m.
   double speed = 1.0;                                    ///< m/s
 
   /// Two that are equal are one order said twice.

@@ -64,7 +64,7 @@ std::optional<std::string> beyond_limits(const Trajectory& trajectory,
       [&](const char* what, const Peak& peak, double unit, double limit, const char* name) {
         const double needed = peak.value / unit;
         if (needed <= kTolerance * limit) return;
-        const Vector3d& p = peak.place_world;
+        const Vector3d& p = peak.position_world;
         beyond.push_back(
             fmt::format("{} of {:.3g}{} (limit {:.3g}) after {:.1f} s at {:.1f}, {:.1f}, {:.1f}",
                         what,

@@ -11,9 +11,9 @@ namespace pointflight {
 
 /// The most of something on a trajectory, and where that is.
 struct Peak {
-  double value = 0.0;                       ///< In its own unit.
-  double time = 0.0;                        ///< Since the trajectory's start, s.
-  Vector3d place_world = Vector3d::Zero();  ///< m
+  double value = 0.0;                          ///< In its own unit.
+  double time = 0.0;                           ///< Since the trajectory's start, s.
+  Vector3d position_world = Vector3d::Zero();  ///< m
 };
 
 /// The most that a trajectory asks of a vehicle in still air.

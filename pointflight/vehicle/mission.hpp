@@ -28,7 +28,7 @@ class SmoothMove {
   /// `distance` >= 0; the limits must be positive. Peak speed shrinks if the distance is short.
   SmoothMove(double distance, const MotionLimits& limits);
 
-  /// A place on the move, along it.
+  /// A position on the move, along it.
   struct Sample {
     double position;      ///< m
     double speed;         ///< m/s

@@ -65,7 +65,7 @@ std::vector<Trial> inner_trials(const VehicleSettings& v) {
   };
 }
 
-/// Of the place and what leads to it.
+/// Of the position and its derivatives.
 std::vector<Trial> outer_trials(const VehicleSettings& v) {
   const ControllerSettings& c = v.controller;
   LoopDesign velocity = c.horizontal;

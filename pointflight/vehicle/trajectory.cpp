@@ -80,7 +80,7 @@ std::shared_ptr<const PolynomialTrajectory> PolynomialTrajectory::parse(std::str
     try {
       PolynomialTrajectory check({piece});
     } catch (const InputError& error) {
-      throw InputError(fmt::format("{}: {}", table.place(row), error.what()));
+      throw InputError(fmt::format("{}: {}", table.location(row), error.what()));
     }
     pieces.push_back(std::move(piece));
   }
@@ -168,7 +168,7 @@ std::shared_ptr<const BSplineTrajectory> BSplineTrajectory::read(const std::stri
                                 yaw < 0 ? 0.0 : kDegree * table.at(row, yaw));
     if (!(point.cwiseAbs().maxCoeff() <= kLargestCoefficient)) {
       throw InputError(fmt::format(
-          "{}: a number is missing or beyond {:g}", table.place(row), kLargestCoefficient));
+          "{}: a number is missing or beyond {:g}", table.location(row), kLargestCoefficient));
     }
     points.push_back(point);
   }

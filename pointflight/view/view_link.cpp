@@ -225,7 +225,7 @@ void ViewLink::publish_state(SimTime now, const char* doing) {
            {"goal", list_of(s.command.p_world)}};
       if (s.nearest) {
         v["nearest"] = {{"distance", rounded(s.nearest->distance, 1e-3)},
-                        {"place", list_of(s.nearest->place_world)},
+                        {"place", list_of(s.nearest->position_world)},
                         {"label", s.nearest->label}};
       }
       json rotors = json::array();

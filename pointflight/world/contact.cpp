@@ -41,7 +41,7 @@ std::optional<Contact> contact_with_map(const SurfelMap& map,
       const Separation s = separation(hull, T_world_hull, Solid{Box{box.half}}, box.T_world_box);
       if (s.distance <= least) {
         least = s.distance;
-        best = Contact{s.distance, s.place, kMapLabel};
+        best = Contact{s.distance, s.point, kMapLabel};
       }
     }
     // of what touches, something else can still be deeper
@@ -63,12 +63,12 @@ std::optional<Contact> contact_with_body(const BodyShape& shape,
   if (const auto* solid = std::get_if<Solid>(&shape)) {
     const Separation s = separation(hull, T_world_hull, *solid, T_world_body);
     if (s.distance > reach) return std::nullopt;
-    contact = Contact{s.distance, s.place, label};
+    contact = Contact{s.distance, s.point, label};
   } else {
     const auto& points = std::get<std::shared_ptr<const SurfelMap>>(shape);
     contact = contact_with_map(*points, hull, T_world_body.inverse() * T_world_hull, reach);
     if (!contact) return std::nullopt;
-    contact->place_world = T_world_body * contact->place_world;
+    contact->position_world = T_world_body * contact->position_world;
     contact->label = label;
   }
   return contact;

@@ -9,9 +9,9 @@ namespace pointflight {
 
 /// The nearest thing to a hull.
 struct Contact {
-  double distance = 0.0;                    ///< m; negative if they overlap: minus the depth.
-  Vector3d place_world = Vector3d::Zero();  ///< Of the thing, about where it is nearest.
-  Label label = kMapLabel;                  ///< What the thing is.
+  double distance = 0.0;                       ///< m; negative if they overlap: minus the depth.
+  Vector3d position_world = Vector3d::Zero();  ///< Of the thing, about where it is nearest.
+  Label label = kMapLabel;                     ///< What the thing is.
 };
 
 /// Distance of a hull to the map within `reach`; nothing if all is farther. To the surfels'

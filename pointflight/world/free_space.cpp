@@ -18,7 +18,7 @@ constexpr double kGroundMax = 3.5;
 
 using Index3 = std::array<int, 3>;
 
-/// A coarse grid over the map that knows where a vehicle fits and what surrounds the place.
+/// A coarse grid over the map that knows where a vehicle fits and what surrounds the position.
 class FreeSpaceGrid {
  public:
   FreeSpaceGrid(const SurfelMap& map, const TourOptions& options, const Executor& executor)
@@ -320,7 +320,7 @@ std::optional<Tour> find_tour(const SurfelMap& map,
                               const Executor& executor) {
   if (map.surfel_count() == 0) return std::nullopt;
   const FreeSpaceGrid grid(map, options, executor);
-  // well enclosed places if they make a tour long enough, else the longest of all
+  // well enclosed positions if they make a tour long enough, else the longest of all
   Tour best;
   for (const bool near_ground : {true, false}) {
     for (const int sides : {6, 4, 2, 0}) {
@@ -333,10 +333,10 @@ std::optional<Tour> find_tour(const SurfelMap& map,
   return best;
 }
 
-std::optional<Vector3d> nearest_free_place(const SurfelMap& map,
-                                           const Vector3d& near_world,
-                                           double radius,
-                                           const Executor& executor) {
+std::optional<Vector3d> nearest_free_position(const SurfelMap& map,
+                                              const Vector3d& near_world,
+                                              double radius,
+                                              const Executor& executor) {
   if (map.surfel_count() == 0) return std::nullopt;
   for (const double margin : {0.5, 0.3, 0.15}) {
     TourOptions options;

@@ -27,17 +27,17 @@ struct Tour {
 
 /// Finds a start and waypoints inside a map: free of it by radius + margin, above ground and
 /// surrounded by it (not outside the walls of a scanned hall). Long legs first; as long as
-/// `length_min` if the map allows. Nothing if no free place is found. Deterministic.
+/// `length_min` if the map allows. Nothing if no free position is found. Deterministic.
 std::optional<Tour> find_tour(const SurfelMap& map,
                               const TourOptions& options,
                               const Executor& executor);
 
-/// A place for a vehicle of `radius` (m), free of the map by half a metre or as much as there is
+/// A position for a vehicle of `radius` (m), free of the map by half a metre or as much as there is
 /// room for, with ground below; the nearest one to `near_world` within the resolution of the
 /// search. Nothing if none is found. Deterministic.
-std::optional<Vector3d> nearest_free_place(const SurfelMap& map,
-                                           const Vector3d& near_world,
-                                           double radius,
-                                           const Executor& executor);
+std::optional<Vector3d> nearest_free_position(const SurfelMap& map,
+                                              const Vector3d& near_world,
+                                              double radius,
+                                              const Executor& executor);
 
 }  // namespace pointflight

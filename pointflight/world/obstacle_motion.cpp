@@ -61,7 +61,7 @@ PoseTrack parse_keyframes(std::string_view text, const std::string& name, bool r
       const double value = table.at(row, column);
       if (!(std::abs(value) <= limit)) {
         throw InputError(
-            fmt::format("{}: a number is missing or beyond {}", table.place(row), limit));
+            fmt::format("{}: a number is missing or beyond {}", table.location(row), limit));
       }
       return value;
     };
@@ -75,7 +75,7 @@ PoseTrack parse_keyframes(std::string_view text, const std::string& name, bool r
                       number(quaternion[2], 1e3),
                       number(quaternion[3], 1e3));
       if (!(q.norm() > 1e-6)) {
-        throw InputError(fmt::format("{}: the quaternion is zero", table.place(row)));
+        throw InputError(fmt::format("{}: the quaternion is zero", table.location(row)));
       }
       q.normalize();
     } else {
@@ -87,7 +87,7 @@ PoseTrack parse_keyframes(std::string_view text, const std::string& name, bool r
     if (!frames.empty() && frame.time <= frames.back().time) {
       throw InputError(
           fmt::format("{}: time {} s does not come after {} s of the row before; sort the rows",
-                      table.place(row),
+                      table.location(row),
                       to_seconds(frame.time),
                       to_seconds(frames.back().time)));
     }
@@ -98,7 +98,7 @@ PoseTrack parse_keyframes(std::string_view text, const std::string& name, bool r
     throw InputError(
         fmt::format("{}: repeats, but does not end where it starts: it would jump; add "
                     "a last row at ({}, {}, {})",
-                    table.place(table.rows() - 1),
+                    table.location(table.rows() - 1),
                     first.x(),
                     first.y(),
                     first.z()));

@@ -63,9 +63,9 @@ Motion motion_of(const ObstacleSettings& s, const std::string& folder) {
 }
 
 /// What only makes sense together.
-void check(const ObstacleSettings& s, const std::function<std::string(const char*)>& place) {
+void check(const ObstacleSettings& s, const std::function<std::string(const char*)>& location) {
   const auto fail = [&](const char* key, const char* what) {
-    throw InputError(fmt::format("{}: {}", place(key), what));
+    throw InputError(fmt::format("{}: {}", location(key), what));
   };
   if (!s.shape && s.file.empty()) fail("file", "shape 'cloud' needs a cloud or mesh");
   if (s.shape && !s.file.empty()) fail("file", "only shape 'cloud' has a file");
@@ -116,11 +116,12 @@ void describe_motion(SettingsVisitor& v, ObstacleSettings& s) {
     w.value({"speed_max", "m/s", "above speed: each is drawn between the two", 0, 100},
             s.speed_max);
     w.choice({"directions", "", "of flight"}, s.directions, kDirections);
-    w.choice({"at_border",
-              "",
-              "what happens at the bounds: another one at a random free place, or it turns back"},
-             s.at_border,
-             kBorders);
+    w.choice(
+        {"at_border",
+         "",
+         "what happens at the bounds: another one at a random free position, or it turns back"},
+        s.at_border,
+        kBorders);
     w.value({"bounds_min", "m", "both 0: the map's", -kFar, kFar}, s.bounds_min);
     w.value({"bounds_max", "m", "upper corner", -kFar, kFar}, s.bounds_max);
   });
@@ -150,18 +151,18 @@ void describe(SettingsVisitor& v, ObstacleSettings& s) {
 Obstacles::Obstacles(const std::vector<ObstacleSettings>& settings,
                      const ObstacleWorld& world,
                      const Executor& executor) {
-  if (!world.map || !world.place) throw std::invalid_argument("obstacles need a map and places");
+  if (!world.map || !world.location) throw std::invalid_argument("obstacles need a map and places");
   for (std::size_t entry = 0; entry < settings.size(); ++entry) {
     const ObstacleSettings& s = settings[entry];
-    const auto place = [&](const char* key) { return world.place(entry, key); };
+    const auto location = [&](const char* key) { return world.location(entry, key); };
     check_settings(s, fmt::format("obstacles[{}]", entry));
-    check(s, place);
+    check(s, location);
     std::shared_ptr<const SurfelMap> cloud;
     if (!s.shape) {
       try {
         cloud = load_cloud(resolve_path(s.file, world.folder), s.resolution, executor);
       } catch (const InputError& error) {
-        throw InputError(fmt::format("{}: {}", place("file"), error.what()));
+        throw InputError(fmt::format("{}: {}", location("file"), error.what()));
       }
     }
     Aabb bounds;
@@ -171,11 +172,11 @@ Obstacles::Obstacles(const std::vector<ObstacleSettings>& settings,
     for (std::int64_t i = 0; i < s.count; ++i) {
       const auto number = static_cast<std::uint32_t>(obstacles_.size());
       if (obstacles_.size() >= kMost) {
-        throw InputError(fmt::format("{}: more than {} obstacles", place("count"), kMost));
+        throw InputError(fmt::format("{}: more than {} obstacles", location("count"), kMost));
       }
       if (s.motion == ObstacleMotion::kRandom) {
         obstacles_.push_back(
-            std::make_unique<RandomFlight>(s, cloud, bounds, world, number, place("motion")));
+            std::make_unique<RandomFlight>(s, cloud, bounds, world, number, location("motion")));
         continue;
       }
       Body body;
@@ -207,23 +208,25 @@ std::shared_ptr<const Obstacles::Slice> Obstacles::slice(std::int64_t number) co
   }
   const SimTime from = SimTime{} + number * kSlice;
   std::vector<Body> bodies = this->bodies(from, from + kSlice);
-  std::vector<BoundingBall> balls;
-  balls.reserve(bodies.size());
+  std::vector<Aabb> boxes;
+  boxes.reserve(bodies.size());
   for (const Body& body : bodies) {
     const SimTime first = std::max(from, body.from);
     const SimTime last = std::min(from + kSlice, body.until);
     const SimTime middle = first + (last - first) / 2;
     const double moved = body.speed_max * to_seconds(last - middle);
-    balls.push_back({body.T_world_body(middle).translation, bounding_radius(body.shape) + moved});
+    const Vector3d half = Vector3d::Constant(bounding_radius(body.shape) + moved);
+    const Vector3d center = body.T_world_body(middle).translation;
+    boxes.push_back({center - half, center + half});
   }
-  auto made = std::make_shared<const Slice>(Slice{std::move(bodies), BallTree(std::move(balls))});
+  auto made = std::make_shared<const Slice>(Slice{std::move(bodies), BoxTree(std::move(boxes))});
   const std::lock_guard lock(known_->mutex);
   known_->slices[number] = made;  // another thread may have made the same
   if (known_->slices.size() > kSlicesKept) known_->slices.erase(known_->slices.begin());
   return made;
 }
 
-std::vector<Body> Obstacles::near(const Vector3d& place_world,
+std::vector<Body> Obstacles::near(const Vector3d& position_world,
                                   double reach,
                                   SimTime from,
                                   SimTime until) const {
@@ -233,7 +236,7 @@ std::vector<Body> Obstacles::near(const Vector3d& place_world,
   const std::int64_t last = until.time_since_epoch() / kSlice;
   for (std::int64_t number = first; number <= last; ++number) {
     const auto slice = this->slice(number);
-    for (const std::uint32_t i : slice->tree.within(place_world, reach)) {
+    for (const std::uint32_t i : slice->tree.within(position_world, reach)) {
       found.push_back(slice->bodies[i]);
     }
   }

@@ -11,7 +11,7 @@
 
 #include "pointflight/core/parallel.hpp"
 #include "pointflight/core/settings.hpp"
-#include "pointflight/geometry/internal/ball_tree.hpp"
+#include "pointflight/geometry/internal/box_tree.hpp"
 #include "pointflight/geometry/solid_kind.hpp"
 #include "pointflight/map/body.hpp"
 
@@ -19,7 +19,7 @@ namespace pointflight {
 
 /// How an obstacle moves.
 enum class ObstacleMotion {
-  kRandom,     ///< Straight, from free place to free place.
+  kRandom,     ///< Straight, from free position to free position.
   kStill,      ///< Stands at `position`.
   kLoop,       ///< Through `waypoints`, round and round.
   kKeyframes,  ///< As a file says.
@@ -65,7 +65,7 @@ struct ObstacleSettings {
 /// The keys of an entry.
 void describe(SettingsVisitor& visitor, ObstacleSettings& settings);
 
-/// A place that must be free of obstacles at the start.
+/// A position that must be free of obstacles at the start.
 struct KeepFree {
   Vector3d center_world;  ///< m
   double radius;          ///< m
@@ -73,12 +73,12 @@ struct KeepFree {
 
 /// What obstacles are made from.
 struct ObstacleWorld {
-  std::shared_ptr<const SurfelMap> map;  ///< Never null: where free places are looked for.
+  std::shared_ptr<const SurfelMap> map;  ///< Never null: where free positions are looked for.
   std::uint64_t seed = 1;                ///< The run's.
   std::vector<KeepFree> keep_free;       ///< Starts of vehicles.
   std::string folder;                    ///< Relative paths are taken from here.
   /// Where a key of entry i stands ("scenario.yaml:12: obstacles[0].radius"), for messages.
-  std::function<std::string(std::size_t entry, const char* key)> place;
+  std::function<std::string(std::size_t entry, const char* key)> location;
 };
 
 /// One moving thing. Its number within the run is its entity in the random streams.
@@ -98,7 +98,7 @@ class Obstacle {
 class Obstacles {
  public:
   Obstacles() = default;
-  /// Reads files, imports clouds, looks for free places. Throws InputError.
+  /// Reads files, imports clouds, looks for free positions. Throws InputError.
   Obstacles(const std::vector<ObstacleSettings>& settings,
             const ObstacleWorld& world,
             const Executor& executor);
@@ -109,9 +109,9 @@ class Obstacles {
   /// Bodies between two instants. Callable from several threads.
   [[nodiscard]] std::vector<Body> bodies(SimTime from, SimTime until) const;
 
-  /// Those that may come within `reach` of a place between two instants, and perhaps some more, in
-  /// the order of their labels. Looks at no others. Callable from several threads.
-  [[nodiscard]] std::vector<Body> near(const Vector3d& place_world,
+  /// Those that may come within `reach` of a position between two instants, and perhaps some more,
+  /// in the order of their labels. Looks at no others. Callable from several threads.
+  [[nodiscard]] std::vector<Body> near(const Vector3d& position_world,
                                        double reach,
                                        SimTime from,
                                        SimTime until) const;
@@ -120,7 +120,7 @@ class Obstacles {
   /// All bodies of a slice of time, and where each can be in it.
   struct Slice {
     std::vector<Body> bodies;
-    BallTree tree;
+    BoxTree tree;
   };
   /// What is worked out as time goes on; functions of the obstacles, so that all may share it.
   struct Known {

@@ -34,7 +34,7 @@ RandomFlight::RandomFlight(const ObstacleSettings& settings,
                            const Aabb& bounds,
                            const ObstacleWorld& world,
                            std::uint32_t number,
-                           const std::string& place)
+                           const std::string& location)
     : settings_(settings),
       cloud_(std::move(cloud)),
       bounds_(bounds),
@@ -42,11 +42,11 @@ RandomFlight::RandomFlight(const ObstacleSettings& settings,
       keep_free_(world.keep_free),
       random_(world.seed, StreamId::kObstacles, number),
       label_(kFirstObstacle + number),
-      place_(place) {
+      location_(location) {
   lives_.push_back(life(0, SimTime{}, true));
 }
 
-Vector3d RandomFlight::free_place(std::uint64_t n, double radius, bool strict) const {
+Vector3d RandomFlight::free_position(std::uint64_t n, double radius, bool strict) const {
   Vector3d best = bounds_.min;
   double best_room = -1.0;
   for (std::uint64_t attempt = 0; attempt < kTries; ++attempt) {
@@ -68,10 +68,10 @@ Vector3d RandomFlight::free_place(std::uint64_t n, double radius, bool strict) c
   }
   if (strict) {
     throw InputError(fmt::format(
-        "{}: no free place for an obstacle that reaches {:.2f} m to all sides was found "
+        "{}: no free position for an obstacle that reaches {:.2f} m to all sides was found "
         "within ({:.1f}, {:.1f}, {:.1f}) to ({:.1f}, {:.1f}, {:.1f}) in {} tries; make it "
         "smaller, or give bounds_min and bounds_max",
-        place_,
+        location_,
         radius,
         bounds_.min.x(),
         bounds_.min.y(),
@@ -97,7 +97,7 @@ RandomFlight::Life RandomFlight::life(std::uint64_t n, SimTime from, bool strict
     size.radius = radius;
     life.shape = (*settings_.shape)->make(size);
   }
-  life.start = free_place(n, bounding_radius(life.shape), strict);
+  life.start = free_position(n, bounding_radius(life.shape), strict);
 
   const auto [u, v] = random_.uniform2(base + kDirectionDraw);
   const double z = settings_.directions == FlightDirections::kHorizontal ? 0.0 : 2.0 * u - 1.0;

@@ -8,18 +8,18 @@
 namespace pointflight {
 
 /// The paper's dynamic obstacle (section IV.E): constant velocity in a random direction; outside
-/// the bounds it is replaced at a random free place, with a new size, direction and speed.
+/// the bounds it is replaced at a random free position, with a new size, direction and speed.
 /// "bounce" turns it back at the bounds instead.
 class RandomFlight : public Obstacle {
  public:
-  /// `settings` of the entry, `bounds` already decided. Throws InputError if no free place is
-  /// found at the start; `place` says where the entry stands.
+  /// `settings` of the entry, `bounds` already decided. Throws InputError if no free position is
+  /// found at the start; `location` says where the entry stands.
   RandomFlight(const ObstacleSettings& settings,
                std::shared_ptr<const SurfelMap> cloud,
                const Aabb& bounds,
                const ObstacleWorld& world,
                std::uint32_t number,
-               const std::string& place);
+               const std::string& location);
 
   void collect(SimTime from, SimTime until, std::vector<Body>& bodies) const override;
   void extend(SimTime until) override;
@@ -32,9 +32,9 @@ class RandomFlight : public Obstacle {
     Vector3d start;
     Vector3d velocity;
   };
-  /// Life number n, which starts at `from`; `strict`: throws if no place is free.
+  /// Life number n, which starts at `from`; `strict`: throws if no position is free.
   [[nodiscard]] Life life(std::uint64_t n, SimTime from, bool strict) const;
-  [[nodiscard]] Vector3d free_place(std::uint64_t n, double radius, bool strict) const;
+  [[nodiscard]] Vector3d free_position(std::uint64_t n, double radius, bool strict) const;
 
   ObstacleSettings settings_;
   std::shared_ptr<const SurfelMap> cloud_;
@@ -43,7 +43,7 @@ class RandomFlight : public Obstacle {
   std::vector<KeepFree> keep_free_;
   RandomStream random_;
   Label label_;
-  std::string place_;
+  std::string location_;
   std::vector<Life> lives_;
 };
 

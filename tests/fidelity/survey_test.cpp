@@ -189,7 +189,7 @@ TEST(SeenSurfaces, AreSeenNearAReturnFromItsSide) {
 TEST(SeenSurfaces, OneReturnStandsForOthersOfItsDirectionAlone) {
   SeenSurfaces seen;
   seen.add({{0, 0, 0}, Vector3f::UnitX(), 1.0f});
-  seen.add({{2, 0, 0}, -Vector3f::UnitX(), 1.0f});  // the same place from behind
+  seen.add({{2, 0, 0}, -Vector3f::UnitX(), 1.0f});  // the same position from behind
   EXPECT_TRUE(seen.has({1, 0, 0}, -Vector3f::UnitX()));
   EXPECT_TRUE(seen.has({1, 0, 0}, Vector3f::UnitX()));
 }

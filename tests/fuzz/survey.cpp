@@ -9,7 +9,7 @@
 
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/survey/posed_scans.hpp"
-#include "pointflight/survey/surveyed_places.hpp"
+#include "pointflight/survey/surveyed_cells.hpp"
 
 namespace pointflight {
 namespace {
@@ -61,7 +61,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     const SurveyFolder survey(folder.files());
     const auto reader = survey.open();
     std::vector<SurveyRay> batch;
-    SurveyedPlaces places;
+    SurveyedCells places;
     while (reader->read(batch)) {
       for (const SurveyRay& ray : batch) {
         if (!ray.origin_world.allFinite() || !std::isfinite(ray.range)) __builtin_trap();

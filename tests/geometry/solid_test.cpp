@@ -147,7 +147,7 @@ TEST(Separation, IsTheDistanceThatAlternatingProjectionsFind) {
     const Separation s = separation(a, T_a, b, T_b);
     const double expected = alternating(a, T_a, b, T_b);
     if (s.distance <= 0.0) {
-      EXPECT_LT(expected, 1e-3);  // projections creep up to a touching place
+      EXPECT_LT(expected, 1e-3);  // projections creep up to a touching position
       continue;
     }
     ++apart;
@@ -155,9 +155,9 @@ TEST(Separation, IsTheDistanceThatAlternatingProjectionsFind) {
     EXPECT_LE(s.distance, expected + 1e-9);
     EXPECT_GT(s.distance, expected - 2e-4);
     worst = std::max(worst, expected - s.distance);
-    // the place lies on b, at that distance from a
-    EXPECT_NEAR(signed_distance(b, T_b.inverse() * s.place), 0.0, 1e-7);
-    EXPECT_NEAR(signed_distance(a, T_a.inverse() * s.place), s.distance, 1e-7);
+    // the position lies on b, at that distance from a
+    EXPECT_NEAR(signed_distance(b, T_b.inverse() * s.point), 0.0, 1e-7);
+    EXPECT_NEAR(signed_distance(a, T_a.inverse() * s.point), s.distance, 1e-7);
     const Separation back = separation(b, T_b, a, T_a);
     EXPECT_NEAR(back.distance, s.distance, 1e-8);
   }

@@ -308,14 +308,14 @@ TEST_F(Output, ScenariosThatCannotBeAreRefusedOrWarnedOf) {
   };
   const Result far = check("[940, 10, 3]");
   expect_user_error(far, "s.yaml:4: vehicle.start: (940.00, 10.00, 3.00) of drone0 is outside");
-  expect_contains(far.err, "the nearest free place found is (");
+  expect_contains(far.err, "the nearest free position found is (");
   for (const auto& [start, more, words] :
        {std::tuple{"[12, 10, -6]", "", "is below the floor"},
         std::tuple{"[12, 10, 300]", "  landed: true\n", "starts landed, but the ground is 29"}}) {
     const Result result = check(start, more);
     EXPECT_EQ(result.code, 0);
     expect_contains(result.err, words);
-    expect_contains(result.err, "the nearest free place found is (");
+    expect_contains(result.err, "the nearest free position found is (");
   }
   EXPECT_EQ(check("[12, 10, 4]").err, "");
   // beside the map there is nothing to fall on

@@ -193,7 +193,7 @@ bool reads_meshes() {
   return reads;
 }
 
-/// A few places changed: bits, bytes, cuts, words that are too large, pieces twice.
+/// A few positions changed: bits, bytes, cuts, words that are too large, pieces twice.
 std::string mutant_of(const std::string& seed, std::uint32_t number) {
   const RandomStream random(number, StreamId::kCloudSampling, 0);
   std::uint64_t drawn = 0;

@@ -158,8 +158,8 @@ std::pair<double, double> shares(const Surroundings& around, double range) {
   for (std::uint64_t i = 0; i < kBeams; ++i) {
     const auto [normal, unused] = random.normal2(3 * i);
     const auto [detection, place] = random.uniform2(3 * i + 1);
-    const auto [drop, drop_place] = random.uniform2(3 * i + 2);
-    const Return made = model.measure(wall, {normal, detection, place, drop, drop_place});
+    const auto [drop, drop_position] = random.uniform2(3 * i + 2);
+    const Return made = model.measure(wall, {normal, detection, place, drop, drop_position});
     if (made.range < 0.0f) continue;
     (made.label == kFalseReturn ? of_air : of_wall)++;
   }

@@ -41,7 +41,7 @@ double time_of_place(std::size_t i) {
   return 0.02 * static_cast<double>(i);
 }
 
-/// A scan as a sensor that turns with the body has it: each place at a time of its own.
+/// A scan as a sensor that turns with the body has it: each position at a time of its own.
 Scan scan_from(int number) {
   Scan scan;
   scan.start = SimTime(from_seconds(0.1 * number));
@@ -118,7 +118,7 @@ std::vector<SurveyRay> rays_of(const SurveySource& survey) {
   return rays;
 }
 
-/// Every ray ends at its place, to `tolerance`, and began at the sensor.
+/// Every ray ends at its position, to `tolerance`, and began at the sensor.
 void expect_places(const std::vector<SurveyRay>& rays, double tolerance, bool deskewed = false) {
   ASSERT_EQ(rays.size(), kScans * kPlaces.size());
   for (std::size_t i = 0; i < rays.size(); ++i) {

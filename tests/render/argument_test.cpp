@@ -103,7 +103,7 @@ TEST(Arguments, OfReadersAndWriters) {
                std::invalid_argument);
   EXPECT_FALSE(std::filesystem::exists(folder / "a.pcd"));
   const CsvTable table("a,b\n1,2\n", "table");
-  EXPECT_THROW(static_cast<void>(table.place(1)), std::out_of_range);
+  EXPECT_THROW(static_cast<void>(table.location(1)), std::out_of_range);
 }
 
 TEST(Arguments, ResolutionsHaveTwoDigits) {

@@ -129,7 +129,7 @@ TEST(Bodies, Statistics_AreSeenWhereTheyAreAtEachBeamsOwnTime) {
 }
 
 TEST(Bodies, OfPointsFollowTheSameRuleAsTheMap) {
-  // a ball of points that moves beside an exact one at the same place
+  // a ball of points that moves beside an exact one at the same position
   ShapeScene scene;
   scene.shapes.emplace_back(SceneSphere{Vector3d::Zero(), 0.5});
   const auto points = map_of(scene, 0.05);

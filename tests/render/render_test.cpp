@@ -305,7 +305,7 @@ TEST(BeamRenderer, TheShapeOfTheTreeDoesNotShow) {
   const auto b = render(BeamRenderer(Scene{map_from(high)}), rays);
   std::size_t differing = 0;
   for (std::size_t i = 0; i < rays.size(); ++i) {
-    // places are rounded from another leaf's corner
+    // positions are rounded from another leaf's corner
     const bool same =
         a[i].is_return() == b[i].is_return() && std::abs(a[i].range - b[i].range) < 1e-4f;
     differing += same ? 0 : 1;

@@ -38,7 +38,7 @@ class SpinningToAndFro : public Trajectory {
   double length_, rate_;
 };
 
-/// Walls with niches, so that a place along the corridor can be told.
+/// Walls with niches, so that a position along the corridor can be told.
 std::shared_ptr<const SurfelMap> corridor() {
   static const auto map = [] {
     ShapeScene scene;

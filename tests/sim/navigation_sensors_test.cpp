@@ -90,7 +90,7 @@ TEST(NavigationSensors, AMagnetometerSeesTheFieldOfItsPlace) {
 }
 
 /// Earth-centred coordinates by the closed form (WGS 84).
-Vector3d earth_centred(const GeodeticPlace& g) {
+Vector3d earth_centred(const GeodeticPosition& g) {
   const double e2 = (2.0 - 1.0 / 298.257223563) / 298.257223563;
   const double b = g.latitude * kDegree;
   const double l = g.longitude * kDegree;
@@ -101,7 +101,7 @@ Vector3d earth_centred(const GeodeticPlace& g) {
 }
 
 TEST(NavigationSensors, PlacesLieOnTheEllipsoid) {
-  const GeodeticPlace origin{48.2, 11.6, 520.0};
+  const GeodeticPosition origin{48.2, 11.6, 520.0};
   const double b = origin.latitude * kDegree;
   const double l = origin.longitude * kDegree;
   const Vector3d east(-std::sin(l), std::cos(l), 0.0);
@@ -127,7 +127,7 @@ TEST(NavigationSensors, FixesErrSlowlyAreLateAndStopInOutages) {
   EXPECT_NEAR(deviation_of(all, 5), s.velocity_noise, 0.2 * s.velocity_noise);
   double squares = 0.0;
   constexpr int kRuns = 60;
-  const GeodeticPlace truth = geodetic({s.latitude, s.longitude, s.altitude}, {10, 6, 3});
+  const GeodeticPosition truth = geodetic({s.latitude, s.longitude, s.altitude}, {10, 6, 3});
   for (int i = 0; i < kRuns; ++i) {
     const auto fix = measured("gnss", s, 0.3, i).front();
     const double north = (fix.values[0] - truth.latitude) * kDegree * 6.37e6;

@@ -128,7 +128,7 @@ TEST(Scenario, WhatIsWrittenReadsBackTheSame) {
   EXPECT_EQ(again.vehicles[0].lidars[2].renderer, "paper");
   EXPECT_TRUE(again.vehicles[0].lidars[1].snapshot);
   EXPECT_EQ(scenario_yaml(again), scenario_yaml(scenario));
-  EXPECT_EQ(again.place("vehicles[0].mission.speed").rfind("s.yaml:", 0), 0u);
+  EXPECT_EQ(again.location("vehicles[0].mission.speed").rfind("s.yaml:", 0), 0u);
 }
 
 /// Everything that a run delivers, folded into one number.
@@ -294,7 +294,7 @@ TEST(Simulation, ReportsACollisionOrStopsAtIt) {
   EXPECT_TRUE(stopped_sink.last.entered);
   // at the moment of contact: the sphere's radius before the pillar
   EXPECT_NEAR(stopped_sink.last.vehicle_world.x(), 8 - 0.3 - 0.26, 0.05);
-  EXPECT_NEAR(stopped_sink.last.place_world.x(), 7.7, 0.12);
+  EXPECT_NEAR(stopped_sink.last.position_world.x(), 7.7, 0.12);
 }
 
 TEST(Simulation, AMissionCutShortIsUnfinished) {

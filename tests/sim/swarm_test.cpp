@@ -175,7 +175,7 @@ TEST(Scenario, MistakesInASwarmSayWhere) {
   expect_contains(error("vehicles:\n  - model: quad_3300\n"), "s.yaml:3: vehicles[0].model");
   expect_contains(error("vehicles:\n  - name: a b\n    start: [10, 6, 3]\n"), "s.yaml:3: 'a b'");
   expect_contains(error("vehicle: {start: [10, 6, 3]}\nobstacles:\n  - radius: 7\n"),
-                  "obstacles[0].motion: no free place");
+                  "obstacles[0].motion: no free position");
   expect_contains(
       error(
           "vehicle: {start: [10, 6, 3]}\nobstacles:\n  - {motion: still, position: [10, 6, 3]}\n"),

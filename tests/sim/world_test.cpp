@@ -37,7 +37,7 @@ TEST(Collisions, SayWhoMetWhomWhenAndWhere) {
   EXPECT_EQ(met.partner, kFirstObstacle);
   // 3 m less both radii at 2 m/s
   EXPECT_NEAR(to_seconds(met.time), (3.0 - 0.3 - 0.26) / 2.0, 1e-4);
-  EXPECT_NEAR(met.place_world.y(), 6 - 0.26, 1e-3);
+  EXPECT_NEAR(met.position_world.y(), 6 - 0.26, 1e-3);
   EXPECT_LT(met.penetration, 2.0 * 0.001 + 1e-6);
   EXPECT_FALSE(sink.events[1].entered);
   EXPECT_NEAR(to_seconds(sink.events[1].time), (3.0 + 0.56) / 2.0, 1.5e-3);
@@ -191,7 +191,7 @@ TEST(Obstacles, ThoseThatAreNearAreFoundWithoutLookingAtAll) {
   settings[3].position = {4, 4, 2};
   ObstacleWorld world;
   world.map = hall();
-  world.place = [](std::size_t, const char*) { return std::string(); };
+  world.location = [](std::size_t, const char*) { return std::string(); };
   const Executor executor(1);
   const Obstacles all(settings, world, executor);
   // forwards, backwards and over several slices; the same set whatever was asked before

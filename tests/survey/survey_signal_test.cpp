@@ -46,7 +46,7 @@ constexpr double kDark = 0.08;   // the wall at x = 8
 constexpr double kBright = 0.4;  // the wall at y = 8
 constexpr double kLimit = 25.0;  // of signals
 
-/// Signals by the sensor's own law, from two places; each return is off by a factor of up to 2.
+/// Signals by the sensor's own law, from two positions; each return is off by a factor of up to 2.
 std::vector<SurveyRay> survey_of(const DetectionModel& sensor, std::size_t count) {
   const RandomStream random(7, StreamId::kTest, 0);
   std::vector<SurveyRay> rays;
@@ -111,7 +111,7 @@ TEST(SurveySignal, FindsTheReflectivityOfWallsFromAnyRangeAndIncidence) {
     SCOPED_TRACE(name);
     SignalOptions options;
     options.detection = load_lidar(name).detection;
-    options.detection.near = {{1.0, 0.02}, {4.0, 1.0}};  // one of the places is that near
+    options.detection.near = {{1.0, 0.02}, {4.0, 1.0}};  // one of the positions is that near
     options.limit = kLimit;
     const auto rays = survey_of(DetectionModel(options.detection, options.sun_klx), 60000);
     const Painted made = painted(*map, rays, options);

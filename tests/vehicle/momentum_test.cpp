@@ -47,7 +47,7 @@ class MomentumModel {
     return J.inverse() * (m.R.inverse() * m.L - rotor_momentum(m.w));
   }
 
-  /// External forces at their places; the air is all there is beside gravity.
+  /// External forces at their positions; the air is all there is beside gravity.
   [[nodiscard]] Momenta rate(const Momenta& m) const {
     const Vector3d om = omega(m);
     const Vector3d v = m.P / v_.mass;

@@ -1,5 +1,5 @@
-// Vehicles that lose a rotor: what is left of six or eight holds the place, of four it comes down
-// spinning.
+// Vehicles that lose a rotor: what is left of six or eight holds the position, of four it comes
+// down spinning.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -79,7 +79,7 @@ TEST(Mixer, WhatIsLeftMakesTheSameWrenchWhereItCan) {
 /// What became of a vehicle that hovers at a height of 20 m, of which a rotor has `share` of its
 /// speed from second 2 on.
 struct Loss {
-  double sideways = 0.0;  ///< Farthest from its place, m.
+  double sideways = 0.0;  ///< Farthest from its position, m.
   double sunk = 0.0;      ///< Farthest from the height that was asked for, m.
   double tilt_deg = 0.0;  ///< Greatest.
   double spin = 0.0;      ///< Greatest yaw rate, rad/s.

@@ -182,7 +182,7 @@ TEST(Contact, WithBodiesIsTheSeparationOfSolids) {
       BodyShape{points}, there, 9, Sphere{0.25}, Pose{Quaterniond::Identity(), {4.5, 1, 2}}, 2.0);
   ASSERT_TRUE(got);
   EXPECT_NEAR(got->distance, 0.75, 0.02);
-  EXPECT_NEAR(got->place_world.x(), 3.5, 0.05);
+  EXPECT_NEAR(got->position_world.x(), 3.5, 0.05);
 }
 
 TEST(Proximity, AWireOfSinglePointsIsMetAtTwentyMetresASecond) {
@@ -248,7 +248,7 @@ TEST(Proximity, TwoThatPassThroughEachOtherWithinAStepMeet) {
   EXPECT_EQ(events[0].partner, 12u);
   // they touch when 20 mm less a little apart: (0.21 - 0.02) / 40 m/s
   EXPECT_NEAR(to_seconds(events[0].time), 0.00475, 0.00002);
-  EXPECT_NEAR(events[0].place_world.x(), 0.005, 0.001);
+  EXPECT_NEAR(events[0].position_world.x(), 0.005, 0.001);
   EXPECT_FALSE(events.back().entered);
 }
 

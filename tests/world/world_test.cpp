@@ -19,7 +19,7 @@ TEST(Contact, OfABallBeforeAWallIsTheGap) {
         *map, Sphere{0.3}, {Quaterniond::Identity(), {5.0 - 0.3 - gap, 0.1, 0.2}}, 10.0);
     ASSERT_TRUE(c);
     EXPECT_NEAR(c->distance, gap, 0.005);
-    EXPECT_NEAR(c->place_world.x(), 5.0, 0.01);
+    EXPECT_NEAR(c->position_world.x(), 5.0, 0.01);
   }
   EXPECT_LT(
       contact_with_map(*map, Sphere{0.3}, {Quaterniond::Identity(), {4.8, 0, 0}}, 10.0)->distance,

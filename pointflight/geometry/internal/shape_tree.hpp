@@ -1,15 +1,15 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <optional>
 #include <vector>
 
+#include "pointflight/geometry/internal/box_tree.hpp"
 #include "pointflight/geometry/shape_scene.hpp"
 
 namespace pointflight {
 
-/// Exact ray casting into many shapes: a binary hierarchy of boxes, all in double.
+/// Exact ray casting into many shapes.
 class ShapeTree {
  public:
   /// Refers to `shapes`, which must outlive the tree and stay as they are.
@@ -26,17 +26,8 @@ class ShapeTree {
                                              const Vector3d& direction) const;
 
  private:
-  struct Node {
-    Aabb box;
-    std::uint32_t first = 0;  ///< Of the leaf's shapes in `order_`, or the right child.
-    std::uint32_t count = 0;  ///< Shapes of a leaf; 0 for an inner node, its left child follows it.
-  };
-  void build(std::uint32_t begin, std::uint32_t end);
-
   const std::vector<Shape>& shapes_;
-  std::vector<Aabb> boxes_;
-  std::vector<std::uint32_t> order_;
-  std::vector<Node> nodes_;
+  BoxTree tree_;
 };
 
 }  // namespace pointflight

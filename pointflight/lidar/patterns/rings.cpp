@@ -76,7 +76,7 @@ void check_interval(const LidarSettings& settings, const CsvTable& table) {
   throw InputError(fmt::format(
       "{}: rings.channel_interval_us: has no effect here: {} has a fire_time_us for each "
       "channel; remove it",
-      settings.place("rings.channel_interval_us"),
+      settings.location("rings.channel_interval_us"),
       settings.rings.table));
 }
 

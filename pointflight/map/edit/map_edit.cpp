@@ -35,7 +35,7 @@ Surfel turned(Surfel surfel, const Quaterniond& rotation) {
   return surfel;
 }
 
-/// True if a surfel of `map` stands for the place already: its cell, turned as it is, holds it.
+/// True if a surfel of `map` stands for the position already: its cell, turned as it is, holds it.
 bool covers(const SurfelMap& map, const Vector3d& p_map) {
   const double r = map.resolution();
   const Vector3d half(0.5 * r, 0.6 * r, 0.6 * r);  // centroids lie anywhere in their cells

@@ -2,33 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <nanoflann.hpp>
 
 #include "pointflight/core/hash.hpp"
 #include "pointflight/core/math.hpp"
+#include "pointflight/geometry/internal/point_tree.hpp"
 
 namespace pointflight {
-namespace {
-
-struct Points {
-  const std::vector<Vector3d>& points;
-  [[nodiscard]] std::size_t kdtree_get_point_count() const { return points.size(); }
-  [[nodiscard]] double kdtree_get_pt(std::size_t i, std::size_t axis) const {
-    return points[i][static_cast<int>(axis)];
-  }
-  template <class Bounds>
-  bool kdtree_get_bbox(Bounds& /*box*/) const {
-    return false;
-  }
-};
-
-using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, Points>,
-                                                 Points,
-                                                 3,
-                                                 std::uint32_t>;
-
-}  // namespace
-
 SpacingEstimate::Block SpacingEstimate::block_of(const Vector3d& point) {
   Block block{};
   for (int axis = 0; axis < 3; ++axis) {
@@ -88,16 +67,14 @@ double SpacingEstimate::median_spacing() const {
   };
   std::sort(distinct.begin(), distinct.end(), less);
   distinct.erase(std::unique(distinct.begin(), distinct.end()), distinct.end());
-  const Points points{distinct};
   if (distinct.size() < 20) return 0.0;
-  const Tree tree(3, points, nanoflann::KDTreeSingleIndexAdaptorParams(16));
-  const std::size_t stride = std::max<std::size_t>(1, distinct.size() / kMaxQueries);
+  const PointTree<Vector3d> tree(std::move(distinct));
+  const std::size_t count = tree.points().size();
+  const std::size_t stride = std::max<std::size_t>(1, count / kMaxQueries);
   std::vector<double> spacing;
-  for (std::size_t i = 0; i < distinct.size(); i += stride) {
-    std::uint32_t index[2];
-    double squared[2];
-    tree.knnSearch(distinct[i].data(), 2, index, squared);
-    if (squared[1] > 1e-12) spacing.push_back(std::sqrt(squared[1]));
+  for (std::size_t i = 0; i < count; i += stride) {
+    const double squared = tree.squared_spacing(i);
+    if (squared > 1e-12) spacing.push_back(std::sqrt(squared));
   }
   if (spacing.empty()) return 0.0;
   const auto middle = spacing.begin() + static_cast<std::ptrdiff_t>(spacing.size() / 2);

@@ -19,7 +19,7 @@ class SpacingEstimate {
   /// Median distance between a point and its nearest neighbour, m; 0 below 20 usable points.
   [[nodiscard]] double median_spacing() const;
 
-  /// Median of each coordinate: a place amid the cloud that stray points do not move.
+  /// Median of each coordinate: a position amid the cloud that stray points do not move.
   [[nodiscard]] Vector3d middle() const;
 
  private:

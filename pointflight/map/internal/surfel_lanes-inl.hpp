@@ -26,7 +26,7 @@ struct SurfelLanes {
 POINTFLIGHT_INLINE SurfelLanes load_surfels(const SurfelScale& scale, const SurfelWord* words) {
   SurfelLanes s;  // NOLINT(cppcoreguidelines-pro-type-member-init): all is written
   load_words(words, s.low, s.high);
-  const F8 step = splat(scale.place_step);
+  const F8 step = splat(scale.position_step);
   const F8 half = splat(0.5f);
   const U8 ten = splat_bits(1023u);
   s.x = (to_float(s.low & ten) + half) * step;

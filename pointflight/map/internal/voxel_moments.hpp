@@ -46,7 +46,7 @@ struct VoxelCell {
 
   [[nodiscard]] Moments moments() const;
 
-  /// Adds the points of another cell at the same place.
+  /// Adds the points of another cell at the same position.
   void add(const VoxelCell& other);
 };
 

@@ -35,8 +35,8 @@ struct Group {
 
 /// Up to 64 beams.
 struct BeamGroups {
-  // The beams' directions d as places (d.u / d.w, d.v / d.w) in a plane across the mean direction
-  // w: a rectangle around each group; lanes are groups.
+  // The beams' directions d as positions (d.u / d.w, d.v / d.w) in a plane across the mean
+  // direction w: a rectangle around each group; lanes are groups.
   alignas(32) float middle_u[8], middle_v[8], half_u[8], half_v[8], group_end[8];
   float u[3], v[3], w[3];
   float low_u, high_u, low_v, high_v;  ///< Around all groups.

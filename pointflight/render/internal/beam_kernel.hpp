@@ -62,7 +62,7 @@ std::uint64_t trace_beams(const KernelMap& map,
                           BeamGrouping grouping = BeamGrouping::kAutomatic);
 
 /// The same for beams of eight sub-rays each: rays 8 k to 8 k + 7 are beam k's, leave from one
-/// place, and follow each other in `order`, whose length is a multiple of eight. Besides
+/// point, and follow each other in `order`, whose length is a multiple of eight. Besides
 /// `nearest[k]`: how far the centre of the nearest surfel is that reaches into the rectangle around
 /// beam k's sub-rays by more than its fringe (m, along the beam; very large or infinite if there
 /// is none, and where the sub-rays are farther than 0.1 rad apart). It tells whether anything lies

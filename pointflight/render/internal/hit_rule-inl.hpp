@@ -21,7 +21,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace pointflight::HWY_NAMESPACE {
 
-/// A place in the frames of eight surfels, in their standard deviations.
+/// A position in the frames of eight surfels, in their standard deviations.
 struct Whitened {
   F8 x, y, z;
 };

@@ -79,7 +79,7 @@ POINTFLIGHT_INLINE std::uint64_t pairs_from_origins(const Packet& p,
     const F8 at_v = (in.v - splat(p.shift[g][1])) * per_depth;
     const F8 begin = depth - reach.w;
     const F8 per_begin = splat(1.0f) / begin;
-    // the reach across is that for the place seen from the apex
+    // the reach across is that for the position seen from the apex
     const F8 half_u = (reach.u + abs(at_u - reach.at_u) * reach.w) * per_begin;
     const F8 half_v = (reach.v + abs(at_v - reach.at_v) * reach.w) * per_begin;
     const M8 beside = (abs(at_u - splat(p.middle_u[g])) <= half_u + splat(p.half_u[g])) &

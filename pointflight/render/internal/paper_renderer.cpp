@@ -142,7 +142,7 @@ class CellWidths {
     std::sort(voxels_.begin(), voxels_.end());
   }
 
-  /// `visit(point in the world, its PaperPoints::Point but for the place)`
+  /// `visit(point in the world, its PaperPoints::Point without the position)`
   template <class Visit>
   void for_each_point(double gamma_threshold, const Visit& visit) const {
     const double r = map_.resolution();

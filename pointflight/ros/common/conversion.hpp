@@ -16,7 +16,7 @@ namespace pointflight {
 /// header.stamp and header.frame_id.
 msg::Header header_of(SimTime time, Duration epoch, const std::string& frame);
 
-/// A place.
+/// A position.
 msg::Point point_of(const Vector3d& v);
 /// A direction.
 msg::Vector3 vector_of(const Vector3d& v);
@@ -25,7 +25,7 @@ msg::Quaternion quaternion_of(const Quaterniond& q);
 /// In the frame that it is given in.
 msg::Pose pose_of(const Pose& pose);
 
-/// A place; what is not finite stays so.
+/// A position; what is not finite stays so.
 Vector3d vector_of(const msg::Point& v);
 /// A direction; what is not finite stays so.
 Vector3d vector_of(const msg::Vector3& v);

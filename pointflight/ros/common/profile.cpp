@@ -25,31 +25,31 @@ constexpr Named<ImuGravity> kGravities[] = {{ImuGravity::kUp, "up"}, {ImuGravity
 constexpr std::array<std::string_view, 2> kLivoxPackages = {"livox_ros_driver2",
                                                             "livox_ros_driver"};
 
-using Place = std::function<std::string(const std::string& key)>;
+using Location = std::function<std::string(const std::string& key)>;
 
 /// Throws if ROS would not take a name; what stands in braces is written out later.
 void check_pattern(const std::string& key,
                    const std::string& pattern,
                    bool is_topic,
-                   const Place& place) {
+                   const Location& location) {
   if (pattern.empty() || pattern == "-") return;
   const std::string text = with_names(pattern, {"x", 0, "x"});
   const std::string fault = is_topic ? topic_fault(text) : frame_fault(text);
   if (fault.empty()) return;
   throw InputError(fmt::format("{}: {}: '{}' is no {} for ROS: it {}",
-                               place(key),
+                               location(key),
                                key,
                                pattern,
                                is_topic ? "topic" : "frame",
                                fault));
 }
 
-/// Throws if a kind or layout is unknown, or a name is none for ROS; `place` gives file and line
+/// Throws if a kind or layout is unknown, or a name is none for ROS; `location` gives file and line
 /// of a key.
 void check_names(const std::vector<RosOutput>& outputs,
                  const std::vector<RosInput>& inputs,
                  const std::string& prefix,
-                 const Place& place) {
+                 const Location& location) {
   const auto check = [&](const std::string& key, const std::string& value, const auto& names) {
     const std::vector<std::string> known(names.begin(), names.end());
     if (std::find(known.begin(), known.end(), value) != known.end()) return;
@@ -57,7 +57,7 @@ void check_names(const std::vector<RosOutput>& outputs,
     std::vector<std::string> named = known;
     std::erase(named, "");  // left open
     throw InputError(fmt::format("{}: {}: '{}' is unknown; {}",
-                                 place(key),
+                                 location(key),
                                  key,
                                  value,
                                  close.empty() ? fmt::format("one of: {}", fmt::join(named, ", "))
@@ -71,13 +71,13 @@ void check_names(const std::vector<RosOutput>& outputs,
     const auto key = [&](const char* name) {
       return fmt::format("{}outputs[{}].{}", prefix, i, name);
     };
-    check_pattern(key("topic"), outputs[i].topic, true, place);
-    check_pattern(key("frame"), outputs[i].frame, false, place);
-    check_pattern(key("child_frame"), outputs[i].child_frame, false, place);
+    check_pattern(key("topic"), outputs[i].topic, true, location);
+    check_pattern(key("frame"), outputs[i].frame, false, location);
+    check_pattern(key("child_frame"), outputs[i].child_frame, false, location);
   }
   for (std::size_t i = 0; i < inputs.size(); ++i) {
     check(fmt::format("{}inputs[{}].kind", prefix, i), inputs[i].kind, input_types().names());
-    check_pattern(fmt::format("{}inputs[{}].topic", prefix, i), inputs[i].topic, true, place);
+    check_pattern(fmt::format("{}inputs[{}].topic", prefix, i), inputs[i].topic, true, location);
   }
 }
 
@@ -91,7 +91,7 @@ void check_vehicle_names(const Scenario& scenario) {
     throw InputError(fmt::format(
         "{}: {}: '{}' is part of ROS topics (/{}/odom), which take letters, digits and _ only; "
         "call it {}",
-        scenario.place(key),
+        scenario.location(key),
         key,
         name,
         name,
@@ -104,14 +104,14 @@ RosProfile read(SettingsReader& reader, const std::string& path) {
   describe(reader, profile);
   reader.finish();
   profile.path = path;
-  const Place place = [&](const std::string& key) {
+  const Location location = [&](const std::string& key) {
     const auto line = reader.lines().find(key);
     return line == reader.lines().end() ? path : fmt::format("{}:{}", path, line->second);
   };
-  check_names(profile.outputs, profile.inputs, "", place);
-  check_pattern("world_frame", profile.world_frame, false, place);
-  check_pattern("body_frame", profile.body_frame, false, place);
-  check_pattern("sensor_frame", profile.sensor_frame, false, place);
+  check_names(profile.outputs, profile.inputs, "", location);
+  check_pattern("world_frame", profile.world_frame, false, location);
+  check_pattern("body_frame", profile.body_frame, false, location);
+  check_pattern("sensor_frame", profile.sensor_frame, false, location);
   return profile;
 }
 
@@ -178,8 +178,9 @@ RosProfile profile_for(const Scenario& scenario, const std::string& name) {
                                  [&] { return load_ros_profile(ros.profile, scenario.folder()); })
                    : load_ros_profile(name);
   check_vehicle_names(scenario);
-  check_names(
-      ros.outputs, ros.inputs, "ros.", [&](const std::string& key) { return scenario.place(key); });
+  check_names(ros.outputs, ros.inputs, "ros.", [&](const std::string& key) {
+    return scenario.location(key);
+  });
   if (!ros.world_alias.empty()) profile.world_alias = ros.world_alias;
   const auto take = [](std::string& own, const std::string& base) {
     if (own.empty()) own = base;

@@ -197,7 +197,7 @@ class CollisionMarkers : public Output {
       const bool is_one = stream_.ros.run.vehicles.size() == 1;
       const std::string name = stream_.ros.names(event->vehicle).vehicle;
       stream_.send(msg::MarkerArray{{marker_of(Solid{Sphere{kCollisionRadius}},
-                                               {Quaterniond::Identity(), event->place_world},
+                                               {Quaterniond::Identity(), event->position_world},
                                                stream_.header(event->time),
                                                is_one ? "collisions" : "collisions/" + name,
                                                number,

@@ -26,7 +26,7 @@ bool has_rows(const std::filesystem::path& path) {
 SimTime time_at(const CsvTable& table, std::size_t row, int column) {
   const double time = table.at(row, column);
   if (!(time >= 0.0 && time <= kTimeMax)) {
-    throw InputError(fmt::format("{}: no time of a run", table.place(row)));
+    throw InputError(fmt::format("{}: no time of a run", table.location(row)));
   }
   return SimTime(from_seconds(time));
 }
@@ -34,7 +34,7 @@ SimTime time_at(const CsvTable& table, std::size_t row, int column) {
 Label label_at(const CsvTable& table, std::size_t row, int column) {
   const double label = table.at(row, column);
   if (label >= 0.0 && label <= 4e9) return static_cast<Label>(label);
-  throw InputError(fmt::format("{}: no label", table.place(row)));
+  throw InputError(fmt::format("{}: no label", table.location(row)));
 }
 
 Vector3d vector_at(const CsvTable& table, std::size_t row, int column) {

@@ -1,4 +1,4 @@
-// The tables that a run leaves in its folder, read with care: numbers, times, places, words.
+// The tables that a run leaves in its folder, read with care: numbers, times, positions, words.
 #pragma once
 
 #include <cstdint>

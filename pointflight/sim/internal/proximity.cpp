@@ -91,7 +91,7 @@ class Sensing {
     event.partner = partner;
     event.time = time;
     event.vehicle_world = query_.T_world_body.translation;
-    if (nearest_) event.place_world = nearest_->place_world;
+    if (nearest_) event.position_world = nearest_->position_world;
     return event;
   }
 
@@ -116,7 +116,7 @@ class Sensing {
     const Duration late = from_seconds((1.0 - meeting->share) * to_seconds(query_.step));
     CollisionEvent event = event_of(label, state_.started ? query_.now - late : query_.now);
     event.vehicle_world = interpolate(before_, query_.T_world_body, meeting->share).translation;
-    event.place_world = meeting->contact.place_world;
+    event.position_world = meeting->contact.position_world;
     event.penetration = inside ? -now->distance : 0.0;
     events_.push_back(event);
   }

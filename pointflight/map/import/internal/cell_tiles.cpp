@@ -28,7 +28,7 @@ SignedVoxel corner_of(SignedVoxel voxel, int bits) {
   return voxel;
 }
 
-/// First place from `at` on where `holds` does not, by steps that double: it is mostly near.
+/// First position from `at` on where `holds` does not, by steps that double: it is mostly near.
 template <class Iterator, class Predicate>
 Iterator first_behind(Iterator at, Iterator end, const Predicate& holds) {
   std::ptrdiff_t step = 1;

@@ -7,8 +7,9 @@
 
 namespace pointflight {
 
-/// Which places a survey has seen: those with a return in the same or a neighbouring cube of 0.1 m.
-class SurveyedPlaces {
+/// Which positions a survey has seen: those with a return in the same or a neighbouring cube of 0.1
+/// m.
+class SurveyedCells {
  public:
   /// A return.
   void add(const Vector3d& point_world);
@@ -20,6 +21,6 @@ class SurveyedPlaces {
 };
 
 /// Of all returns of a survey.
-SurveyedPlaces places_of(const SurveyOpener& survey);
+SurveyedCells surveyed_cells(const SurveyOpener& survey);
 
 }  // namespace pointflight

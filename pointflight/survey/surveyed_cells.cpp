@@ -1,6 +1,6 @@
-#include "pointflight/survey/surveyed_places.hpp"
+#include "pointflight/survey/surveyed_cells.hpp"
 
-#include "pointflight/survey/place_cells.hpp"
+#include "pointflight/survey/grid_cells.hpp"
 
 namespace pointflight {
 namespace {
@@ -14,22 +14,22 @@ bool is_in_reach(const Vector3d& p) {
 
 }  // namespace
 
-void SurveyedPlaces::add(const Vector3d& point_world) {
+void SurveyedCells::add(const Vector3d& point_world) {
   if (!is_in_reach(point_world)) return;
-  cells_.insert(place_key(place_cell(point_world, kCell)));
+  cells_.insert(grid_key(grid_cell(point_world, kCell)));
 }
 
-bool SurveyedPlaces::has(const Vector3d& point_world) const {
+bool SurveyedCells::has(const Vector3d& point_world) const {
   if (!is_in_reach(point_world)) return false;
-  const PlaceCell middle = place_cell(point_world, kCell);
+  const GridCell middle = grid_cell(point_world, kCell);
   for (std::int64_t i = 0; i < 27; ++i) {
-    if (cells_.contains(place_key(neighbour(middle, i)))) return true;
+    if (cells_.contains(grid_key(neighbour(middle, i)))) return true;
   }
   return false;
 }
 
-SurveyedPlaces places_of(const SurveyOpener& survey) {
-  SurveyedPlaces seen;
+SurveyedCells surveyed_cells(const SurveyOpener& survey) {
+  SurveyedCells seen;
   const auto reader = cloud_of(survey());
   std::vector<CloudPoint> points;
   while (reader->read(points)) {
