@@ -1,8 +1,5 @@
 #include <fmt/format.h>
 
-#include <CLI/App.hpp>
-#include <CLI/Config.hpp>
-#include <CLI/Formatter.hpp>
 #include <algorithm>
 #include <atomic>
 #include <chrono>
@@ -16,6 +13,7 @@
 #include <vector>
 
 #include "apps/campaign_results.hpp"
+#include "apps/cli.hpp"
 #include "apps/commands.hpp"
 #include "apps/modules.hpp"
 #include "apps/terminal.hpp"

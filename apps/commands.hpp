@@ -1,6 +1,6 @@
 #pragma once
 
-#include <CLI/App.hpp>
+#include "apps/cli.hpp"
 
 /// One function a subcommand: adds its flags and help to `app`; its callback does the work, throws
 /// InputError for what is wrong outside, and sets `exit_code` (0 if it does not).

@@ -1,14 +1,12 @@
 #include <fmt/format.h>
 
-#include <CLI/App.hpp>
-#include <CLI/Config.hpp>
-#include <CLI/Formatter.hpp>
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "apps/cli.hpp"
 #include "apps/commands.hpp"
 #include "apps/error_table.hpp"
 #include "apps/flags.hpp"

@@ -1,9 +1,9 @@
 #pragma once
 
-#include <CLI/App.hpp>
 #include <string>
 #include <vector>
 
+#include "apps/cli.hpp"
 #include "pointflight/geometry/types.hpp"
 #include "pointflight/io/cloud_reader.hpp"
 

@@ -1,9 +1,8 @@
 #include <fmt/format.h>
 
-#include <CLI/Config.hpp>
-#include <CLI/Formatter.hpp>
 #include <utility>
 
+#include "apps/cli.hpp"
 #include "apps/flags.hpp"
 #include "apps/map_edit.hpp"
 #include "apps/terminal.hpp"

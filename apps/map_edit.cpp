@@ -2,11 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <CLI/Config.hpp>
-#include <CLI/Formatter.hpp>
 #include <filesystem>
 #include <utility>
 
+#include "apps/cli.hpp"
 #include "apps/flags.hpp"
 #include "apps/terminal.hpp"
 #include "pointflight/core/input_error.hpp"

@@ -1,11 +1,11 @@
 #pragma once
 
-#include <CLI/App.hpp>
 #include <functional>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "apps/cli.hpp"
 #include "pointflight/io/cloud_writer.hpp"
 #include "pointflight/map/edit/map_edit.hpp"
 #include "pointflight/map/import/map_points.hpp"

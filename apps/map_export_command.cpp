@@ -1,12 +1,11 @@
 #include <fmt/format.h>
 
-#include <CLI/Config.hpp>
-#include <CLI/Formatter.hpp>
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "apps/cli.hpp"
 #include "apps/flags.hpp"
 #include "apps/map_edit.hpp"
 #include "apps/settings_json.hpp"

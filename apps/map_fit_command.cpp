@@ -1,10 +1,9 @@
 #include <fmt/format.h>
 
-#include <CLI/Config.hpp>
-#include <CLI/Formatter.hpp>
 #include <memory>
 #include <utility>
 
+#include "apps/cli.hpp"
 #include "apps/flags.hpp"
 #include "apps/map_edit.hpp"
 #include "apps/survey_flags.hpp"

@@ -1,14 +1,12 @@
 #include <fmt/format.h>
 
-#include <CLI/App.hpp>
-#include <CLI/Config.hpp>
-#include <CLI/Formatter.hpp>
 #include <algorithm>
 #include <chrono>
 #include <filesystem>
 #include <memory>
 #include <optional>
 
+#include "apps/cli.hpp"
 #include "apps/flags.hpp"
 #include "apps/import_report.hpp"
 #include "apps/map_edit.hpp"

@@ -1,12 +1,11 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <CLI/Config.hpp>
-#include <CLI/Formatter.hpp>
 #include <cmath>
 #include <filesystem>
 #include <utility>
 
+#include "apps/cli.hpp"
 #include "apps/flags.hpp"
 #include "apps/map_edit.hpp"
 #include "apps/terminal.hpp"

@@ -1,9 +1,6 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include <CLI/App.hpp>
-#include <CLI/Config.hpp>
-#include <CLI/Formatter.hpp>
 #include <algorithm>
 #include <cerrno>
 #include <cstdlib>
@@ -15,6 +12,7 @@
 #include <sstream>
 #include <system_error>
 
+#include "apps/cli.hpp"
 #include "apps/commands.hpp"
 #include "apps/flags.hpp"
 #include "apps/terminal.hpp"

@@ -2,13 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <CLI/App.hpp>
-#include <CLI/Config.hpp>
-#include <CLI/Formatter.hpp>
 #include <algorithm>
 #include <chrono>
 #include <filesystem>
 
+#include "apps/cli.hpp"
 #include "apps/flags.hpp"
 #include "apps/modules.hpp"
 #include "apps/terminal.hpp"

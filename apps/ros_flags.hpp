@@ -1,12 +1,12 @@
 #pragma once
 
-#include <CLI/App.hpp>
 #include <memory>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "apps/cli.hpp"
 #include "apps/flight_part.hpp"
 #include "apps/view_flags.hpp"
 #include "pointflight/ros/common/ros_link.hpp"

@@ -2,14 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <CLI/App.hpp>
-#include <CLI/Config.hpp>
-#include <CLI/Formatter.hpp>
 #include <cmath>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "apps/cli.hpp"
 #include "apps/commands.hpp"
 #include "apps/flags.hpp"
 #include "apps/settings_json.hpp"

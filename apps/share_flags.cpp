@@ -3,13 +3,11 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include <CLI/App.hpp>
-#include <CLI/Config.hpp>
-#include <CLI/Formatter.hpp>
 #include <array>
 #include <chrono>
 #include <random>
 
+#include "apps/cli.hpp"
 #include "apps/modules.hpp"
 #include "apps/terminal.hpp"
 #include "pointflight/core/input_error.hpp"

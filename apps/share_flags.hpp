@@ -1,11 +1,11 @@
 #pragma once
 
-#include <CLI/App.hpp>
 #include <memory>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "apps/cli.hpp"
 #include "apps/flight_part.hpp"
 #include "pointflight/run/run_loop.hpp"
 #include "pointflight/share/share_link.hpp"

@@ -1,8 +1,6 @@
 #include "apps/surroundings_flags.hpp"
 
-#include <CLI/Config.hpp>
-#include <CLI/Formatter.hpp>
-
+#include "apps/cli.hpp"
 #include "apps/flags.hpp"
 
 namespace pointflight::apps {

@@ -1,8 +1,8 @@
 #pragma once
 
-#include <CLI/App.hpp>
 #include <vector>
 
+#include "apps/cli.hpp"
 #include "pointflight/lidar/return_model.hpp"
 
 namespace pointflight::apps {

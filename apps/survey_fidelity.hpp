@@ -1,11 +1,11 @@
 #pragma once
 
-#include <CLI/App.hpp>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "apps/cli.hpp"
 #include "pointflight/core/parallel.hpp"
 #include "pointflight/core/progress.hpp"
 #include "pointflight/fidelity/exact_scene.hpp"

@@ -1,11 +1,11 @@
 #pragma once
 
-#include <CLI/App.hpp>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "apps/cli.hpp"
 #include "pointflight/core/output_file.hpp"
 #include "pointflight/recording/recorded_survey.hpp"
 #include "pointflight/survey/map_fit.hpp"

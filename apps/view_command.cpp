@@ -1,8 +1,5 @@
 #include <fmt/format.h>
 
-#include <CLI/App.hpp>
-#include <CLI/Config.hpp>
-#include <CLI/Formatter.hpp>
 #include <array>
 #include <chrono>
 #include <filesystem>
@@ -12,6 +9,7 @@
 #include <thread>
 #include <vector>
 
+#include "apps/cli.hpp"
 #include "apps/commands.hpp"
 #include "apps/survey_flags.hpp"
 #include "apps/terminal.hpp"

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <CLI/App.hpp>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -8,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "apps/cli.hpp"
 #include "pointflight/map/surfel_map.hpp"
 #include "pointflight/view/live_server.hpp"
 

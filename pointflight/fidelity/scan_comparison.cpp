@@ -8,7 +8,7 @@
 #include <limits>
 
 #include "pointflight/core/input_error.hpp"
-#include "pointflight/geometry/internal/point_tree.hpp"
+#include "pointflight/geometry/internal/point_tree-inl.hpp"
 #include "pointflight/io/cloud_reader.hpp"
 
 namespace pointflight {

@@ -46,16 +46,56 @@ MapSection section_named(std::string_view name) {
   return section;
 }
 
+/// False if a parameter is none that maps have.
+bool is_sane(const MapProperties& p) {
+  const auto within = [](double value, double min, double max) {
+    return value >= min && value <= max;
+  };
+  const bool is_finite = p.origin_world.allFinite() && std::isfinite(p.intensity_offset) &&
+                         std::isfinite(p.intensity_step);
+  return is_finite && within(p.resolution, kMinResolution, kMaxResolution) &&
+         within(static_cast<double>(p.model.support), 1.0, 10.0) &&
+         within(static_cast<double>(p.model.tau), 0.01, 1.0) &&
+         within(static_cast<double>(p.model.window), 0.01, 10.0);
+}
+
+MapHeader header_of(const MapProperties& p) {
+  MapHeader header{};
+  std::memcpy(header.magic, kMapMagic, sizeof kMapMagic);
+  header.version = kMapVersion;
+  header.resolution = p.resolution;
+  for (int axis = 0; axis < 3; ++axis) {
+    header.origin[axis] = p.origin_world[axis];
+    header.bounds_min[axis] = p.bounds_world.min[axis];
+    header.bounds_max[axis] = p.bounds_world.max[axis];
+  }
+  header.support = p.model.support;
+  header.tau = p.model.tau;
+  header.window = p.model.window;
+  header.intensity_offset = p.intensity_offset;
+  header.intensity_step = p.intensity_step;
+  header.surfel_count = p.surfel_count;
+  return header;
+}
+
+MapProperties properties_of(const MapHeader& header) {
+  MapProperties p;
+  p.resolution = header.resolution;
+  for (int axis = 0; axis < 3; ++axis) {
+    p.origin_world[axis] = header.origin[axis];
+    p.bounds_world.min[axis] = header.bounds_min[axis];
+    p.bounds_world.max[axis] = header.bounds_max[axis];
+  }
+  p.model = {header.support, header.tau, header.window};
+  p.intensity_offset = header.intensity_offset;
+  p.intensity_step = header.intensity_step;
+  p.surfel_count = header.surfel_count;
+  return p;
+}
+
 /// A map that could not be opened again is not written.
 void check(const Bvh8& tree, const MapDescription& d) {
-  require_argument(d.resolution >= kMinResolution && d.resolution <= kMaxResolution &&
-                       d.origin_world.allFinite() && std::isfinite(d.intensity_offset) &&
-                       std::isfinite(d.intensity_step),
-                   "write_map: the resolution, the origin or the scale of intensities is no number "
-                   "that maps have");
-  require_argument(d.model.support >= 1.0f && d.model.tau >= 0.01f && d.model.tau <= 1.0f &&
-                       d.model.window >= 0.01f,
-                   "write_map: the render model is out of range");
+  require_argument(is_sane(d), "write_map: a property of the map is out of range");
   require_argument(tree.words.size() >= kLeafPadding &&
                        (tree.intensity.size() == 0 || tree.intensity.size() == tree.words.size()),
                    "write_map: the tree is not one that build_bvh8 made");
@@ -81,22 +121,8 @@ Layout lay_out(const Bvh8& tree, const MapDescription& d) {
     add(extra.name, extra.bytes);
   }
   require_argument(table.size() <= kMapSectionsMax, "write_map: too many sections");
-  MapHeader header{};
-  std::memcpy(header.magic, kMapMagic, sizeof kMapMagic);
-  header.version = kMapVersion;
+  MapHeader header = header_of(d);
   header.section_count = static_cast<std::uint32_t>(table.size());
-  header.resolution = d.resolution;
-  for (int axis = 0; axis < 3; ++axis) {
-    header.origin[axis] = d.origin_world[axis];
-    header.bounds_min[axis] = d.bounds_world.min[axis];
-    header.bounds_max[axis] = d.bounds_world.max[axis];
-  }
-  header.support = d.model.support;
-  header.tau = d.model.tau;
-  header.window = d.model.window;
-  header.intensity_offset = d.intensity_offset;
-  header.intensity_step = d.intensity_step;
-  header.surfel_count = d.surfel_count;
   std::size_t offset = kMapHeaderSize;
   for (std::size_t i = 0; i < table.size(); ++i) {
     layout.offsets.push_back(offset);
@@ -195,19 +221,6 @@ void check_sections(std::span<const MapSection> sections,
   }
 }
 
-/// False if a parameter is none.
-bool is_sane(const MapHeader& header) {
-  bool finite = std::isfinite(header.intensity_offset) && std::isfinite(header.intensity_step);
-  for (int axis = 0; axis < 3; ++axis) finite = finite && std::isfinite(header.origin[axis]);
-  const auto within = [](double value, double min, double max) {
-    return value >= min && value <= max;
-  };
-  return finite && within(header.resolution, kMinResolution, kMaxResolution) &&
-         within(static_cast<double>(header.support), 1.0, 10.0) &&
-         within(static_cast<double>(header.tau), 0.01, 1.0) &&
-         within(static_cast<double>(header.window), 0.01, 10.0);
-}
-
 }  // namespace
 
 void write_map(OutputFile file, const Bvh8& tree, const MapDescription& description) {
@@ -274,7 +287,8 @@ void SurfelMap::attach(std::span<const std::byte> bytes, const std::string& name
     fail(12, "wrong number of sections");
   }
   check_sections(sections_, bytes, fail);
-  if (!is_sane(header)) fail(16, "a parameter in the header is out of range");
+  properties_ = properties_of(header);
+  if (!is_sane(properties_)) fail(16, "a parameter in the header is out of range");
   bytes_ = bytes;
   nodes_ = view_of<Bvh8Node>(section("nodes"));
   words_ = view_of<SurfelWord>(section("words"));
@@ -284,34 +298,25 @@ void SurfelMap::attach(std::span<const std::byte> bytes, const std::string& name
   if (words_.size() < kLeafPadding || (!intensity_.empty() && intensity_.size() != words_.size())) {
     fail(kMapHeaderSize, "section lengths do not fit each other");
   }
+  const auto corrupt = [&](const char* name, std::span<const std::byte> found) {
+    fail(static_cast<std::size_t>(found.data() - bytes.data()),
+         fmt::format("the section '{}' is corrupt", name));
+  };
   if (const auto known = section(KnownSpace::kSection); !known.empty()) {
     known_ = KnownSpace::from_section(known);
-    if (!known_)
-      fail(static_cast<std::size_t>(known.data() - bytes.data()),
-           "the section 'known_space' is corrupt");
+    if (!known_) corrupt(KnownSpace::kSection, known);
   }
   if (const auto scale = section(kReflectivitySection); !scale.empty()) {
     if (scale.size() == sizeof reflectivity_) {
       std::memcpy(&reflectivity_, scale.data(), sizeof reflectivity_);
     }
     if (!(reflectivity_ > 0.0) || !std::isfinite(reflectivity_)) {
-      fail(static_cast<std::size_t>(scale.data() - bytes.data()),
-           "the section 'reflectivity' is corrupt");
+      corrupt(kReflectivitySection, scale);
     }
   }
   name_ = name;
   file_size_ = bytes.size();
-  resolution_ = header.resolution;
-  scale_ = SurfelScale(static_cast<float>(resolution_));
-  for (int axis = 0; axis < 3; ++axis) {
-    origin_[axis] = header.origin[axis];
-    bounds_.min[axis] = header.bounds_min[axis];
-    bounds_.max[axis] = header.bounds_max[axis];
-  }
-  model_ = {header.support, header.tau, header.window};
-  surfel_count_ = header.surfel_count;
-  intensity_offset_ = header.intensity_offset;
-  intensity_step_ = header.intensity_step;
+  scale_ = SurfelScale(static_cast<float>(properties_.resolution));
 }
 
 const KnownSpace& known_space_of(const SurfelMap& map) {

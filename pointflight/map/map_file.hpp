@@ -75,17 +75,10 @@ struct ExtraSection {
 };
 
 /// What `write_map` stores beside the hierarchy.
-struct MapDescription {
-  double resolution = 0.0;                   ///< r, m.
-  Vector3d origin_world = Vector3d::Zero();  ///< Of the corner of voxel (0, 0, 0), m.
-  Aabb bounds_world;                         ///< Of the surfel centres, m.
-  RenderModel model;                         ///< Constants of the hit rule.
-  bool has_intensity = false;                ///< The tree has intensities.
-  float intensity_offset = 0.0f;             ///< Of byte 0, in the cloud's scale.
-  float intensity_step = 0.0f;               ///< From one byte's value to the next.
-  std::uint64_t surfel_count = 0;            ///< For `map info`.
-  std::string metadata;                      ///< JSON.
-  std::vector<ExtraSection> extra;           ///< Further sections; edits keep what they know.
+struct MapDescription : MapProperties {
+  bool has_intensity = false;       ///< The tree has intensities.
+  std::string metadata;             ///< JSON.
+  std::vector<ExtraSection> extra;  ///< Further sections; edits keep what they know.
 };
 
 /// Writes and commits a map: it appears under its name only when complete. Throws InputError.

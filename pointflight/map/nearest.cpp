@@ -7,8 +7,8 @@ namespace pointflight {
 
 std::optional<Nearest> SurfelMap::nearest(const Vector3d& point_world, double max_distance) const {
   if (!point_world.allFinite() || !(max_distance >= 0.0)) return std::nullopt;
-  const NearestWord found =
-      find_nearest(nodes_, words_, scale_, resolution_, point_world - origin_, max_distance);
+  const NearestWord found = find_nearest(
+      nodes_, words_, scale_, resolution(), point_world - origin_world(), max_distance);
   if (found.word == 0) return std::nullopt;
   const LeafHeader leaf = decode_leaf(words_[found.leaf]);
   const Vector3d center = center_world(leaf, words_[found.word]);

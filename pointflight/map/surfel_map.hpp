@@ -23,6 +23,17 @@ struct RenderModel {
   float window = 0.5f;       ///< Depth over which coverage adds up, in units of r.
 };
 
+/// What the header of a map says.
+struct MapProperties {
+  double resolution = 0.0;                   ///< r, m.
+  Vector3d origin_world = Vector3d::Zero();  ///< Of the corner of voxel (0, 0, 0), m.
+  Aabb bounds_world;                         ///< Of the surfel centres, m.
+  RenderModel model;                         ///< Constants of the hit rule that it is made for.
+  float intensity_offset = 0.0f;             ///< Of byte 0, in the cloud's scale.
+  float intensity_step = 0.0f;               ///< From one byte's value to the next.
+  std::uint64_t surfel_count = 0;            ///< Leaf headers not counted.
+};
+
 /// A row of the table of sections in a map file (map_file.hpp).
 struct MapSection {
   char name[16];           ///< "nodes", filled up with zeros.
@@ -69,15 +80,18 @@ class SurfelMap {
 
   virtual ~SurfelMap() = default;
 
-  [[nodiscard]] double resolution() const { return resolution_; }         ///< r, m.
-  [[nodiscard]] const Vector3d& origin_world() const { return origin_; }  ///< Of voxel (0, 0, 0).
-  [[nodiscard]] const Aabb& bounds_world() const { return bounds_; }  ///< Of the surfel centres.
-  /// Constants of the hit rule that it was made for.
-  [[nodiscard]] const RenderModel& model() const { return model_; }
+  /// As its header says; what follows are its parts.
+  [[nodiscard]] const MapProperties& properties() const { return properties_; }
+  /// As `MapProperties`.
+  ///@{
+  [[nodiscard]] double resolution() const { return properties_.resolution; }
+  [[nodiscard]] const Vector3d& origin_world() const { return properties_.origin_world; }
+  [[nodiscard]] const Aabb& bounds_world() const { return properties_.bounds_world; }
+  [[nodiscard]] const RenderModel& model() const { return properties_.model; }
+  [[nodiscard]] std::uint64_t surfel_count() const { return properties_.surfel_count; }
+  ///@}
   /// The constants that its surfels are decoded with.
   [[nodiscard]] const SurfelScale& scale() const { return scale_; }
-  /// As its header says.
-  [[nodiscard]] std::uint64_t surfel_count() const { return surfel_count_; }
   /// As it was opened, for messages.
   [[nodiscard]] const std::string& name() const { return name_; }
   /// Bytes.
@@ -108,21 +122,18 @@ class SurfelMap {
 
   /// Centre of a surfel of that leaf, m.
   [[nodiscard]] Vector3d center_world(const LeafHeader& leaf, SurfelWord word) const {
-    return origin_ +
-           resolution_ * (Vector3d(leaf.x, leaf.y, leaf.z) + center_voxels(word).cast<double>());
+    return origin_world() +
+           resolution() * (Vector3d(leaf.x, leaf.y, leaf.z) + center_voxels(word).cast<double>());
   }
 
   /// Codes of the intensities beside `words`, empty without: offset + step * code.
   [[nodiscard]] std::span<const std::uint8_t> intensity_codes() const { return intensity_; }
-  /// In the cloud's own scale.
-  [[nodiscard]] float intensity_offset() const { return intensity_offset_; }
-  /// In the cloud's own scale, for each step of a code.
-  [[nodiscard]] float intensity_step() const { return intensity_step_; }
 
   /// Intensity of the surfel at a word index, in the cloud's own scale; 0 without intensities.
   [[nodiscard]] float intensity(std::uint32_t word) const {
     return word < intensity_.size()
-               ? intensity_offset_ + intensity_step_ * static_cast<float>(intensity_[word])
+               ? properties_.intensity_offset +
+                     properties_.intensity_step * static_cast<float>(intensity_[word])
                : 0.0f;
   }
 
@@ -142,7 +153,7 @@ class SurfelMap {
       const Surfel surfel = decode(words_[word]);
       const Vector3d center = center_world(leaf, words_[word]);
       const Vector3d normal = surfel.axes.col(0).cast<double>();
-      visit(center, normal, surfel.s[0] * resolution_, static_cast<std::uint32_t>(word));
+      visit(center, normal, surfel.s[0] * resolution(), static_cast<std::uint32_t>(word));
     });
   }
 
@@ -160,15 +171,9 @@ class SurfelMap {
   std::span<const std::uint8_t> intensity_;
   std::string_view metadata_;
   std::optional<KnownSpace> known_;
-  double resolution_ = 0.0;
+  MapProperties properties_;
   SurfelScale scale_;
-  Vector3d origin_ = Vector3d::Zero();
-  Aabb bounds_;
-  RenderModel model_;
-  std::uint64_t surfel_count_ = 0;
   std::uint64_t file_size_ = 0;
-  float intensity_offset_ = 0.0f;
-  float intensity_step_ = 0.0f;
   double reflectivity_ = 0.0;
 };
 

@@ -1,5 +1,7 @@
 #include "pointflight/sim/run_description.hpp"
 
+#include "pointflight/sim/simulation.hpp"
+
 namespace pointflight {
 
 RunDescription describe_run(const Simulation& simulation) {

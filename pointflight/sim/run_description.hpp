@@ -7,9 +7,15 @@
 #include <string>
 #include <vector>
 
-#include "pointflight/sim/simulation.hpp"
+#include "pointflight/geometry/assembly.hpp"
+#include "pointflight/lidar/lidar_settings.hpp"
+#include "pointflight/map/body.hpp"
+#include "pointflight/sim/samples.hpp"
+#include "pointflight/sim/scenario.hpp"
 
 namespace pointflight {
+
+class Simulation;
 
 /// A LiDAR on a vehicle.
 struct LidarDescription {

@@ -67,8 +67,8 @@ std::vector<std::byte> MapBlocks::index() const {
   put(out, static_cast<std::uint32_t>(map_->has_intensity() ? 1 : 0));
   for (int axis = 0; axis < 3; ++axis) put(out, map_->origin_world()[axis]);
   put(out, map_->resolution());
-  put(out, map_->intensity_offset());
-  put(out, map_->intensity_step());
+  put(out, map_->properties().intensity_offset);
+  put(out, map_->properties().intensity_step);
   const auto r = static_cast<float>(map_->resolution());
   for (const Block& block : blocks()) {
     for (std::size_t k = 0; k < 3; ++k) put(out, r * static_cast<float>(block.low[k]));

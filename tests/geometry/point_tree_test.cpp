@@ -1,9 +1,9 @@
-#include "pointflight/geometry/internal/point_tree.hpp"
-
 #include <gtest/gtest.h>
 
 #include <limits>
 #include <random>
+
+#include "pointflight/geometry/internal/point_tree-inl.hpp"
 
 namespace pointflight {
 namespace {

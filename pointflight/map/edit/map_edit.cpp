@@ -116,8 +116,10 @@ void join_intensities(const std::vector<PlacedMap>& maps, MapDescription& descri
   float high = -low;
   for (const PlacedMap& placed : maps) {
     if (!placed.map->has_intensity()) continue;
-    low = std::min(low, placed.map->intensity_offset());
-    high = std::max(high, placed.map->intensity_offset() + 255.0f * placed.map->intensity_step());
+    low = std::min(low, placed.map->properties().intensity_offset);
+    high = std::max(high,
+                    placed.map->properties().intensity_offset +
+                        255.0f * placed.map->properties().intensity_step);
   }
   description.has_intensity = low <= high;
   const double scale = maps.front().map->reflectivity_per_intensity();
@@ -148,14 +150,8 @@ std::uint8_t code_in(const MapDescription& description, float intensity) {
 
 MapDescription description_of(const SurfelMap& map) {
   MapDescription d;
-  d.resolution = map.resolution();
-  d.origin_world = map.origin_world();
-  d.bounds_world = map.bounds_world();
-  d.model = map.model();
+  static_cast<MapProperties&>(d) = map.properties();
   d.has_intensity = map.has_intensity();
-  d.intensity_offset = map.intensity_offset();
-  d.intensity_step = map.intensity_step();
-  d.surfel_count = map.surfel_count();
   d.metadata = std::string(map.metadata());
   for (const char* name : {KnownSpace::kSection, kReflectivitySection}) {
     const auto bytes = map.section(name);

@@ -5,7 +5,7 @@
 
 #include "pointflight/core/hash.hpp"
 #include "pointflight/core/math.hpp"
-#include "pointflight/geometry/internal/point_tree.hpp"
+#include "pointflight/geometry/internal/point_tree-inl.hpp"
 
 namespace pointflight {
 SpacingEstimate::Block SpacingEstimate::block_of(const Vector3d& point) {
