@@ -319,14 +319,6 @@ void SurfelMap::attach(std::span<const std::byte> bytes, const std::string& name
   scale_ = SurfelScale(static_cast<float>(properties_.resolution));
 }
 
-const KnownSpace& known_space_of(const SurfelMap& map) {
-  if (map.known_space() != nullptr) return *map.known_space();
-  throw InputError(
-      fmt::format("{} does not say what its survey saw: make it with 'map import --scans', or fit "
-                  "it with 'map fit --scans'",
-                  map.name()));
-}
-
 std::span<const std::byte> SurfelMap::section(std::string_view name) const {
   for (const MapSection& s : sections_) {
     if (name_of(s) == name) return bytes_.subspan(s.offset, s.size);

@@ -145,7 +145,7 @@ function showTime(t) {
 function showClock() {
   if (document.activeElement !== $("line")) $("line").value = state.last.t;
   $("time").textContent = `${state.last.t.toFixed(1)} s`;
-  $("pause").textContent = state.last.doing === "paused" ? "go on" : "pause";
+  $("pause").textContent = state.last.doing === "paused" ? "resume" : "pause";
 }
 
 function listVehicles() {
@@ -226,8 +226,9 @@ function showFigures() {
   const v = chosen()?.state ?? {};
   const now = state.last;
   const rows = [];
-  if (now) rows.push(["time", `${now.t.toFixed(2)} s`], [state.recording ? "pace" : "real-time factor", now.rate.toFixed(2)]);
-  if (v.p) rows.push(["place", `${v.p.map((x) => x.toFixed(2)).join(", ")} m`]);
+  if (now) rows.push(["time", `${now.t.toFixed(2)} s`]);
+  if (now && now.doing !== "paused") rows.push([state.recording ? "speed of replay" : "real-time factor", now.rate.toFixed(2)]);
+  if (v.p) rows.push(["position", `${v.p.map((x) => x.toFixed(2)).join(", ")} m`]);
   if (v.v) rows.push(["speed", `${Math.hypot(...v.v).toFixed(2)} m/s`]);
   // of another process' vehicle only the pose is told
   if (v.p && !state.recording && v.command !== undefined) {
@@ -237,7 +238,7 @@ function showFigures() {
     );
   }
   if (map.surfels) rows.push(["surfels drawn", `${large(map.drawn)} of ${large(map.surfels)}`]);
-  rows.push(["frame, script", `${budget.interval.toFixed(0)}, ${state.cost.toFixed(0)} ms`]);
+  if (query.has("debug")) rows.push(["frame, script", `${budget.interval.toFixed(0)}, ${state.cost.toFixed(0)} ms`]);
   $("figures").replaceChildren(
     ...rows.map(([name, value]) => {
       const row = document.createElement("tr");
