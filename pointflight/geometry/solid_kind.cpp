@@ -29,7 +29,7 @@ Registry<SolidKind>& SolidKind::table() {
 std::string kinds_with(bool SolidKind::*size) {
   std::string names;
   for (const SolidKind& kind : SolidKind::table().rows()) {
-    if (kind.*size) names += (names.empty() ? "shape: " : ", ") + kind.name;
+    if (size == nullptr || kind.*size) names += (names.empty() ? "shape: " : ", ") + kind.name;
   }
   return names;
 }

@@ -30,8 +30,8 @@ struct SolidKind {
   Solid (*make)(const SolidSize& s);  ///< Of sizes above 0; a capsule is a sphere at least.
 };
 
-/// "shape: sphere, cylinder": kinds with a size, as the condition of a key names them.
-std::string kinds_with(bool SolidKind::*size);
+/// "shape: sphere, cylinder": kinds with a size, or all, as the condition of a key names them.
+std::string kinds_with(bool SolidKind::*size = nullptr);
 
 /// What is wrong with a height for this radius (m), for users; null: nothing.
 const char* fault_of_height(const SolidKind& kind, double height, double radius);

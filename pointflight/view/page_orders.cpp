@@ -14,7 +14,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr double kFarthest = 1e7;   // m
+constexpr double kFarthestGoal = 1e7;   // m
 constexpr double kFastest = 200.0;  // m/s
 constexpr double kMostRate = 1000.0;
 constexpr double kLongestRun = 1e6;  // s
@@ -74,7 +74,7 @@ Order page_order(std::string_view text, const std::vector<MotionLimits>& motions
   if (order.contains("goal")) {
     WaypointCommand command;
     command.mission.motion = motions[told.vehicle];
-    command.mission.waypoints = {vector_of(order["goal"], "goal", kFarthest)};
+    command.mission.waypoints = {vector_of(order["goal"], "goal", kFarthestGoal)};
     told.command = command;
   } else if (order.contains("velocity")) {
     VelocityCommand command;

@@ -88,11 +88,13 @@ void describe_shape(SettingsVisitor& v, ObstacleSettings& s) {
   const bool is_cloud = !s.shape;
   const SolidKind* kind = is_cloud ? nullptr : &**s.shape;
   describe_solid(v, kind, s.size, 1000.0);
-  v.only_if(kind != nullptr && kind->has_radius && s.motion == ObstacleMotion::kRandom,
-            kinds_with(&SolidKind::has_radius) + "; motion: random",
+  v.only_if(kind != nullptr && kind->has_radius,
+            kinds_with(&SolidKind::has_radius),
             [&](SettingsVisitor& w) {
-              w.value({"radius_max", "m", "above radius: each is drawn between the two", 0, 1000},
-                      s.radius_max);
+              w.only_if(s.motion == ObstacleMotion::kRandom, "motion: random", [&](auto& x) {
+                x.value({"radius_max", "m", "above radius: each is drawn between the two", 0, 1000},
+                        s.radius_max);
+              });
             });
   v.only_if(is_cloud, "shape: cloud", [&](SettingsVisitor& w) {
     w.value({"file", "", "cloud, mesh or .pfmap, around its own origin"}, s.file);
@@ -100,7 +102,7 @@ void describe_shape(SettingsVisitor& v, ObstacleSettings& s) {
       x.value({"resolution", "m", "at which it is imported", 0.001, 10}, s.resolution);
     });
   });
-  v.only_if(!is_cloud, "not shape: cloud", [&](SettingsVisitor& w) {
+  v.only_if(!is_cloud, kinds_with(), [&](SettingsVisitor& w) {
     w.value({"intensity", "", "of returns from it", 0, 1e6}, s.intensity);
   });
 }
