@@ -97,9 +97,9 @@ class Player {
 
   void seek(SimTime to) {
     time_ = std::clamp(to, SimTime{}, playable_.end());
+    say(true);  // first: viewers forget what they have
     playable_.seek(time_);
     pace_.restart_at(time_);
-    say(true);
   }
 
   void say(bool did_seek) const {

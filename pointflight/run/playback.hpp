@@ -37,7 +37,7 @@ class Playable {
   virtual void on_time(SimTime /*now*/) {}
   /// It stands still; some 50 times per second.
   virtual void on_wait(SimTime /*now*/) {}
-  /// It starts, stands still, goes on, jumps; if it is controlled.
+  /// It starts, stands still, goes on, is about to jump; if it is controlled.
   virtual void on_status(const PlaybackStatus& /*status*/) {}
   /// All since the last call, in the order in which they came.
   virtual std::vector<Order> take_orders() = 0;

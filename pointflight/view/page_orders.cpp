@@ -14,8 +14,8 @@ namespace {
 
 using nlohmann::json;
 
-constexpr double kFarthestGoal = 1e7;   // m
-constexpr double kFastest = 200.0;  // m/s
+constexpr double kFarthestGoal = 1e7;  // m
+constexpr double kFastest = 200.0;     // m/s
 constexpr double kMostRate = 1000.0;
 constexpr double kLongestRun = 1e6;  // s
 

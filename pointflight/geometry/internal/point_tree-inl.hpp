@@ -68,8 +68,8 @@ class PointTree {
   /// Stops once enough points are found.
   struct EnoughPoints {
     using DistanceType = double;
-    double squared;
-    std::size_t wanted;
+    double squared = 0.0;
+    std::size_t wanted = 0;
     std::size_t found = 0;
     [[nodiscard]] bool addPoint(double distance, std::uint32_t /*index*/) {
       found += distance < squared ? 1 : 0;
@@ -84,7 +84,7 @@ class PointTree {
   /// own from 1.5 on.)
   struct PointsWithin {
     using DistanceType = double;
-    double squared;
+    double squared = 0.0;
     std::vector<Near> items;
     bool addPoint(double distance, std::uint32_t index) {
       if (distance < squared) items.push_back({index, distance});
