@@ -81,6 +81,8 @@ class Process:
     def signal(self, number):
         # nsenter has become the program
         self.process.send_signal(number)
+        if number == signal.SIGKILL:
+            self.process.wait()  # only then its folder is free for the next one
 
     def end(self, seconds=60):
         try:
