@@ -40,7 +40,7 @@ class Dealer {
   void serve() {
     while (!over_) {
       int is_there = 0;
-      MPI_Status status;
+      MPI_Status status{};
       MPI_Iprobe(MPI_ANY_SOURCE, kAsk, MPI_COMM_WORLD, &is_there, &status);
       if (is_there == 0) {
         std::this_thread::sleep_for(kLook);
@@ -79,7 +79,7 @@ void begin() {
 }
 
 void barrier() {
-  MPI_Request request;
+  MPI_Request request = MPI_REQUEST_NULL;
   MPI_Ibarrier(MPI_COMM_WORLD, &request);
   wait_for(request);
 }
@@ -91,7 +91,7 @@ std::size_t next() {
   }
   if (job().dealer) return job().dealer->next();
   unsigned long long number = 0;
-  MPI_Request request;
+  MPI_Request request = MPI_REQUEST_NULL;
   MPI_Irecv(&number, 1, MPI_UNSIGNED_LONG_LONG, 0, kDeal, MPI_COMM_WORLD, &request);
   MPI_Send(nullptr, 0, MPI_BYTE, 0, kAsk, MPI_COMM_WORLD);
   wait_for(request);
@@ -104,12 +104,11 @@ void end() {
 }
 
 }  // namespace
-}  // namespace pointflight
 
-extern "C" __attribute__((visibility("default"))) const pointflight::MpiModule*
-pointflight_mpi_module() {
-  using namespace pointflight;
+extern "C" __attribute__((visibility("default"))) const MpiModule* pointflight_mpi_module() {
   static const MpiModule module = {
       begin, [] { return job().rank; }, [] { return job().size; }, barrier, next, end};
   return &module;
 }
+
+}  // namespace pointflight
