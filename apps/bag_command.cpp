@@ -7,6 +7,7 @@
 #include "apps/commands.hpp"
 #include "apps/modules.hpp"
 #include "apps/settings_json.hpp"
+#include "apps/terminal.hpp"
 #include "pointflight/core/mapped_file.hpp"
 #include "pointflight/recording/mcap_reader.hpp"
 
@@ -38,7 +39,8 @@ nlohmann::ordered_json json_of(const std::string& path, const RecordingInfo& inf
 void show(const std::string& path, bool as_json) {
   require_regular_file(path);
   const bool is_bag = path.ends_with(".bag") || path.ends_with(".bag.active");
-  const RecordingInfo info = is_bag ? ros1_module().read_bag(path) : read_mcap(path);
+  const RecordingInfo info =
+      is_bag ? ros1_module().read_bag(path) : read_mcap(path, terminal_progress());
   const double seconds = 1e-9 * static_cast<double>(info.end - info.start);
   if (as_json) {
     print_json(json_of(path, info, seconds));

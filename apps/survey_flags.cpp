@@ -56,7 +56,7 @@ std::optional<RecordingOpener> recording_of(const std::string& path) {
     throw InputError(
         fmt::format("{}: is no folder of clouds and no recording (.bag, .mcap)", path));
   }
-  return [paths](const std::vector<std::string>&) { return open_mcap(paths); };
+  return [paths](const std::vector<std::string>&) { return open_mcap(paths, terminal_progress()); };
 }
 
 std::unique_ptr<ScanSource> open_scans(const std::string& path,

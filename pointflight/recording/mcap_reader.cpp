@@ -24,11 +24,17 @@ std::unique_ptr<mcap::Timeline> timeline_of(const std::string& path, const Progr
   return std::make_unique<mcap::Timeline>(std::make_unique<MappedFile>(path), path, progress);
 }
 
+/// How much of a file's time is before `time`, 0 to 1.
+double share_before(const mcap::Timeline& file, std::int64_t time) {
+  const auto [first, last] = file.range();
+  return last > first ? static_cast<double>(time - first) / static_cast<double>(last - first) : 0.0;
+}
+
 /// File after file.
 class McapSeries : public MessageReader {
  public:
-  explicit McapSeries(const std::vector<std::string>& paths) {
-    for (const std::string& path : paths) files_.push_back(timeline_of(path, {}));
+  McapSeries(const std::vector<std::string>& paths, const Progress& progress) {
+    for (const std::string& path : paths) files_.push_back(timeline_of(path, progress));
   }
 
   [[nodiscard]] Wire wire() const override { return Wire::kCdr; }
@@ -46,10 +52,7 @@ class McapSeries : public MessageReader {
       const RecordedChannel& channel = file.channels()[found.channel];
       message = {
           channel.topic, channel.schema_name, found.time, found.data.data(), found.data.size()};
-      const auto [first, last] = file.range();
-      share_of_file_ =
-          last > first ? static_cast<double>(found.time - first) / static_cast<double>(last - first)
-                       : 0.0;
+      share_of_file_ = share_before(file, found.time);
       return true;
     }
     return false;
@@ -61,7 +64,7 @@ class McapSeries : public MessageReader {
   double share_of_file_ = 0.0;
 };
 
-RecordingInfo count(mcap::Timeline& file) {
+RecordingInfo count(mcap::Timeline& file, const Progress& progress) {
   std::map<std::pair<std::string, std::string>, std::uint64_t> topics;
   for (const RecordedChannel& channel : file.channels()) {
     topics[{channel.topic, channel.schema_name}];
@@ -71,6 +74,7 @@ RecordingInfo count(mcap::Timeline& file) {
   std::int64_t end = 0;
   TimedMessage message;
   while (file.next(message)) {
+    report(progress, "counting messages", share_before(file, message.time));
     const RecordedChannel& channel = file.channels()[message.channel];
     ++topics[{channel.topic, channel.schema_name}];
     if (messages++ == 0) start = end = message.time;
@@ -97,17 +101,18 @@ std::unique_ptr<TimedRecording> timed_mcap(std::span<const std::byte> bytes,
   return with_messages(std::make_unique<mcap::Timeline>(bytes, name, progress), name);
 }
 
-std::unique_ptr<MessageReader> open_mcap(const std::vector<std::string>& paths) {
-  return std::make_unique<McapSeries>(paths);
+std::unique_ptr<MessageReader> open_mcap(const std::vector<std::string>& paths,
+                                         const Progress& progress) {
+  return std::make_unique<McapSeries>(paths, progress);
 }
 
-RecordingInfo read_mcap(const std::string& path) {
-  return count(*timeline_of(path, {}));
+RecordingInfo read_mcap(const std::string& path, const Progress& progress) {
+  return count(*timeline_of(path, progress), progress);
 }
 
 RecordingInfo read_mcap_bytes(std::span<const std::byte> bytes, const std::string& name) {
   mcap::Timeline timeline(bytes, name, {});
-  return count(timeline);
+  return count(timeline, {});
 }
 
 }  // namespace pointflight

@@ -27,10 +27,11 @@ std::unique_ptr<TimedRecording> timed_mcap(std::span<const std::byte> bytes,
 
 /// The messages of several files as one, file after file, each in the order of time: rosbag2 splits
 /// what is long. Throws InputError if one is no MCAP file.
-std::unique_ptr<MessageReader> open_mcap(const std::vector<std::string>& paths);
+std::unique_ptr<MessageReader> open_mcap(const std::vector<std::string>& paths,
+                                         const Progress& progress = {});
 
 /// What is in a file, counted by reading all of it. Throws InputError if it is no MCAP file.
-RecordingInfo read_mcap(const std::string& path);
+RecordingInfo read_mcap(const std::string& path, const Progress& progress = {});
 
 /// The same of bytes, for tests and fuzzers.
 RecordingInfo read_mcap_bytes(std::span<const std::byte> bytes, const std::string& name);

@@ -12,7 +12,7 @@ namespace {
 /// Groups of keys that lines of several commands have.
 enum Keys : unsigned {
   kVector = 1 << 0,
-  kPlace = 1 << 1,  // with kVector: it is one
+  kMoves = 1 << 1,  // with kVector: a position, which moves with the vehicle's copies
   kHeading = 1 << 2,
   kThrust = 1 << 3,
   kRates = 1 << 4,
@@ -90,10 +90,10 @@ Registry<ScriptedCommand>& ScriptedCommand::table() {
       {"attitude", kRpy | kThrust, attitude},
       {"acceleration", kVector | kHeading, acceleration},
       {"velocity", kVector | kHeading, velocity},
-      {"position", kVector | kPlace | kFeedForward | kHeading, position},
+      {"position", kVector | kMoves | kFeedForward | kHeading, position},
       {"polynomial", kFile, polynomial},
       {"b_spline", kFile | kKnots, b_spline},
-      {"waypoint", kVector | kPlace, waypoint},
+      {"waypoint", kVector | kMoves, waypoint},
       {"take_off", kHeight | kSpeed, take_off},
       {"land", kSpeed, land},
       {"hover", 0, plain<HoverCommand>},
@@ -103,14 +103,14 @@ Registry<ScriptedCommand>& ScriptedCommand::table() {
   return table;
 }
 
-bool has_place(const CommandSettings& settings) {
-  return (settings.kind->keys & kPlace) != 0;
+bool moves_with_copies(const CommandSettings& settings) {
+  return (settings.kind->keys & kMoves) != 0;
 }
 
 void describe(SettingsVisitor& v, CommandSettings& s) {
   v.value({"time", "s", "when it is given", 0, 1e6}, s.time);
   v.choice({"kind", "", "what is commanded"}, s.kind);
-  // the keys of a group, where the command has it
+  // the keys of a group, if the command has it
   const auto group = [&](Keys keys, const auto& describe_keys, const char* hint = "") {
     std::string names;
     for (const ScriptedCommand& row : ScriptedCommand::table().rows()) {

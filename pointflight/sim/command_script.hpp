@@ -60,7 +60,7 @@ struct CommandSettings {
 /// The keys of one entry of `commands`.
 void describe(SettingsVisitor& visitor, CommandSettings& settings);
 
-/// True if the line's `vector` is a position, which moves with the vehicle's copies.
-bool has_place(const CommandSettings& settings);
+/// True if the line's `vector` is a position: each of a vehicle's copies has its own.
+bool moves_with_copies(const CommandSettings& settings);
 
 }  // namespace pointflight

@@ -217,7 +217,7 @@ std::vector<VehicleSetup> Scenario::fleet() const {
       one.start += offset;
       for (Vector3d& waypoint : one.mission.waypoints) waypoint += offset;
       for (CommandSettings& command : one.commands) {
-        if (has_place(command)) command.vector += offset;
+        if (moves_with_copies(command)) command.vector += offset;
       }
       if (one.name.empty()) {
         one.name = fmt::format("drone{}", fleet.size() - 1);

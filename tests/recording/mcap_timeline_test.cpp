@@ -268,6 +268,15 @@ TEST(McapTimeline, LeavesOutTimesThatNoClockShows) {
   const auto recording = timed_mcap(file.bytes(), "raw");
   EXPECT_EQ(recording->range(), std::pair(std::int64_t{20}, std::int64_t{30}));
   EXPECT_EQ(times_of(*recording), (std::vector<std::int64_t>{20, 30}));
+  // what was left out makes the file incomplete, although it has its end
+  file.add(Opcode::kDataEnd, RecordWriter().number<std::uint32_t>(0));
+  file.add(Opcode::kFooter, RecordWriter());
+  EXPECT_FALSE(read_mcap_bytes(file.bytes(), "raw").complete);
+  RawFile whole;
+  whole.describe(1, "/a").chunk(1, {20, 30});
+  whole.add(Opcode::kDataEnd, RecordWriter().number<std::uint32_t>(0));
+  whole.add(Opcode::kFooter, RecordWriter());
+  EXPECT_TRUE(read_mcap_bytes(whole.bytes(), "raw").complete);
 }
 
 }  // namespace

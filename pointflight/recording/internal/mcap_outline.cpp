@@ -76,7 +76,10 @@ void Outline::note(Opcode opcode, std::span<const std::byte> content) {
   RecordReader reader(content);
   if (opcode == Opcode::kChunk && !data_ended_) {
     const auto chunk = chunk_of(reader);
-    if (!chunk || chunk->start > chunk->end || chunk->end > kLatestTime) return;
+    if (!chunk || chunk->start > chunk->end || chunk->end > kLatestTime) {
+      lacks_chunks_ = true;
+      return;
+    }
     Piece& piece = pieces_.emplace_back();
     piece.start = static_cast<std::int64_t>(chunk->start);
     piece.end = static_cast<std::int64_t>(chunk->end);
@@ -86,7 +89,7 @@ void Outline::note(Opcode opcode, std::span<const std::byte> content) {
   } else if (opcode == Opcode::kDataEnd) {
     data_ended_ = true;
   } else if (opcode == Opcode::kFooter) {
-    info_.complete = true;
+    info_.complete = !lacks_chunks_;
   } else {
     describe(opcode, reader);
   }

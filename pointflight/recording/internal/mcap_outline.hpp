@@ -63,7 +63,7 @@ class Outline {
     const auto found = numbers_.find(id);
     return found == numbers_.end() ? std::nullopt : std::optional(found->second);
   }
-  /// Format, library and attachments; complete if the file has its end.
+  /// Format, library and attachments; complete if the file has its end and all chunks make sense.
   [[nodiscard]] const RecordingInfo& info() const { return info_; }
 
  private:
@@ -88,6 +88,7 @@ class Outline {
   Piece loose_;
   bool data_ended_ = false;
   bool has_summary_ = false;
+  bool lacks_chunks_ = false;  ///< One was left out: too large, or with times that are none.
 };
 
 }  // namespace pointflight::mcap
