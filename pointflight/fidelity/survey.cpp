@@ -11,6 +11,7 @@
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/core/random.hpp"
+#include "pointflight/fidelity/scene_renderer.hpp"
 #include "pointflight/geometry/rotation.hpp"
 #include "pointflight/io/pcd_writer.hpp"
 #include "pointflight/io/pose_files.hpp"
@@ -22,48 +23,53 @@ namespace {
 
 namespace fs = std::filesystem;
 
+/// What is told apart after the scan: whether something was too near, or nothing was there.
+LidarSettings sees_all_near(LidarSettings lidar, double noise) {
+  lidar.range_min = 0.0;
+  lidar.noise = {.range_sigma = noise};
+  return lidar;
+}
+
 /// Takes the scans of a walk.
 class Surveyor {
  public:
-  Surveyor(const SceneTree& tree, const LidarSettings& lidar, const SurveyOptions& options)
-      : tree_(tree), lidar_(lidar, 0), options_(options) {}
+  Surveyor(const ExactScene& scene,
+           const SceneTree& tree,
+           const LidarSettings& lidar,
+           const SurveyOptions& options)
+      : renderer_(scene, tree),
+        lidar_(sees_all_near(lidar, options.noise), 0),
+        nearest_(static_cast<float>(lidar.range_min)),
+        options_(options) {}
 
   [[nodiscard]] Duration period() const { return lidar_.period(); }
 
   [[nodiscard]] std::vector<SurveyShot> take(std::size_t index,
-                                             const Pose& from,
-                                             const Pose& to,
+                                             SimTime start,
+                                             const PoseTrack& T_world_sensor,
                                              const Executor& executor) const {
-    const auto beams = lidar_.beams(index, executor);
-    const RandomStream noise(
-        options_.seed, StreamId::kSurvey, survey_draws::kNoise + static_cast<std::uint32_t>(index));
-    std::vector<SurveyShot> shots(beams.size());
-    std::vector<std::uint8_t> lost(beams.size(), 0);
-    const double reach = lidar_.settings().range_max;
-    const double nearest = lidar_.settings().range_min;
-    executor.parallel_for(beams.size(), 512, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; ++i) {
-        const Beam& beam = beams[i];
-        const double at = to_seconds(beam.time_offset);
-        const Pose pose = interpolate(from, to, at / to_seconds(period()));
-        const Vector3d o = pose * beam.origin_sensor.cast<double>();
-        const Vector3d d = pose.rotation * beam.direction_sensor.cast<double>().normalized();
-        const auto met = tree_.intersect(o, d);
-        shots[i].time = static_cast<float>(at);
-        shots[i].is_return = met && met->range <= reach;
-        lost[i] = met && met->range < nearest ? 1 : 0;
-        // how far a sensor is sure to see depends on the surface: half of its reach is safe
-        double range = 0.5 * reach;
-        if (shots[i].is_return) range = met->range + options_.noise * noise.normal(i);
-        shots[i].position_sensor =
-            beam.origin_sensor + static_cast<float>(range) * beam.direction_sensor;
+    ScanRequest request;
+    request.index = index;
+    request.start = start;
+    request.seed = options_.seed;
+    const Scan scan = lidar_.take(request, T_world_sensor, renderer_, executor);
+    const std::vector<Beam> beams = lidar_.beams(index, executor);
+    // how far a sensor is sure to see depends on the surface: half of its reach is safe
+    const auto free = static_cast<float>(0.5 * lidar_.settings().range_max);
+    std::vector<SurveyShot> shots;
+    shots.reserve(beams.size());
+    auto point = scan.points.begin();
+    for (std::size_t i = 0; i < beams.size(); ++i) {
+      SurveyShot shot;
+      shot.time = static_cast<float>(to_seconds(beams[i].time_offset));
+      shot.is_return = point != scan.points.end() && point->beam == i;
+      shot.position_sensor = beams[i].origin_sensor + free * beams[i].direction_sensor;
+      if (shot.is_return) {
+        shot.position_sensor = point->position_sensor;
+        if ((point++)->range < nearest_) continue;
       }
-    });
-    std::size_t kept = 0;
-    for (std::size_t i = 0; i < shots.size(); ++i) {
-      if (lost[i] == 0) shots[kept++] = shots[i];
+      shots.push_back(shot);
     }
-    shots.resize(kept);
     return shots;
   }
 
@@ -82,8 +88,9 @@ class Surveyor {
   }
 
  private:
-  const SceneTree& tree_;
+  SceneRenderer renderer_;
   Lidar lidar_;
+  float nearest_;  // m
   const SurveyOptions& options_;
 };
 
@@ -158,17 +165,17 @@ Survey make_survey(const ExactScene& scene,
                    const SurveyOptions& options,
                    const Executor& executor,
                    const Progress& progress) {
-  const Surveyor surveyor(tree, lidar, options);
+  const Surveyor surveyor(scene, tree, lidar, options);
   Survey survey;
   survey.walk = make_walk(scene, tree, options, surveyor.period());
+  const PoseTrack T_world_sensor(survey.walk);
   for (std::size_t i = 0; i + 1 < survey.walk.size(); ++i) {
     report(progress,
            "surveying " + scene.name,
            static_cast<double>(i) / static_cast<double>(survey.walk.size()));
     const TimedPose& truth = survey.walk[i];
     survey.poses.push_back({truth.time, truth.pose * surveyor.shake(i)});
-    survey.scans.push_back(
-        surveyor.take(i, survey.walk[i].pose, survey.walk[i + 1].pose, executor));
+    survey.scans.push_back(surveyor.take(i, truth.time, T_world_sensor, executor));
   }
   return survey;
 }

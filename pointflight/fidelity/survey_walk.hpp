@@ -26,7 +26,6 @@ namespace survey_draws {
 inline constexpr std::uint32_t kWay = 0;     ///< Places to walk by.
 inline constexpr std::uint32_t kShake = 1;   ///< Errors of poses.
 inline constexpr std::uint32_t kPlaces = 2;  ///< Places to judge from.
-inline constexpr std::uint32_t kNoise = 3;   ///< Of the first scan; one more for each.
 }  // namespace survey_draws
 
 /// A walk at chest height (1.2 to 1.8 m above what is below) along straight legs, 0.4 m from

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "pointflight/core/constants.hpp"
+#include "pointflight/fidelity/scene_renderer.hpp"
 #include "pointflight/fidelity/survey_report.hpp"
 #include "pointflight/io/pose_files.hpp"
 #include "tests/support.hpp"
@@ -145,6 +146,52 @@ TEST(Survey, ShotsWithoutAReturnSayWhatIsFree) {
   EXPECT_GT(empty, 100000u);
 }
 
+TEST(Survey, WhatIsTooNearIsLost) {
+  ExactScene scene = room();
+  scene.geometry.shapes.emplace_back(Cone{{0, 0, 1.0}, {12, 8, 2.0}, 0.01, 0.01});
+  scene.tag_from(scene.geometry.shapes.size() - 1, "pole");
+  const SceneTree tree(scene);
+  LidarSettings lidar = load_lidar("mid360");
+  const Executor executor(2);
+  const auto shots = [&] {
+    std::size_t count = 0;
+    for (const auto& scan : make_survey(scene, tree, lidar, short_walk(), executor).scans) {
+      count += scan.size();
+      for (const SurveyShot& shot : scan) {
+        EXPECT_GE(static_cast<double>(shot.position_sensor.norm()), lidar.range_min - 1e-5);
+        EXPECT_TRUE(shot.is_return) << "nothing is free in a closed room";
+      }
+    }
+    return count;
+  };
+  const std::size_t all = shots();
+  lidar.range_min = 2.0;
+  EXPECT_LT(shots(), all * 9 / 10);
+}
+
+TEST(Survey, ItsReturnsHaveTheNoiseThatWasAskedFor) {
+  const ExactScene scene = room();
+  const SceneTree tree(scene);
+  const Executor executor(2);
+  SurveyOptions options = short_walk();
+  options.seconds = 1.0;
+  const Survey exact = make_survey(scene, tree, load_lidar("mid360"), options, executor);
+  options.noise = 0.02;
+  const Survey noisy = make_survey(scene, tree, load_lidar("mid360"), options, executor);
+  double squares = 0.0;
+  double count = 0.0;
+  for (std::size_t scan = 0; scan < exact.scans.size(); ++scan) {
+    ASSERT_EQ(exact.scans[scan].size(), noisy.scans[scan].size());
+    for (std::size_t i = 0; i < exact.scans[scan].size(); ++i) {
+      const Vector3f moved =
+          noisy.scans[scan][i].position_sensor - exact.scans[scan][i].position_sensor;
+      squares += static_cast<double>(moved.squaredNorm());
+      ++count;
+    }
+  }
+  EXPECT_NEAR(std::sqrt(squares / count), 0.02, 4 * 0.02 / std::sqrt(2 * count));
+}
+
 TEST(Survey, ThinnedCloudsKeepOnePointOfACube) {
   const ExactScene scene = room();
   const SceneTree tree(scene);
@@ -195,22 +242,20 @@ TEST(SeenSurfaces, OneReturnStandsForOthersOfItsDirectionAlone) {
 }
 
 /// The true ranges, moved.
-class TrueRenderer : public Renderer {
+class MovedRenderer : public SceneRenderer {
  public:
-  TrueRenderer(const SceneTree& tree, float offset) : tree_(tree), offset_(offset) {}
+  MovedRenderer(const ExactScene& scene, const SceneTree& tree, float offset)
+      : SceneRenderer(scene, tree), offset_(offset) {}
 
  protected:
-  void render_one(const RenderJob& job, const Executor& /*executor*/) const override {
-    for (std::size_t i = 0; i < job.hits.size(); ++i) {
-      const Ray& ray = job.batch.rays[i];
-      const auto met = tree_.intersect(ray.origin_world, ray.direction_world.cast<double>());
-      job.hits[i] = {};
-      if (met) job.hits[i].range = static_cast<float>(met->range) + offset_;
+  void render_one(const RenderJob& job, const Executor& executor) const override {
+    SceneRenderer::render_one(job, executor);
+    for (Hit& hit : job.hits) {
+      if (hit.is_return()) hit.range += offset_;
     }
   }
 
  private:
-  const SceneTree& tree_;
   float offset_;
 };
 
@@ -235,7 +280,7 @@ struct HalfSurveyed {
     }
   }
   [[nodiscard]] SurveyReport report(float offset) const {
-    return measure_survey(scene, beams, seen, TrueRenderer(tree, offset), executor);
+    return measure_survey(scene, beams, seen, MovedRenderer(scene, tree, offset), executor);
   }
 };
 
