@@ -119,6 +119,13 @@ bool is_same_file(const std::string& a, const std::string& b) {
   return fs::equivalent(a, b, ignored) || full(a) == full(b);
 }
 
+std::string path_in_file(const std::string& file, const std::string& other) {
+  const fs::path folder = fs::weakly_canonical(fs::absolute(file).parent_path());
+  const fs::path path = fs::weakly_canonical(fs::absolute(other));
+  const fs::path relative = path.lexically_relative(folder);
+  return relative.empty() ? path.string() : relative.string();
+}
+
 void check_outputs(const std::vector<std::string>& outputs,
                    const std::vector<std::string>& inputs,
                    bool force) {

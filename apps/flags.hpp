@@ -34,6 +34,9 @@ void add_force_flag(CLI::App& app, bool& force);
 /// True if both paths mean one file, whether it is there or not.
 bool is_same_file(const std::string& a, const std::string& b);
 
+/// How a file that is written names another one: by the way from its own folder.
+std::string path_in_file(const std::string& file, const std::string& other);
+
 /// Looks at all files of a command before it begins; empty names are none. Throws InputError
 /// - if an output is there already and `force` is not given, or is a link, a folder or a device;
 /// - if two outputs are one file;

@@ -61,6 +61,7 @@ int run(int argc, char** argv) {
   add_compare_command(app, exit_code);
   add_fidelity_command(app, exit_code);
   add_view_command(app, exit_code);
+  add_study_command(app, exit_code);
   add_campaign_command(app, exit_code);
   add_shell_commands(app);
   app.footer(  // not of the commands, which have examples of their own

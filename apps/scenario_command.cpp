@@ -42,16 +42,9 @@ struct NewFlags {
 void new_scenario(const NewFlags& flags) {
   const Executor executor;
   check_outputs({flags.output}, {flags.map, flags.lidar, flags.vehicle}, flags.force);
-  // the scenario finds its files from its own folder
-  const fs::path folder = fs::weakly_canonical(fs::absolute(flags.output).parent_path());
-  const auto from_folder = [&](const std::string& path) {
-    const fs::path absolute = fs::weakly_canonical(fs::absolute(path));
-    const fs::path relative = absolute.lexically_relative(folder);
-    return relative.empty() ? absolute.string() : relative.string();
-  };
   ScenarioRequest wish;
   wish.map_path = flags.map;
-  wish.map_key = from_folder(flags.map);
+  wish.map_key = path_in_file(flags.output, flags.map);
   wish.lidar = flags.lidar;
   wish.vehicle = flags.vehicle;
   wish.length = flags.length;
@@ -60,7 +53,7 @@ void new_scenario(const NewFlags& flags) {
   Scenario scenario = make_scenario(wish, executor);
   VehicleSetup& vehicle = scenario.vehicles.front();
   for (std::string* model : {&vehicle.lidars.front().model, &vehicle.model}) {
-    if (is_model_path(*model)) *model = from_folder(*model);
+    if (is_model_path(*model)) *model = path_in_file(flags.output, *model);
   }
   OutputFile file(flags.output);
   file.write(

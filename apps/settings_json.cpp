@@ -33,6 +33,12 @@ void SettingsJson::value(const Key& key, std::vector<Eigen::Vector3d>& value) {
   for (const Eigen::Vector3d& v : value) list.push_back({v.x(), v.y(), v.z()});
   set(key, std::move(list));
 }
+void SettingsJson::value(const Key& key, std::vector<std::string>& value) {
+  set(key, value);
+}
+void SettingsJson::value(const Key& key, YamlList& value) {
+  set(key, value.items);
+}
 void SettingsJson::choice(const Key& key,
                           std::string& value,
                           std::span<const std::string_view> /*choices*/) {

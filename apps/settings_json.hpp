@@ -20,6 +20,8 @@ class SettingsJson : public SettingsVisitor {
   void value(const Key& key, Eigen::Vector3d& value) override;
   void value(const Key& key, std::vector<double>& value) override;
   void value(const Key& key, std::vector<Eigen::Vector3d>& value) override;
+  void value(const Key& key, std::vector<std::string>& value) override;
+  void value(const Key& key, YamlList& value) override;
   void choice(const Key& key,
               std::string& value,
               std::span<const std::string_view> choices) override;

@@ -3,7 +3,7 @@
 # usage: check_key_docs.sh PROGRAM [--write]
 cd "$(dirname "$0")/.." || exit 2
 failed=0
-for page in scenario:scenario lidar:sensors vehicle:vehicles; do
+for page in scenario:scenario lidar:sensors vehicle:vehicles study:campaigns; do
   command=${page%:*}
   name=${page#*:}
   table=$("$1" "$command" keys) || exit 2

@@ -1,273 +1,298 @@
 #include "pointflight/campaign/study.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
-#include <yaml-cpp/yaml.h>
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <numeric>
 #include <set>
 
 #include "pointflight/core/input_error.hpp"
-#include "pointflight/core/mapped_file.hpp"
 #include "pointflight/core/settings.hpp"
-#include "pointflight/io/byte_cursor.hpp"
 
 namespace pointflight {
 namespace {
 
-constexpr std::size_t kMostValues = 1'000'000;
+constexpr double kMostValues = 1e6;
+constexpr double kGreatest = 1e12;                   // of a number to draw or to step to
+constexpr double kLargestSeed = 9007199254740992.0;  // 2^53: numbers in YAML and JSON are doubles
 
-/// Reads nodes and says where something is wrong.
-class StudyReader {
+/// `seeds`: 100, [3, 5] or {from: 1, to: 100}.
+struct SeedKeys {
+  std::vector<double> values;
+  std::int64_t from = 1;
+  std::int64_t to = 1;
+};
+
+/// An entry of `grid`: [1, 2, 4] or {from: 0, to: 100, n: 6}.
+struct AxisKeys {
+  std::string key;
+  YamlList values;
+  double from = 0.0;
+  double to = 1.0;
+  std::int64_t n = 0;
+};
+
+/// An entry of `draws`: one of these.
+struct DrawKeys {
+  std::string key;
+  std::vector<double> uniform;
+  std::vector<double> log_uniform;
+  std::vector<double> integer;
+  YamlList choice;
+};
+
+/// A study as its file has it.
+struct StudyKeys {
+  std::string scenario;
+  SeedKeys seeds;
+  std::vector<AxisKeys> grid;
+  std::int64_t draw_count = 1;
+  std::int64_t draw_seed = 1;
+  std::vector<DrawKeys> draws;
+  std::vector<std::string> command;
+  double time_limit = 0.0;
+  double memory_limit = 0.0;
+  std::string figures;
+  KeptFiles keep = KeptFiles::kResults;
+};
+
+constexpr Named<KeptFiles> kKeptFiles[] = {{KeptFiles::kResults, "results"},
+                                           {KeptFiles::kAll, "all"}};
+
+void describe(SettingsVisitor& v, SeedKeys& seeds) {
+  v.value({"values", "", "these; a list in place of the section is short for it", 0, kLargestSeed},
+          seeds.values);
+  v.value({"from", "", "the first of a range", 0, kLargestSeed}, seeds.from);
+  v.value({"to", "", "the last; a number in place of the section is short for it", 0, kLargestSeed},
+          seeds.to);
+}
+
+void describe(SettingsVisitor& v, AxisKeys& axis) {
+  v.value({"values", "", "these; a list in place of the section is short for it"}, axis.values);
+  v.value({"from", "", "the first of values at equal steps", -kGreatest, kGreatest}, axis.from);
+  v.value({"to", "", "the last", -kGreatest, kGreatest}, axis.to);
+  v.value({"n", "", "how many, both ends included; 0: as listed", 0, kMostValues}, axis.n);
+}
+
+void describe(SettingsVisitor& v, DrawKeys& draw) {
+  v.value({"uniform", "", "[from, to], in the key's unit", -kGreatest, kGreatest}, draw.uniform);
+  v.value({"log_uniform", "", "[from, to], uniform in the logarithm", -kGreatest, kGreatest},
+          draw.log_uniform);
+  v.value({"integer", "", "[from, to], whole numbers, both ends included", -kGreatest, kGreatest},
+          draw.integer);
+  v.value({"choice", "", "one of these, each as likely"}, draw.choice);
+}
+
+void describe(SettingsVisitor& v, StudyKeys& study) {
+  constexpr auto kMost = static_cast<double>(kMostRuns);
+  v.value({.name = "scenario", .unit = "", .help = "the scenario file to fly", .required = true},
+          study.scenario);
+  v.section({"seeds", "", "each combination of values is flown with each of them"},
+            {.one = "to", .list = "values"},
+            [&](SettingsVisitor& w) { describe(w, study.seeds); });
+  v.section({"grid", "", "keys of the scenario with several values: all combinations are flown"},
+            [&](SettingsVisitor& w) {
+              w.others({"", "", ""}, {.list = "values"}, study.grid, [](auto& u, AxisKeys& axis) {
+                describe(u, axis);
+              });
+            });
+  v.section(
+      {"draws", "", "keys of the scenario that are drawn at random, each in one way"},
+      [&](SettingsVisitor& w) {
+        w.value({"count", "", "draws at each point of the grid", 1, kMost, true}, study.draw_count);
+        w.value({"seed", "", "of the draws", 0, kLargestSeed}, study.draw_seed);
+        w.others({"", "", ""}, {}, study.draws, [](auto& u, DrawKeys& draw) { describe(u, draw); });
+      });
+  v.value({"command",
+           "",
+           "words of a program that flies instead of `fly`; {scenario}, {seed} and {output} stand "
+           "for the flight's"},
+          study.command);
+  v.section({"limits", "", "of each flight"}, [&](SettingsVisitor& w) {
+    w.value({"time", "s", "by the wall clock; 0: none", 0, 1e8}, study.time_limit);
+    w.value({"memory", "bytes", "beside mapped files; 0: none", 0, 1e15}, study.memory_limit);
+  });
+  v.value({"figures", "", "JSON file that the command leaves in {output}; its numbers are columns"},
+          study.figures);
+  v.choice({"keep", "", "what stays of a flight's files; with `command`: all, if not given"},
+           study.keep,
+           kKeptFiles);
+}
+
+/// What the keys mean, and whether they make sense together.
+class StudyMaker {
  public:
-  explicit StudyReader(const std::string& path) : path_(path) {}
+  StudyMaker(const std::string& path, const std::map<std::string, int>& lines)
+      : path_(path), lines_(lines) {}
 
-  [[noreturn]] void fail(const YAML::Node& node, const std::string& words) const {
-    throw InputError(fmt::format("{}:{}: {}", path_, line_of(node), words));
-  }
-
-  static int line_of(const YAML::Node& node) { return node.Mark().line + 1; }
-
-  /// Refuses keys that nobody knows.
-  void check_keys(const YAML::Node& map,
-                  const std::string& name,
-                  const std::vector<std::string>& known) const {
-    if (!map.IsMap()) fail(map, fmt::format("{}: is to be keys with values", name));
-    std::set<std::string> seen;
-    for (const auto& entry : map) {
-      const auto key = entry.first.as<std::string>();
-      if (!seen.insert(key).second) fail(entry.first, fmt::format("{}: is there twice", key));
-      if (std::find(known.begin(), known.end(), key) != known.end()) continue;
-      const std::string near = closest_word(key, known);
-      fail(entry.first,
-           fmt::format("{}: unknown key{}",
-                       key,
-                       near.empty() ? fmt::format("; known here: {}", fmt::join(known, ", "))
-                                    : fmt::format("; did you mean '{}'?", near)));
-    }
-  }
-
-  [[nodiscard]] double number(const YAML::Node& node,
-                              const std::string& name,
-                              double low,
-                              double high) const {
-    double value = 0.0;
-    const bool is_number = node.IsScalar() && parse_number(node.Scalar(), value);
-    if (!is_number || !(value >= low && value <= high)) {
-      fail(node, fmt::format("{}: is to be a number from {} to {}", name, low, high));
-    }
-    return value;
-  }
-
-  [[nodiscard]] std::int64_t whole(const YAML::Node& node,
-                                   const std::string& name,
-                                   std::int64_t low,
-                                   std::int64_t high) const {
-    const double value = number(node, name, static_cast<double>(low), static_cast<double>(high));
-    if (value != std::floor(value)) fail(node, fmt::format("{}: is to be a whole number", name));
-    return static_cast<std::int64_t>(value);
-  }
-
-  [[nodiscard]] std::string word(const YAML::Node& node, const std::string& name) const {
-    if (!node.IsScalar()) fail(node, fmt::format("{}: is to be one value", name));
-    return node.Scalar();
+  [[nodiscard]] Study study_of(const StudyKeys& keys) const {
+    Study study;
+    study.path = path_;
+    study.scenario = keys.scenario;
+    study.seeds = seeds_of(keys.seeds);
+    for (const AxisKeys& axis : keys.grid) study.grid.push_back(axis_of(axis));
+    for (const DrawKeys& draw : keys.draws) study.draws.push_back(draw_of(draw));
+    check_once(study);
+    if (keys.draw_count > 1 && study.draws.empty()) fail("draws", "names no key to draw");
+    study.draw_count = static_cast<std::size_t>(keys.draw_count);
+    study.draw_seed = keys.draw_seed;
+    study.command = keys.command;
+    check_command(study.command);
+    study.time_limit = keys.time_limit;
+    study.memory_limit = keys.memory_limit;
+    study.figures = keys.figures;
+    study.kept = keys.keep;
+    // what is not ours is removed if the user says so, and never otherwise
+    if (!study.command.empty() && !is_given("keep")) study.kept = KeptFiles::kAll;
+    return study;
   }
 
  private:
-  const std::string& path_;
-};
+  [[nodiscard]] bool is_given(const std::string& key) const { return lines_.count(key) != 0; }
+  [[nodiscard]] int line_of(const std::string& key) const {
+    const auto line = lines_.find(key);
+    return line == lines_.end() ? 1 : line->second;
+  }
+  [[noreturn]] void fail(const std::string& key, const std::string& words) const {
+    throw InputError(fmt::format("{}:{}: {}: {}", path_, line_of(key), key, words));
+  }
 
-/// A node as YAML in one line.
-std::string flow_text(const YAML::Node& node) {
-  YAML::Emitter emitter;
-  emitter.SetMapFormat(YAML::Flow);
-  emitter.SetSeqFormat(YAML::Flow);
-  emitter << node;
-  std::string text = emitter.c_str();
-  std::replace(text.begin(), text.end(), '\n', ' ');
-  return text;
-}
-
-/// 1 .. 100 as `100`, `[3, 5]` or `{from: 1, to: 100}`.
-std::vector<std::int64_t> seeds_of(const StudyReader& reader, const YAML::Node& node) {
-  constexpr std::int64_t kLargest = std::int64_t{1} << 53;
-  std::vector<std::int64_t> seeds;
-  if (node.IsSequence()) {
-    for (const auto& item : node) seeds.push_back(reader.whole(item, "seeds", 0, kLargest));
-  } else {
-    std::int64_t from = 1;
-    std::int64_t to = 0;
-    if (node.IsMap()) {
-      reader.check_keys(node, "seeds", {"from", "to"});
-      if (!node["from"] || !node["to"]) reader.fail(node, "seeds: wants `from` and `to`");
-      from = reader.whole(node["from"], "seeds.from", 0, kLargest);
-      to = reader.whole(node["to"], "seeds.to", 0, kLargest);
+  [[nodiscard]] std::vector<std::int64_t> seeds_of(const SeedKeys& keys) const {
+    std::vector<std::int64_t> seeds;
+    const bool has_range = is_given("seeds.from") || is_given("seeds.to");
+    if (!keys.values.empty() && has_range) {
+      fail("seeds", "give a list, or `from` and `to`, not both");
+    }
+    if (is_given("seeds.values") && !has_range) {
+      for (const double seed : keys.values) {
+        if (seed != std::floor(seed)) fail("seeds", "are to be whole numbers");
+        seeds.push_back(static_cast<std::int64_t>(seed));
+      }
     } else {
-      to = reader.whole(node, "seeds", 1, static_cast<std::int64_t>(kMostRuns));
+      if (is_given("seeds.from") && !is_given("seeds.to")) fail("seeds", "give `to` as well");
+      if (keys.to < keys.from || keys.to - keys.from >= static_cast<std::int64_t>(kMostRuns)) {
+        fail("seeds", fmt::format("from {} to {} are none, or too many", keys.from, keys.to));
+      }
+      seeds.resize(static_cast<std::size_t>(keys.to - keys.from + 1));
+      std::iota(seeds.begin(), seeds.end(), keys.from);
     }
-    if (to < from || to - from >= static_cast<std::int64_t>(kMostRuns)) {
-      reader.fail(node, fmt::format("seeds: from {} to {} are none, or too many", from, to));
+    if (seeds.empty()) fail("seeds", "the list is empty");
+    if (std::set(seeds.begin(), seeds.end()).size() != seeds.size()) {
+      fail("seeds", "one of them is given twice");
     }
-    for (std::int64_t seed = from; seed <= to; ++seed) seeds.push_back(seed);
+    return seeds;
   }
-  if (seeds.empty()) reader.fail(node, "seeds: is empty");
-  if (std::set(seeds.begin(), seeds.end()).size() != seeds.size()) {
-    reader.fail(node, "seeds: has one twice");
-  }
-  return seeds;
-}
 
-/// `[1, 2, 4]` or `{from: 0, to: 100, n: 6}`.
-StudyAxis axis_of(const StudyReader& reader, const std::string& key, const YAML::Node& node) {
-  StudyAxis axis;
-  axis.key = key;
-  axis.line = StudyReader::line_of(node);
-  if (node.IsSequence()) {
-    for (const auto& item : node) axis.values.push_back(flow_text(item));
-  } else if (node.IsMap()) {
-    reader.check_keys(node, key, {"from", "to", "n"});
-    if (!node["from"] || !node["to"] || !node["n"]) {
-      reader.fail(node, fmt::format("{}: wants `from`, `to` and `n`", key));
+  [[nodiscard]] StudyAxis axis_of(const AxisKeys& keys) const {
+    const std::string name = "grid." + keys.key;
+    const bool has_steps = keys.n > 0 || is_given(name + ".from") || is_given(name + ".to");
+    if (has_steps && !keys.values.items.empty())
+      fail(name, "give a list, or `from`, `to` and `n`, not both");
+    StudyAxis axis{keys.key, keys.values.items, line_of(name)};
+    if (has_steps && (!is_given(name + ".from") || !is_given(name + ".to") || keys.n < 2)) {
+      fail(name, "give `from`, `to` and `n`, at least 2");
     }
-    const double from = reader.number(node["from"], key + ".from", -1e12, 1e12);
-    const double to = reader.number(node["to"], key + ".to", -1e12, 1e12);
-    const auto n = reader.whole(node["n"], key + ".n", 2, static_cast<std::int64_t>(kMostValues));
-    for (std::int64_t i = 0; i < n; ++i) {
-      const double share = static_cast<double>(i) / static_cast<double>(n - 1);
-      axis.values.push_back(fmt::format("{:.12g}", from + share * (to - from)));
+    for (std::int64_t i = 0; i < keys.n; ++i) {
+      const double fraction = static_cast<double>(i) / static_cast<double>(keys.n - 1);
+      axis.values.push_back(fmt::format("{:.12g}", keys.from + fraction * (keys.to - keys.from)));
     }
-  } else {
-    reader.fail(node, fmt::format("{}: is to be a list, or {{from, to, n}}", key));
+    if (axis.values.empty()) fail(name, "has no values: give a list, or `from`, `to` and `n`");
+    return axis;
   }
-  if (axis.values.empty()) reader.fail(node, fmt::format("{}: has no value", key));
-  return axis;
-}
 
-/// `{uniform: [0, 5]}`, `{log_uniform: ...}`, `{integer: ...}` or `{choice: [a, b]}`.
-StudyDraw draw_of(const StudyReader& reader, const std::string& key, const YAML::Node& node) {
-  reader.check_keys(node, key, {"uniform", "log_uniform", "integer", "choice"});
-  if (node.size() != 1) reader.fail(node, fmt::format("{}: wants one way to draw it", key));
-  StudyDraw draw;
-  draw.key = key;
-  draw.line = StudyReader::line_of(node);
-  const auto how = node.begin()->first.as<std::string>();
-  const YAML::Node what = node.begin()->second;  // the iterator lends no reference
-  if (!what.IsSequence()) reader.fail(what, fmt::format("{}.{}: is to be a list", key, how));
-  if (how == "choice") {
-    for (const auto& item : what) draw.choices.push_back(flow_text(item));
-    if (draw.choices.empty()) reader.fail(what, fmt::format("{}.choice: is empty", key));
+  [[nodiscard]] StudyDraw draw_of(const DrawKeys& keys) const {
+    const std::string name = "draws." + keys.key;
+    std::vector<std::string> ways;
+    for (const char* way : {"uniform", "log_uniform", "integer", "choice"}) {
+      if (is_given(name + "." + way)) ways.emplace_back(way);
+    }
+    if (ways.size() != 1) {
+      fail(name, "give one way to draw it: `uniform`, `log_uniform`, `integer` or `choice`");
+    }
+    const std::string way = name + "." + ways.front();
+    StudyDraw draw;
+    draw.key = keys.key;
+    draw.line = line_of(name);
+    draw.choices = keys.choice.items;
+    if (ways.front() == "choice") {
+      if (draw.choices.empty()) fail(way, "the list is empty");
+      return draw;
+    }
+    draw.is_logarithmic = ways.front() == "log_uniform";
+    draw.is_whole = ways.front() == "integer";
+    const std::vector<double>& ends = draw.is_logarithmic ? keys.log_uniform
+                                      : draw.is_whole     ? keys.integer
+                                                          : keys.uniform;
+    if (ends.size() != 2 || ends[1] < ends[0]) {
+      fail(way, "give two numbers, the smaller one first");
+    }
+    draw.low = ends[0];
+    draw.high = ends[1];
+    if (draw.is_logarithmic && !(draw.low > 0.0)) fail(way, "the first has to be above 0");
     return draw;
   }
-  if (what.size() != 2) reader.fail(what, fmt::format("{}.{}: wants two numbers", key, how));
-  draw.is_logarithmic = how == "log_uniform";
-  draw.is_whole = how == "integer";
-  draw.low = reader.number(what[0], key, -1e12, 1e12);
-  draw.high = reader.number(what[1], key, draw.low, 1e12);
-  if (draw.is_logarithmic && !(draw.low > 0.0)) {
-    reader.fail(what, fmt::format("{}.log_uniform: begins above 0", key));
-  }
-  return draw;
-}
 
-void read_draws(const StudyReader& reader, const YAML::Node& node, Study& study) {
-  if (!node.IsMap()) reader.fail(node, "draws: is to be `count`, `seed` and keys to draw");
-  study.draw_count = 0;
-  for (const auto& entry : node) {
-    const auto key = entry.first.as<std::string>();
-    if (key == "count") {
-      study.draw_count = static_cast<std::size_t>(
-          reader.whole(entry.second, "draws.count", 1, static_cast<std::int64_t>(kMostRuns)));
-    } else if (key == "seed") {
-      study.draw_seed = reader.whole(entry.second, "draws.seed", 0, std::int64_t{1} << 53);
-    } else {
-      study.draws.push_back(draw_of(reader, key, entry.second));
+  void check_once(const Study& study) const {
+    std::set<std::string> keys;
+    const auto check = [&](const std::string& where, const std::string& key) {
+      if (key == "seed") fail(where + key, "is given by `seeds`");
+      if (!keys.insert(key).second) fail(where + key, "is in `grid` as well");
+    };
+    for (const StudyAxis& axis : study.grid) check("grid.", axis.key);
+    for (const StudyDraw& draw : study.draws) check("draws.", draw.key);
+  }
+
+  void check_command(const std::vector<std::string>& command) const {
+    if (command.empty()) return;
+    const auto has_scenario = [](const std::string& word) {
+      return word.find("{scenario}") != std::string::npos;
+    };
+    if (std::none_of(command.begin(), command.end(), has_scenario)) {
+      fail("command",
+           "one of its words has to have {scenario}: [./planner, --scenario, \"{scenario}\"]; "
+           "{seed} and {output} may be there too");
     }
   }
-  if (study.draw_count == 0) reader.fail(node, "draws: wants `count`, how often");
-  if (study.draws.empty()) reader.fail(node, "draws: names no key to draw");
-}
 
-void read_limits(const StudyReader& reader, const YAML::Node& node, Study& study) {
-  reader.check_keys(node, "limits", {"time", "memory"});
-  if (node["time"]) study.time_limit = reader.number(node["time"], "limits.time", 0.0, 1e8);
-  if (node["memory"]) {
-    study.memory_limit = reader.number(node["memory"], "limits.memory", 0.0, 1e15);
-  }
-}
+  const std::string& path_;
+  const std::map<std::string, int>& lines_;
+};
 
-void read_command(const StudyReader& reader, const YAML::Node& node, Study& study) {
-  if (!node.IsSequence() || node.size() == 0) {
-    reader.fail(node, "command: is to be a list of words: [./planner, --scenario, '{scenario}']");
-  }
-  std::string all;
-  for (const auto& word : node) {
-    study.command.push_back(reader.word(word, "command"));
-    all += study.command.back();
-  }
-  if (all.find("{scenario}") == std::string::npos) {
-    reader.fail(node,
-                "command: has to name {scenario} somewhere, and may name {seed} and {output}");
-  }
-}
-
-Study read_study(const YAML::Node& root, const StudyReader& reader, const std::string& path) {
-  reader.check_keys(root,
-                    "a study",
-                    {"scenario", "seeds", "grid", "draws", "command", "limits", "figures", "keep"});
-  Study study;
-  study.path = path;
-  if (!root["scenario"]) reader.fail(root, "scenario: is missing: the file to fly");
-  study.scenario = reader.word(root["scenario"], "scenario");
-  study.seeds = root["seeds"] ? seeds_of(reader, root["seeds"]) : std::vector<std::int64_t>{1};
-  if (const YAML::Node grid = root["grid"]) {
-    if (!grid.IsMap()) reader.fail(grid, "grid: is to be keys of the scenario with values");
-    for (const auto& entry : grid) {
-      study.grid.push_back(axis_of(reader, entry.first.as<std::string>(), entry.second));
-    }
-  }
-  if (root["draws"]) read_draws(reader, root["draws"], study);
-  std::set<std::string> keys = {"seed"};
-  const auto check_once = [&](const std::string& key, int line) {
-    if (keys.insert(key).second) return;
-    throw InputError(fmt::format("{}:{}: {}: {}",
-                                 path,
-                                 line,
-                                 key,
-                                 key == "seed" ? "is given by `seeds`" : "is there twice"));
-  };
-  for (const StudyAxis& axis : study.grid) check_once(axis.key, axis.line);
-  for (const StudyDraw& draw : study.draws) check_once(draw.key, draw.line);
-  if (root["command"]) read_command(reader, root["command"], study);
-  if (root["limits"]) read_limits(reader, root["limits"], study);
-  if (root["figures"]) study.figures = reader.word(root["figures"], "figures");
-  // what is not ours is removed if the user says so, and never otherwise
-  if (!study.command.empty()) study.kept = KeptFiles::kAll;
-  if (root["keep"]) {
-    const std::string keep = reader.word(root["keep"], "keep");
-    if (keep != "results" && keep != "all") {
-      reader.fail(root["keep"], "keep: is to be `results` or `all`");
-    }
-    study.kept = keep == "all" ? KeptFiles::kAll : KeptFiles::kResults;
-  }
-  return study;
+Study read_study(SettingsReader& reader, const std::string& path) {
+  StudyKeys keys;
+  describe(reader, keys);
+  reader.finish();
+  return StudyMaker(path, reader.lines()).study_of(keys);
 }
 
 }  // namespace
 
 Study parse_study(std::string_view text, const std::string& path) {
-  const StudyReader reader(path);
-  try {
-    const YAML::Node root = YAML::Load(std::string(text));
-    if (!root.IsMap()) throw InputError(fmt::format("{}: is no study: it has no keys", path));
-    return read_study(root, reader, path);
-  } catch (const YAML::Exception& error) {
-    throw InputError(fmt::format("{}:{}: {}", path, error.mark.line + 1, error.msg));
-  }
+  SettingsReader reader(text, path);
+  return read_study(reader, path);
 }
 
 Study load_study(const std::string& path) {
-  return parse_study(MappedFile(path).text(), path);
+  SettingsReader reader(path);
+  return read_study(reader, path);
+}
+
+std::string study_reference() {
+  StudyKeys defaults;
+  SettingsTable table;
+  describe(table, defaults);
+  return table.text();
+}
+
+std::string study_template(const std::string& scenario) {
+  StudyKeys keys;
+  keys.scenario = scenario;
+  keys.seeds.to = 10;
+  SettingsWriter writer;
+  describe(writer, keys);
+  return writer.text();
 }
 
 }  // namespace pointflight

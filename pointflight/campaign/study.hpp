@@ -61,4 +61,10 @@ Study load_study(const std::string& path);
 /// From text, for tests and fuzzers.
 Study parse_study(std::string_view text, const std::string& path);
 
+/// Rows of a Markdown table of all keys.
+std::string study_reference();
+
+/// A commented study of ten seeds of a scenario (its path as the file shall have it).
+std::string study_template(const std::string& scenario);
+
 }  // namespace pointflight

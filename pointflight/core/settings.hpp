@@ -45,6 +45,18 @@ struct Key {
   bool required = false;                                 ///< Missing: an error.
 };
 
+/// What a section's key may have instead of a section, as a short form of it: `[1, 2]` for
+/// `{values: [1, 2]}`. Empty: not allowed.
+struct ShortForm {
+  std::string_view one = {};   ///< The key that a single value stands for.
+  std::string_view list = {};  ///< The key that a list stands for.
+};
+
+/// A list of values of any kind, each as YAML in one line: "2", "[0, 0, 2]", "crash".
+struct YamlList {
+  std::vector<std::string> items;  ///< In the order of the file.
+};
+
 /// Walks over the keys of a settings struct. Each struct has one `describe(SettingsVisitor&, T&)`;
 /// reading a file, writing a commented template and generating docs are three visitors of it, so
 /// that they cannot disagree.
@@ -61,6 +73,8 @@ class SettingsVisitor {
   virtual void value(const Key& key, Eigen::Vector3d& value) = 0;
   virtual void value(const Key& key, std::vector<double>& value) = 0;
   virtual void value(const Key& key, std::vector<Eigen::Vector3d>& value) = 0;
+  virtual void value(const Key& key, std::vector<std::string>& value) = 0;
+  virtual void value(const Key& key, YamlList& value) = 0;
   ///@}
   /// Text that must be one of `choices`.
   virtual void choice(const Key& key,
@@ -114,6 +128,33 @@ class SettingsVisitor {
     leave();
   }
 
+  /// The same, if the file may also have a short form.
+  template <class Describe>
+  void section(const Key& key, const ShortForm& form, const Describe& describe_items) {
+    if (!enter(key, form)) return;
+    describe_items(*this);
+    leave();
+  }
+
+  /// All keys of the present section that were not described before: the file chooses their names,
+  /// and each is a section. The reader makes an item for each key, named in `T::key`.
+  template <class T, class Describe>
+  void others(const Key& each,
+              const ShortForm& form,
+              std::vector<T>& items,
+              const Describe& describe_item) {
+    std::vector<std::string> names;
+    for (const T& item : items) names.push_back(item.key);
+    names = other_keys(std::move(names));
+    items.resize(names.size());
+    for (std::size_t i = 0; i < items.size(); ++i) {
+      items[i].key = names[i];
+      section(Key{items[i].key, each.unit, each.help}, form, [&](SettingsVisitor& visitor) {
+        describe_item(visitor, items[i]);
+      });
+    }
+  }
+
   /// Keys that matter only under a condition on what was described before, written as the file
   /// would have it ("convention: ouster"). Elsewhere the reader refuses them, for they would have
   /// no effect, and the writer leaves them out; required ones are required under it alone.
@@ -145,6 +186,10 @@ class SettingsVisitor {
   virtual void leave_condition() {}
   /// Returns false to skip the section (absent from the file: its defaults stay).
   virtual bool enter(const Key& key) = 0;
+  /// The same if there may be a short form instead.
+  virtual bool enter(const Key& key, const ShortForm& /*form*/) { return enter(key); }
+  /// The names of the keys that `others` visits; its items have `own` so far.
+  virtual std::vector<std::string> other_keys(std::vector<std::string> own) { return own; }
   /// Ends the section or list item that was entered last.
   virtual void leave() = 0;
   /// Returns the number of items to visit, or kAbsent to leave the list as it is.
@@ -186,6 +231,8 @@ class SettingsReader : public SettingsVisitor {
   void value(const Key& key, Eigen::Vector3d& value) override;
   void value(const Key& key, std::vector<double>& value) override;
   void value(const Key& key, std::vector<Eigen::Vector3d>& value) override;
+  void value(const Key& key, std::vector<std::string>& value) override;
+  void value(const Key& key, YamlList& value) override;
   void choice(const Key& key,
               std::string& value,
               std::span<const std::string_view> choices) override;
@@ -193,7 +240,9 @@ class SettingsReader : public SettingsVisitor {
  protected:
   bool enter_condition(bool holds, std::string_view condition) override;
   void leave_condition() override;
-  bool enter(const Key& key) override;
+  bool enter(const Key& key) override { return enter(key, {}); }
+  bool enter(const Key& key, const ShortForm& form) override;
+  std::vector<std::string> other_keys(std::vector<std::string> own) override;
   void leave() override;
   std::size_t enter_list(const Key& key, std::size_t size) override;
   void enter_item(std::size_t index) override;
@@ -219,6 +268,8 @@ class SettingsChecker : public SettingsVisitor {
   void value(const Key& key, Eigen::Vector3d& value) override;
   void value(const Key& key, std::vector<double>& value) override;
   void value(const Key& key, std::vector<Eigen::Vector3d>& value) override;
+  void value(const Key& key, std::vector<std::string>& value) override;
+  void value(const Key& key, YamlList& value) override;
   void choice(const Key& key,
               std::string& value,
               std::span<const std::string_view> choices) override;
@@ -260,6 +311,8 @@ class SettingsWriter : public SettingsVisitor {
   void value(const Key& key, Eigen::Vector3d& value) override;
   void value(const Key& key, std::vector<double>& value) override;
   void value(const Key& key, std::vector<Eigen::Vector3d>& value) override;
+  void value(const Key& key, std::vector<std::string>& value) override;
+  void value(const Key& key, YamlList& value) override;
   void choice(const Key& key,
               std::string& value,
               std::span<const std::string_view> choices) override;
@@ -292,6 +345,8 @@ class SettingsTable : public SettingsVisitor {
   void value(const Key& key, Eigen::Vector3d& value) override;
   void value(const Key& key, std::vector<double>& value) override;
   void value(const Key& key, std::vector<Eigen::Vector3d>& value) override;
+  void value(const Key& key, std::vector<std::string>& value) override;
+  void value(const Key& key, YamlList& value) override;
   void choice(const Key& key,
               std::string& value,
               std::span<const std::string_view> choices) override;
@@ -300,6 +355,7 @@ class SettingsTable : public SettingsVisitor {
   bool enter_condition(bool holds, std::string_view condition) override;
   void leave_condition() override;
   bool enter(const Key& key) override;
+  std::vector<std::string> other_keys(std::vector<std::string> own) override;
   void leave() override;
   std::size_t enter_list(const Key& key, std::size_t size) override;
   void enter_item(std::size_t index) override;

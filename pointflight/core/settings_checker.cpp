@@ -41,6 +41,8 @@ void SettingsChecker::value(const Key& key, std::vector<double>& value) {
 void SettingsChecker::value(const Key& key, std::vector<Eigen::Vector3d>& value) {
   for (Eigen::Vector3d& v : value) this->value(key, v);
 }
+void SettingsChecker::value(const Key& /*key*/, std::vector<std::string>& /*value*/) {}
+void SettingsChecker::value(const Key& /*key*/, YamlList& /*value*/) {}
 void SettingsChecker::choice(const Key& key,
                              std::string& value,
                              std::span<const std::string_view> choices) {

@@ -44,6 +44,16 @@ std::string range_text(const Key& key) {
   return fmt::format("at most {}", key.max);
 }
 
+std::string in_one_line(const YAML::Node& node) {
+  YAML::Emitter emitter;
+  emitter.SetMapFormat(YAML::Flow);
+  emitter.SetSeqFormat(YAML::Flow);
+  emitter << node;
+  std::string text = emitter.c_str();
+  std::replace(text.begin(), text.end(), '\n', ' ');
+  return text;
+}
+
 }  // namespace
 
 std::string closest_word(std::string_view word, const std::vector<std::string>& known) {
@@ -234,15 +244,37 @@ void SettingsReader::leave_condition() {
   document_->conditions.pop_back();
 }
 
-bool SettingsReader::enter(const Key& key) {
+bool SettingsReader::enter(const Key& key, const ShortForm& form) {
   const auto node = document_->find(key);
   if (!node) return false;
-  if (!node->IsMap()) {
-    document_->fail(*node, document_->full_name(key), "expected indented `key: value` lines");
+  const std::string path = document_->full_name(key);
+  lines_[path] = node->Mark().line + 1;
+  if (node->IsMap()) {
+    document_->push(*node, path + ".");
+    return true;
   }
-  lines_[document_->full_name(key)] = node->Mark().line + 1;
-  document_->push(*node, document_->full_name(key) + ".");
+  const std::string_view stands_for = node->IsSequence() ? form.list : form.one;
+  if (stands_for.empty()) {
+    document_->fail(*node,
+                    path,
+                    fmt::format("expected {}{}indented `key: value` lines",
+                                form.one.empty() ? "" : "a value or ",
+                                form.list.empty() ? "" : "a list or "));
+  }
+  YAML::Node whole;
+  whole[std::string(stands_for)] = *node;
+  document_->push(whole, path + ".");
   return true;
+}
+
+std::vector<std::string> SettingsReader::other_keys(std::vector<std::string> /*own*/) {
+  const Document::Level& level = document_->levels.back();
+  std::vector<std::string> names;
+  for (const auto& entry : level.node) {
+    const std::string& name = entry.first.Scalar();
+    if (level.asked.count(name) == 0) names.push_back(name);
+  }
+  return names;
 }
 
 std::size_t SettingsReader::enter_list(const Key& key, std::size_t /*size*/) {
@@ -340,6 +372,29 @@ void SettingsReader::value(const Key& key, std::vector<Eigen::Vector3d>& value) 
     value.push_back(document_->vector3(item, key));
   }
   lines_[document_->full_name(key)] = node->Mark().line + 1;
+}
+
+void SettingsReader::value(const Key& key, std::vector<std::string>& value) {
+  const auto node = document_->find(key);
+  if (!node) return;
+  const std::string path = document_->full_name(key);
+  if (!node->IsSequence()) document_->fail(*node, path, "expected a list such as [a, b]");
+  value.clear();
+  for (const auto& item : *node) {
+    if (!item.IsScalar()) document_->fail(item, path, "expected plain text in the list");
+    value.push_back(item.Scalar());
+  }
+  lines_[path] = node->Mark().line + 1;
+}
+
+void SettingsReader::value(const Key& key, YamlList& value) {
+  const auto node = document_->find(key);
+  if (!node) return;
+  const std::string path = document_->full_name(key);
+  if (!node->IsSequence()) document_->fail(*node, path, "expected a list such as [1, 2, 4]");
+  value.items.clear();
+  for (const auto& item : *node) value.items.push_back(in_one_line(item));
+  lines_[path] = node->Mark().line + 1;
 }
 
 void SettingsReader::choice(const Key& key,

@@ -24,6 +24,33 @@ std::string list_text(const std::vector<double>& values) {
   return fmt::format("[{}]", fmt::join(texts, ", "));
 }
 
+/// Text as YAML; double quotes with YAML's escapes keep any path intact.
+std::string quoted_where_needed(const std::string& value) {
+  bool plain = !value.empty() && value.front() != '-' && value.front() != ' ';
+  for (const char c : value) {
+    plain = plain && (std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '/' || c == '.' ||
+                      c == '_' || c == '-');
+  }
+  if (plain) return value;
+  std::string quoted = "\"";
+  for (const char c : value) {
+    if (c == '"' || c == '\\') quoted += '\\';
+    if (c == '\n') {
+      quoted += "\\n";  // else YAML folds lines
+    } else {
+      quoted += c;
+    }
+  }
+  return quoted + "\"";
+}
+
+std::string list_text(const std::vector<std::string>& values) {
+  std::vector<std::string> texts;
+  texts.reserve(values.size());
+  for (const std::string& value : values) texts.push_back(quoted_where_needed(value));
+  return fmt::format("[{}]", fmt::join(texts, ", "));
+}
+
 std::string interval_text(const Key& key) {
   const bool low = std::isfinite(key.min);
   const bool high = std::isfinite(key.max);
@@ -59,22 +86,7 @@ void SettingsWriter::value(const Key& key, bool& value) {
   line(key, value ? "true" : "false");
 }
 void SettingsWriter::value(const Key& key, std::string& value) {
-  // double quotes with YAML's escapes keep any path intact
-  bool plain = !value.empty() && value.front() != '-' && value.front() != ' ';
-  for (const char c : value) {
-    plain = plain && (std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '/' || c == '.' ||
-                      c == '_' || c == '-');
-  }
-  std::string quoted = "\"";
-  for (const char c : value) {
-    if (c == '"' || c == '\\') quoted += '\\';
-    if (c == '\n') {
-      quoted += "\\n";  // else YAML folds lines
-    } else {
-      quoted += c;
-    }
-  }
-  line(key, plain ? value : quoted + "\"");
+  line(key, quoted_where_needed(value));
 }
 void SettingsWriter::value(const Key& key, Eigen::Vector3d& value) {
   line(key, vector_text(value));
@@ -86,6 +98,12 @@ void SettingsWriter::value(const Key& key, std::vector<Eigen::Vector3d>& value) 
   line(key, value.empty() ? "[]" : "");
   const std::string indent(static_cast<std::size_t>(depth_) * 2 + 2, ' ');
   for (const Eigen::Vector3d& v : value) text_ += indent + "- " + vector_text(v) + "\n";
+}
+void SettingsWriter::value(const Key& key, std::vector<std::string>& value) {
+  line(key, list_text(value));
+}
+void SettingsWriter::value(const Key& key, YamlList& value) {
+  line(key, fmt::format("[{}]", fmt::join(value.items, ", ")));
 }
 void SettingsWriter::choice(const Key& key,
                             std::string& value,
@@ -163,6 +181,12 @@ void SettingsTable::value(const Key& key, std::vector<double>& value) {
 void SettingsTable::value(const Key& key, std::vector<Eigen::Vector3d>& value) {
   row(key, value.empty() ? "[]" : "", "list of [x, y, z]");
 }
+void SettingsTable::value(const Key& key, std::vector<std::string>& value) {
+  row(key, list_text(value), "list of texts");
+}
+void SettingsTable::value(const Key& key, YamlList& /*value*/) {
+  row(key, "", "list of values");
+}
 void SettingsTable::choice(const Key& key,
                            std::string& value,
                            std::span<const std::string_view> choices) {
@@ -180,6 +204,9 @@ bool SettingsTable::enter(const Key& key) {
   if (path_.empty()) text_ += fmt::format("| **{}** | | | | {} |\n", key.name, key.help);
   path_.emplace_back(key.name);
   return true;
+}
+std::vector<std::string> SettingsTable::other_keys(std::vector<std::string> /*own*/) {
+  return {"KEY"};
 }
 void SettingsTable::leave() {
   path_.pop_back();

@@ -54,28 +54,76 @@ TEST(Study, MistakesAreSaidWithTheirLine) {
   const auto error = [](const std::string& text) {
     return error_of([&] { parse_study(text, "s.yaml"); });
   };
-  expect_contains(error("seeds: 3\n"), "s.yaml:1: scenario: is missing");
+  expect_contains(error("seeds: 3\n"), "scenario: missing; add it");
   expect_contains(error("scenario: a\nseed: 3\n"),
                   "s.yaml:2: seed: unknown key; did you mean 'seeds'?");
-  expect_contains(error("scenario: a\nseeds: [1, 1]\n"), "has one twice");
-  expect_contains(error("scenario: a\nseeds: {from: 3}\n"), "wants `from` and `to`");
+  expect_contains(error("scenario: a\nseeds: [1, 1]\n"),
+                  "s.yaml:2: seeds: one of them is given twice");
+  expect_contains(error("scenario: a\nseeds: []\n"), "s.yaml:2: seeds: the list is empty");
+  expect_contains(error("scenario: a\nseeds: {from: 3}\n"), "give `to` as well");
+  expect_contains(error("scenario: a\nseeds: {values: [3], to: 5}\n"), "not both");
+  expect_contains(error("scenario: a\nseeds: {from: 3, to: 1}\n"), "from 3 to 1 are none");
   expect_contains(error("scenario: a\nseeds: 1.5\n"), "whole number");
-  expect_contains(error("scenario: a\ngrid:\n  x: {from: 0, to: 1}\n"), "s.yaml:3: x: wants");
-  expect_contains(error("scenario: a\ngrid:\n  x: []\n"), "has no value");
-  expect_contains(error("scenario: a\ngrid:\n  x: 3\n"), "is to be a list");
+  expect_contains(error("scenario: a\nseeds: [1.5]\n"), "whole number");
+  expect_contains(error("scenario: a\ngrid:\n  x: {from: 0, to: 1}\n"),
+                  "s.yaml:3: grid.x: give `from`, `to` and `n`");
+  expect_contains(error("scenario: a\ngrid:\n  x: {n: 3}\n"), "give `from`, `to` and `n`");
+  expect_contains(error("scenario: a\ngrid:\n  x: {values: [1], n: 3}\n"), "not both");
+  expect_contains(error("scenario: a\ngrid:\n  x: {from: 0, to: 1, m: 3}\n"),
+                  "s.yaml:3: grid.x.m: unknown key");
+  expect_contains(error("scenario: a\ngrid:\n  x: []\n"), "grid.x: has no values");
+  expect_contains(error("scenario: a\ngrid:\n  x:\n"), "grid.x: has no values");
+  expect_contains(error("scenario: a\ngrid:\n  x: 3\n"), "s.yaml:3: grid.x: expected a list or");
+  expect_contains(error("scenario: a\ngrid:\n  x: [1]\n  x: [2]\n"),
+                  "s.yaml:4: grid.x: this key stands twice");
   expect_contains(error("scenario: a\ngrid: {seed: [1]}\n"), "is given by `seeds`");
-  expect_contains(error("scenario: a\ndraws: {count: 1}\n"), "names no key");
-  expect_contains(error("scenario: a\ndraws: {x: {uniform: [0, 1]}}\n"), "wants `count`");
-  expect_contains(error("scenario: a\ndraws: {count: 1, x: {uniform: [2, 1]}}\n"), "number from 2");
+  expect_contains(error("scenario: a\ngrid: {x: [1]}\ndraws: {count: 1, x: {choice: [1]}}\n"),
+                  "s.yaml:3: draws.x: is in `grid` as well");
+  expect_contains(error("scenario: a\ndraws: {count: 2}\n"), "names no key");
+  expect_contains(error("scenario: a\ndraws: {x: {uniform: [0, 1]}}\n"), "draws.count: missing");
+  expect_contains(error("scenario: a\ndraws: {count: 1, x: {uniform: [2, 1]}}\n"),
+                  "draws.x.uniform: give two numbers, the smaller one first");
   expect_contains(error("scenario: a\ndraws: {count: 1, x: {log_uniform: [0, 1]}}\n"), "above 0");
+  expect_contains(error("scenario: a\ndraws: {count: 1, x: {}}\n"), "draws.x: give one way");
+  expect_contains(error("scenario: a\ndraws: {count: 1, x: {choice: [1], integer: [1, 2]}}\n"),
+                  "draws.x: give one way");
   expect_contains(error("scenario: a\ncommand: [planner]\n"), "{scenario}");
-  expect_contains(error("scenario: a\nkeep: some\n"), "`results` or `all`");
+  expect_contains(error("scenario: a\ncommand: [[planner]]\n"), "plain text");
+  expect_contains(error("scenario: a\nkeep: some\n"), "one of: results, all");
   expect_contains(error("scenario: [a\n"), "s.yaml:");
-  expect_contains(error("- a\n"), "no study");
+  expect_contains(error("- a\n"), "s.yaml: expected");
   Study many;
   many.seeds.resize(1000);
   many.grid = {{"a", std::vector<std::string>(1000, "1"), 1}, {"b", {100, "1"}, 2}};
   expect_contains(error_of([&] { plan_of(many); }), "1e+08 flights");
+}
+
+TEST(Study, WhatFliesByACommandIsKeptUnlessTheFileSaysSo) {
+  const std::string start = "scenario: a\ncommand: [p, \"{scenario}\"]\n";
+  EXPECT_EQ(parse_study(start, "s.yaml").kept, KeptFiles::kAll);
+  EXPECT_EQ(parse_study(start + "keep: results\n", "s.yaml").kept, KeptFiles::kResults);
+  EXPECT_EQ(parse_study("scenario: a\n", "s.yaml").kept, KeptFiles::kResults);
+}
+
+TEST(Study, TheTemplateIsAStudyOfTenSeeds) {
+  const Study study = parse_study(study_template("here/forest 1.yaml"), "s.yaml");
+  EXPECT_EQ(study.scenario, "here/forest 1.yaml");
+  EXPECT_EQ(study.seeds.size(), 10u);
+  EXPECT_TRUE(study.grid.empty());
+  EXPECT_TRUE(study.draws.empty());
+  EXPECT_TRUE(study.command.empty());
+  EXPECT_EQ(study.kept, KeptFiles::kResults);
+}
+
+TEST(Study, TheTableHasKeysOfGridAndDraws) {
+  const std::string table = study_reference();
+  for (const char* row : {"| `scenario` |  | **required**",
+                          "| `seeds.from`",
+                          "| `grid.KEY.n`",
+                          "| `draws.KEY.log_uniform`",
+                          "| `limits.memory` | bytes"}) {
+    expect_contains(table, row);
+  }
 }
 
 TEST(Plan, GoesThroughSeedsThenDrawsThenTheLastAxis) {

@@ -187,5 +187,62 @@ TEST(Resources, AnUnknownModelNamesTheKnownOnes) {
   expect_contains(error, "did you mean 'mid360'");
 }
 
+/// A file of its own names: {tea: [hot], price: {from: 1}}
+struct Dish {
+  std::string key;
+  YamlList ways;
+  double from = 0.0;
+};
+struct Menu {
+  std::vector<std::string> words;
+  double guests = 1.0;
+  std::vector<Dish> dishes;
+};
+void describe(SettingsVisitor& v, Menu& menu) {
+  v.value({"words", "", "any"}, menu.words);
+  v.section({"table", "", "short: a number of guests"}, {.one = "guests"}, [&](SettingsVisitor& w) {
+    w.value({"guests", "", "at it", 1, 9}, menu.guests);
+    w.others({"", "", ""}, {.list = "ways"}, menu.dishes, [](SettingsVisitor& u, Dish& dish) {
+      u.value({"ways", "", "of having it"}, dish.ways);
+      u.value({"from", "", "the price"}, dish.from);
+    });
+  });
+}
+Menu menu_of(std::string_view text) {
+  Menu menu;
+  SettingsReader reader(text, "menu.yaml");
+  describe(reader, menu);
+  reader.finish();
+  return menu;
+}
+
+TEST(Settings, SectionsMayHaveAShortForm) {
+  EXPECT_EQ(menu_of("table: 3\n").guests, 3.0);
+  EXPECT_EQ(menu_of("table: {guests: 3}\n").guests, 3.0);
+  const auto error = [](std::string_view text) { return error_of([&] { menu_of(text); }); };
+  expect_contains(error("table: 30\n"), "menu.yaml:1: table.guests: 30 is out of range");
+  expect_contains(error("table: [3]\n"), "menu.yaml:1: table: expected a value or indented");
+  expect_contains(error("a: 1\ntable: {tea: 3}\n"), "menu.yaml:2: table.tea: expected a list or");
+}
+
+TEST(Settings, AFileMayChooseNamesWhereItIsAllowedTo) {
+  const Menu menu = menu_of(
+      "words: [a, \"{b} c\"]\ntable:\n  tea: [hot, [1, 2], {cold: true}]\n  a.b[0]: {from: 2}\n");
+  EXPECT_EQ(menu.words, (std::vector<std::string>{"a", "{b} c"}));
+  ASSERT_EQ(menu.dishes.size(), 2u);
+  EXPECT_EQ(menu.dishes[0].key, "tea");
+  EXPECT_EQ(menu.dishes[0].ways.items, (std::vector<std::string>{"hot", "[1, 2]", "{cold: true}"}));
+  EXPECT_EQ(menu.dishes[1].key, "a.b[0]");
+  EXPECT_EQ(menu.dishes[1].from, 2.0);
+  SettingsWriter writer;
+  Menu written = menu;
+  describe(writer, written);
+  const Menu again = menu_of(writer.text());
+  EXPECT_EQ(again.words, menu.words);
+  ASSERT_EQ(again.dishes.size(), 2u);
+  EXPECT_EQ(again.dishes[0].ways.items, menu.dishes[0].ways.items);
+  EXPECT_EQ(again.dishes[1].from, 2.0);
+}
+
 }  // namespace
 }  // namespace pointflight
