@@ -2,8 +2,6 @@
 import * as THREE from "three";
 import { turbo } from "./colours.js";
 
-const text = new TextDecoder();
-
 // sensor_msgs/PointField
 const READ = {
   1: (v, at) => v.getInt8(at),
@@ -47,39 +45,7 @@ export function cloudFrom(fields, data, count, step) {
   return { count: kept, positions: positions.subarray(0, 3 * kept), times: times.subarray(0, kept), hasTimes: Boolean(time) };
 }
 
-// sensor_msgs/PointCloud2 in CDR, little endian, as a run sends many of them.
-export function cloudOf(bytes) {
-  const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
-  let at = 4;
-  const align = (size) => (at = 4 + Math.ceil((at - 4) / size) * size);
-  const u32 = () => (align(4), (at += 4), view.getUint32(at - 4, true));
-  const string = () => {
-    const size = u32();
-    const value = text.decode(bytes.subarray(at, at + size - 1));
-    at += size;
-    return value;
-  };
-  u32(); // stamp
-  u32();
-  string();
-  const height = u32();
-  const width = u32();
-  const fields = new Map();
-  for (let left = u32(); left > 0; --left) {
-    const name = string();
-    const offset = u32();
-    const type = view.getUint8(at++);
-    u32();
-    fields.set(name, { offset, type });
-  }
-  at += 1;
-  const step = u32();
-  u32();
-  const size = u32();
-  return cloudFrom(fields, new DataView(bytes.buffer, bytes.byteOffset + at, size), width * height, step);
-}
-
-// The same, decoded by its definition.
+// sensor_msgs/PointCloud2, decoded; null if it cannot be read.
 export function cloudOfMessage(message) {
   const fields = new Map(message.fields.map((f) => [f.name, { offset: f.offset, type: f.datatype }]));
   const { data } = message;

@@ -1,9 +1,10 @@
 import * as THREE from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { FrameBudget } from "./budget.js";
-import { ScanTrail, cloudOf } from "./clouds.js";
+import { ScanTrail, cloudOfMessage } from "./clouds.js";
 import { showLegend } from "./legend.js";
 import { SurfelMap } from "./map.js";
+import { decoderOf } from "./messages.js";
 import { Client, json } from "./protocol.js";
 import { drawRange } from "./range_image.js";
 import { Recording } from "./recording.js";
@@ -172,9 +173,11 @@ client.want("/pointflight/run", (bytes) => {
       const trail = new ScanTrail(scene, vehicle.colour.clone().lerp(new THREE.Color("#ffd23f"), 0.7), map.uniforms.heights);
       trail.keep = Number($("keep").value);
       vehicle.scans.set(lidar.topic, trail);
-      client.want(lidar.topic, (data, stamp) => {
+      let decode = null;
+      client.want(lidar.topic, (data, stamp, channel) => {
         if (!$("scans").checked) return;
-        trail.add(cloudOf(data), 1e-9 * Number(stamp - BigInt(run.epoch)));
+        decode ??= decoderOf(channel);
+        trail.add(cloudOfMessage(decode(data)), 1e-9 * Number(stamp - BigInt(run.epoch)));
         if (vehicle === chosen()) drawRange($("image"), trail.cloud, vehicle);
       }, { latest: true });
     }

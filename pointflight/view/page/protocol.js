@@ -3,7 +3,7 @@
 const OPCODE = { message: 1, time: 2, service: 3, playback: 5 };
 const text = new TextDecoder();
 
-// Calls handlers by topic, with a message's bytes and its time (ns, a BigInt); connects again when the run ends and another begins.
+// Calls handlers by topic, with a message's bytes, its time (ns, a BigInt) and its channel; connects again when the run ends and another begins.
 export class Client {
   constructor(url, handlers) {
     this.url = url;
@@ -13,7 +13,7 @@ export class Client {
 
   connect() {
     this.channels = new Map(); // by id
-    this.topics = new Map(); // subscription id -> topic
+    this.subscribed = new Map(); // subscription id -> channel
     this.wanted ??= new Map(); // topic -> handler
     this.waiting = new Map(); // topic -> what is left to be done with its last message
     this.next = 1;
@@ -50,7 +50,7 @@ export class Client {
     for (const channel of this.channels.values()) {
       if (channel.topic !== topic || !channel.subscription) continue;
       this.send({ op: "unsubscribe", subscriptionIds: [channel.subscription] });
-      this.topics.delete(channel.subscription);
+      this.subscribed.delete(channel.subscription);
       channel.subscription = null;
     }
   }
@@ -58,7 +58,7 @@ export class Client {
   subscribe(channel) {
     if (!this.wanted.has(channel.topic) || channel.subscription) return;
     channel.subscription = this.next++;
-    this.topics.set(channel.subscription, channel.topic);
+    this.subscribed.set(channel.subscription, channel);
     this.send({ op: "subscribe", subscriptions: [{ id: channel.subscription, channelId: channel.id }] });
   }
 
@@ -90,8 +90,8 @@ export class Client {
     const view = new DataView(buffer);
     const opcode = view.getUint8(0);
     if (opcode === OPCODE.message) {
-      const topic = this.topics.get(view.getUint32(1, true));
-      this.wanted.get(topic)?.(new Uint8Array(buffer, 13), view.getBigUint64(5, true));
+      const channel = this.subscribed.get(view.getUint32(1, true));
+      this.wanted.get(channel?.topic)?.(new Uint8Array(buffer, 13), view.getBigUint64(5, true), channel);
     } else if (opcode === OPCODE.time) {
       this.handlers.time?.(view.getBigUint64(1, true));
     } else if (opcode === OPCODE.playback) {
