@@ -6,6 +6,11 @@
 #include <utility>
 
 namespace pointflight {
+namespace {
+
+constexpr std::chrono::microseconds kEmptyStep{5000};
+
+}  // namespace
 
 ThreadedLink::ThreadedLink(Link& link, const Options& options) : link_(link), options_(options) {
   if (options.capacity == 0) throw std::invalid_argument("a queue needs room for a sample");
@@ -33,7 +38,9 @@ void ThreadedLink::on_sample(const Sample& sample) {
 
 void ThreadedLink::on_step(const StepDone& step) {
   hold(step);
-  if (std::chrono::steady_clock::now() - handed_on_ >= options_.hold) hand_on();
+  // a step that brought nothing has time
+  const auto wait = held_.size() > 1 ? options_.hold : std::max(options_.hold, kEmptyStep);
+  if (std::chrono::steady_clock::now() - handed_on_ >= wait) hand_on();
 }
 
 void ThreadedLink::on_wait(SimTime now, Waiting why) {
@@ -60,8 +67,7 @@ void ThreadedLink::on_seek(SimTime to) {
 
 std::vector<Order> ThreadedLink::take_orders() {
   rethrow();
-  const std::lock_guard lock(mutex_);
-  return std::exchange(orders_, {});
+  return link_.take_orders();
 }
 
 std::uint64_t ThreadedLink::dropped() const {
@@ -154,9 +160,7 @@ void ThreadedLink::work() {
       if (options_.when_full == WhenFull::kWait) changed_.notify_all();
       lock.unlock();
       hand_over(event);
-      auto orders = link_.take_orders();
       lock.lock();
-      std::move(orders.begin(), orders.end(), std::back_inserter(orders_));
     }
   } catch (...) {
     const std::lock_guard lock(mutex_);

@@ -15,7 +15,8 @@
 namespace pointflight {
 
 /// Runs another link on a thread of its own behind a bounded queue, so that it can be slow or wait
-/// without holding up the run. Its orders are obeyed at the end of a step after it gave them.
+/// without holding up the run. Its orders are taken by the run's own thread, at the end of each
+/// step.
 class ThreadedLink : public Link {
  public:
   /// What happens if the queue is full.
@@ -30,14 +31,15 @@ class ThreadedLink : public Link {
     std::size_t capacity = 1000;
     WhenFull when_full = WhenFull::kWait;  ///< Nothing is lost by default.
     /// Steps without a scan may be held back for so long by the wall clock, to be handed over
-    /// together: a thread is not woken for each of them.
+    /// together: a thread is not woken for each of them. Steps without any sample may always be
+    /// held back for 5 ms.
     std::chrono::microseconds hold{0};
   };
 
   /// `link` must outlive it; throws std::invalid_argument for a capacity of 0. Between the first
-  /// step and `close` all calls of `link` come from its own thread but `is_over`, `is_in_use`,
-  /// `dropped`, `wants_answer`, `objection` and `remedy_when_behind`, which must be callable from
-  /// any thread.
+  /// step and `close` all calls of `link` come from its own thread but `take_orders`, `is_over`,
+  /// `is_in_use`, `dropped`, `wants_answer`, `objection` and `remedy_when_behind`, which must be
+  /// callable from any thread.
   ThreadedLink(Link& link, const Options& options);
   ~ThreadedLink() override;
 
@@ -104,7 +106,6 @@ class ThreadedLink : public Link {
   std::deque<Event> queue_;
   std::size_t size_ = 0;  ///< Of what is in the queue, as `capacity`.
   bool is_busy_ = false;  ///< The link is taking what was in the queue.
-  std::vector<Order> orders_;
   std::uint64_t dropped_ = 0;
   bool ends_ = false;
   std::exception_ptr failure_;

@@ -72,19 +72,19 @@ void RosLink::on_step(const StepDone& step) {
     bridge_.note_scan_time(step.took / static_cast<double>(step.scans));
   }
   bridge_.on_time(step.time);
+  say_refused();
   say_failed_recordings();
 }
 
 void RosLink::on_wait(SimTime now, Waiting why) {
+  say_refused();
   if (why == Waiting::kForAnswer) return bridge_.resend_scans();
   if (why == Waiting::kForLinks && !awaits_planner_) return;
   bridge_.on_wait(now);
 }
 
 std::vector<Order> RosLink::take_orders() {
-  std::vector<Order> orders = inbox_.take();
-  say_refused();
-  return orders;
+  return inbox_.take();
 }
 
 /// The first of each kind at once, their number in the end.
