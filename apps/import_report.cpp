@@ -1,10 +1,13 @@
 #include "apps/import_report.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
+#include <map>
 
 #include "apps/terminal.hpp"
+#include "pointflight/io/byte_cursor.hpp"
 
 namespace pointflight::apps {
 
@@ -28,6 +31,49 @@ std::string about_noise(double noise, std::uint64_t projected, std::uint64_t too
           : "too little to remove");
 }
 
+namespace {
+
+/// "intensity from 'Reflectance'; left out: ring, time", and whatever else its reader noted.
+std::vector<std::string> about_columns(const FileColumns& columns) {
+  std::vector<std::string> lines = columns.notes;
+  std::vector<std::string> left_out = columns.of_scans;
+  left_out.insert(left_out.end(), columns.left_out.begin(), columns.left_out.end());
+  std::string line;
+  if (!columns.intensity.empty() && columns.intensity != "intensity") {
+    line = fmt::format("intensity from '{}'", excerpt(columns.intensity));
+  }
+  if (!left_out.empty()) {
+    constexpr std::size_t kMost = 12;
+    const std::size_t more = left_out.size() - std::min(left_out.size(), kMost);
+    left_out.resize(left_out.size() - more);
+    for (std::string& name : left_out) name = excerpt(name);
+    line += fmt::format("{}left out: {}{}",
+                        line.empty() ? "" : "; ",
+                        fmt::join(left_out, ", "),
+                        more > 0 ? fmt::format(" and {} more", more) : "");
+  }
+  if (!line.empty()) lines.push_back(line);
+  return lines;
+}
+
+/// Files that say the same have one line.
+void print_columns(const ImportReport& report) {
+  std::map<std::string, std::vector<std::string>> sources;
+  for (const SourceColumns& source : report.columns) {
+    for (const std::string& line : about_columns(source.columns)) {
+      sources[line].push_back(source.source);
+    }
+  }
+  for (const auto& [line, names] : sources) {
+    log(fmt::format("columns       {}{}: {}",
+                    names.front(),
+                    names.size() > 1 ? fmt::format(" and {} more", names.size() - 1) : "",
+                    line));
+  }
+}
+
+}  // namespace
+
 void print_report(const ImportReport& r, const ImportOptions& options) {
   log(fmt::format(
       "points        {} read{}{}",
@@ -36,10 +82,16 @@ void print_report(const ImportReport& r, const ImportOptions& options) {
                               : "",
       r.points_out_of_reach > 0 ? fmt::format(", {} too far away dropped", r.points_out_of_reach)
                                 : ""));
+  log(fmt::format("size          {:.4g} x {:.4g} x {:.4g} m", r.size.x(), r.size.y(), r.size.z()));
   log(fmt::format("resolution    {:.4g} m{}",
                   r.resolution,
                   r.resolution_was_chosen ? " (chosen from the spacing)" : ""));
   log("spacing       " + about_spacing(r.spacing, r.resolution, r.supported_resolution));
+  print_columns(r);
+  if (r.intensity_outliers_from > 0.0) {
+    log(fmt::format("intensity     99.9 % are below {:.4g}; brighter ones are kept in coarse steps",
+                    r.intensity_outliers_from));
+  }
   if (r.intensity_from_colors) log("colours       kept as intensities: their luminance, 0 to 255");
   log(fmt::format("outliers      {}",
                   options.outliers.enabled

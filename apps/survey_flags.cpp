@@ -83,7 +83,9 @@ std::unique_ptr<SurveySource> open_survey(const ScansFlags& flags, const Progres
       throw InputError("--scan-topic and --pose-topic are for bags and MCAP files");
     }
     files.T_pose_sensor = T_pose_sensor.value_or(Pose{});
-    return std::make_unique<SurveyFolder>(files);
+    auto folder = std::make_unique<SurveyFolder>(files);
+    if (!folder->about_times().empty()) log("warning: " + folder->about_times());
+    return folder;
   }
   if (!files.free.empty()) throw InputError("--free: is for folders of scans");
   auto survey = std::make_unique<RecordedSurvey>(*recording,
@@ -92,10 +94,12 @@ std::unique_ptr<SurveySource> open_survey(const ScansFlags& flags, const Progres
                                                                        flags.pose_topic,
                                                                        files.poses,
                                                                        T_pose_sensor,
-                                                                       files.is_deskewed},
+                                                                       files.is_deskewed,
+                                                                       files.time_unit},
                                                  progress);
   end_progress();
   log(survey->about());
+  if (!survey->about_times().empty()) log("warning: " + survey->about_times());
   return survey;
 }
 
@@ -129,9 +133,22 @@ CLI::Option* add_scans_flags(CLI::App& app, ScansFlags& flags, bool required) {
          "Pose of the sensor in the frame of the given poses, x,y,z,roll,pitch,yaw in metres and "
          "degrees; without it a recording's /tf_static is used")
       ->needs(scans);
-  app.add_flag("--deskewed",
-               flags.files.is_deskewed,
-               "Ignore times of points: motion within the scans was compensated already")
+  auto* deskewed =
+      app.add_flag("--deskewed",
+                   flags.files.is_deskewed,
+                   "Ignore times of points: motion within the scans was compensated already");
+  deskewed->needs(scans);
+  app.add_option_function<std::string>(
+         "--time-unit",
+         [&flags](const std::string& name) {
+           for (const TimeUnit& unit : kTimeUnits) {
+             if (name == unit.name) flags.files.time_unit = unit;
+           }
+         },
+         "Unit of the points' times: s, ms, us, ns; without it the one in which a scan takes as "
+         "long as scans are apart")
+      ->check(CLI::IsMember({"s", "ms", "us", "ns"}))
+      ->excludes(deskewed)
       ->needs(scans);
   return scans;
 }

@@ -21,21 +21,30 @@ namespace {
 
 struct Format {
   std::string_view extension;
-  std::unique_ptr<CloudReader> (*open)(MappedFile file);  ///< Null for meshes.
+  std::unique_ptr<CloudReader> (*open)(MappedFile file);  ///< Of points; null: always a mesh.
+  bool (*is_mesh)(const MappedFile& file) = nullptr;      ///< Null: if it is not read as points.
+
+  [[nodiscard]] bool has_faces(const MappedFile& file) const {
+    return is_mesh != nullptr ? is_mesh(file) : open == nullptr;
+  }
 };
 
 // every format that `map import` reads
 constexpr Format kFormats[] = {
     {".pcd", open_pcd},
-    {".ply", open_ply},
+    {".ply", open_ply, ply_has_faces},
     {".xyz", open_xyz},
     {".txt", open_xyz},
     {".csv", open_xyz},
     {".asc", open_xyz},
-    {".pts", open_xyz},
+    {".pts", open_pts},
+    {".ptx", open_ptx},
     {".las", open_las},
-    {".obj", nullptr},
+    {".bin", open_kitti_bin},
+    {".npy", open_npy},
+    {".obj", open_obj_points, obj_has_faces},
     {".stl", nullptr},
+    {".off", nullptr},
     {".dae", nullptr},
     {".gltf", nullptr},
     {".glb", nullptr},
@@ -102,6 +111,7 @@ std::string format_by_content(const MappedFile& file) {
     if (!refusal.begin.empty() && begins_with(refusal.begin)) refuse(refusal, file.path());
   }
   if (begins_with("LASF")) return ".las";
+  if (begins_with("\x93NUMPY")) return ".npy";
   if (begins_with("ply\n") || begins_with("ply\r")) return ".ply";
   for (const char* word : {"# .PCD", "VERSION", "FIELDS", "COLUMNS"}) {
     if (begins_with(word)) return ".pcd";
@@ -114,7 +124,8 @@ std::string format_by_content(const MappedFile& file) {
   // byte order marks and comments may hold more than ASCII
   if (is_text && head.find_first_of("0123456789") != std::string_view::npos) return ".xyz";
   throw InputError(fmt::format(
-      "{}: the first bytes tell no format; give it: --format pcd, ply, las or xyz", file.path()));
+      "{}: the first bytes tell no format; give it: --format pcd, ply, las, bin (KITTI) or xyz",
+      file.path()));
 }
 
 }  // namespace
@@ -137,10 +148,10 @@ CloudSource CloudSource::from_stream(int descriptor,
   // what cannot be read from a pipe is said before it is waited for
   if (const Refusal* refusal = find_refusal(source.format_)) refuse(*refusal, "-");
   const Format* known = find_format(source.format_);
-  if (!format.empty() && (known == nullptr || known->open == nullptr)) {
-    throw InputError(
-        fmt::format("--format {}: standard input is read as one of pcd ply xyz txt csv asc pts las",
-                    excerpt(format)));
+  if (!format.empty() && (known == nullptr || known->open == nullptr || source.format_ == ".obj")) {
+    throw InputError(fmt::format(
+        "--format {}: standard input is read as one of pcd ply xyz txt csv asc pts ptx las bin npy",
+        excerpt(format)));
   }
   source.spool_ = spool(descriptor, source.name_, folder, progress);
   const MappedFile file = source.map_file();
@@ -164,7 +175,7 @@ MappedFile CloudSource::map_file() const {
 bool CloudSource::is_mesh() const {
   const Format* format = find_format(format_);
   if (format == nullptr) return false;
-  return format_ == ".ply" ? ply_has_faces(map_file()) : format->open == nullptr;
+  return format->is_mesh != nullptr ? format->is_mesh(map_file()) : format->open == nullptr;
 }
 
 std::unique_ptr<CloudReader> CloudSource::open(const MeshSampling& sampling,
@@ -183,10 +194,8 @@ std::unique_ptr<CloudReader> CloudSource::open(const MeshSampling& sampling,
                                  known_cloud_formats()));
   }
   if (file.bytes().empty()) throw InputError(fmt::format("{}: the file is empty", name_));
-  if (format->open == nullptr || (format_ == ".ply" && ply_has_faces(file))) {
-    const MeshLimits limits = mesh_limits(file.bytes().size());
-    if (format_ == ".ply") check_ply_rows(std::move(file));
-    return open_mesh(name_, sampling, limits, progress);
+  if (format->has_faces(file)) {
+    return open_mesh(name_, format_, sampling, mesh_limits(file.bytes().size()), progress);
   }
   return format->open(std::move(file));
 }
@@ -197,7 +206,7 @@ std::unique_ptr<CloudReader> open_cloud(const std::string& path, const MeshSampl
 
 bool has_cloud_extension(const std::string& path) {
   const Format* format = find_format(extension_of(path));
-  return format != nullptr && format->open != nullptr;
+  return format != nullptr && format->open != nullptr && format->extension != ".obj";
 }
 
 bool is_mesh(const std::string& path) {

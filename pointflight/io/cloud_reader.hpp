@@ -33,6 +33,14 @@ struct FileUnit {
   double metres = 1.0;  ///< Of one unit; 0 if the coordinates are angles.
 };
 
+/// What a file has beside coordinates, by its own names, for messages.
+struct FileColumns {
+  std::string intensity;              ///< What is taken for intensity; empty: nothing.
+  std::vector<std::string> of_scans;  ///< Times and rings, which mean something in scans alone.
+  std::vector<std::string> left_out;  ///< What is not read.
+  std::vector<std::string> notes;     ///< Whatever else a person should know, a line each.
+};
+
 /// Reads a cloud front to back in batches: the whole cloud is never in memory (but for
 /// binary_compressed PCD, whose layout forces one decompressed copy).
 class CloudReader {
@@ -54,12 +62,21 @@ class CloudReader {
   /// not say. By the field's own zero: the scan's start, or the epoch.
   [[nodiscard]] virtual std::span<const double> times() const { return {}; }
 
+  /// The unit that those times were taken to be in, s: of whole numbers and of huge ones 1e-9.
+  [[nodiscard]] virtual double time_unit() const { return 1.0; }
+
   /// Numbers of the channels that measured the points of the last batch; empty if the file does
   /// not say.
   [[nodiscard]] virtual std::span<const std::int32_t> rings() const { return {}; }
 
+  /// What is read of its columns, and what is not.
+  [[nodiscard]] virtual FileColumns columns() const { return {}; }
+
   /// The unit that the file's header or its first comments name; nothing if they name none.
   [[nodiscard]] virtual std::optional<FileUnit> unit() const { return std::nullopt; }
+
+  /// The axis ('x', 'y', 'z') that the file says is up; nothing if it does not say.
+  [[nodiscard]] virtual std::optional<char> up_axis() const { return std::nullopt; }
 
   /// Share of the file that was read, 0 to 1.
   [[nodiscard]] virtual double share_read() const = 0;
@@ -94,7 +111,7 @@ class CloudSource {
   /// For messages: the path, or what stands for a stream.
   [[nodiscard]] const std::string& name() const { return name_; }
 
-  /// True if it is a mesh (by extension, or a PLY with faces).
+  /// True if it is a mesh (by extension; a PLY or an OBJ if it has faces).
   [[nodiscard]] bool is_mesh() const;
 
   /// Opens it at its beginning. Throws InputError. `progress` may throw while a mesh is read.
@@ -121,7 +138,7 @@ std::string known_cloud_formats();
 /// True if the path ends as clouds' files do, that are no meshes: ".pcd", ".LAS", ...
 bool has_cloud_extension(const std::string& path);
 
-/// True if the path names a mesh (by extension, or a PLY with faces).
+/// True if the path names a mesh (by extension; a PLY or an OBJ if it has faces).
 bool is_mesh(const std::string& path);
 
 }  // namespace pointflight

@@ -20,12 +20,30 @@ std::unique_ptr<CloudReader> open_ply(MappedFile file);
 /// True if the PLY header promises faces (or triangle strips): a mesh, not a cloud.
 bool ply_has_faces(const MappedFile& file);
 
-/// Walks over all rows of a PLY. Throws InputError if the file ends before them.
-void check_ply_rows(MappedFile file);
+/// True if an OBJ has a face.
+bool obj_has_faces(const MappedFile& file);
 
-/// Text: x y z [intensity ...] a line; blanks, commas or semicolons between; an optional line of
-/// names; # and // comments; the count line of PTS.
+/// The vertices of an OBJ without faces, with their colours.
+std::unique_ptr<CloudReader> open_obj_points(MappedFile file);
+
+/// Text: x y z [intensity] a line; blanks, commas or semicolons between; an optional line of
+/// names; # and // comments. Without names, columns 4 to 6 of six or seven may be colours.
 std::unique_ptr<CloudReader> open_xyz(MappedFile file);
+
+/// The same with a line that gives the number of points before each scan; without names x y z
+/// intensity red green blue (Leica).
+std::unique_ptr<CloudReader> open_pts(MappedFile file);
+
+/// Leica's PTX: scans in their scanners' frames, each with its pose; beams without a return go.
+std::unique_ptr<CloudReader> open_ptx(MappedFile file);
+
+/// Float32 x y z intensity without a header, as KITTI has them; with a fifth number, the ring, as
+/// nuScenes has them. What it is is guessed by what the numbers say.
+std::unique_ptr<CloudReader> open_kitti_bin(MappedFile file);
+
+/// NumPy's .npy: rows x y z [intensity] of floats or whole numbers, organised clouds (height,
+/// width, numbers), structured arrays with fields x, y, z.
+std::unique_ptr<CloudReader> open_npy(MappedFile file);
 
 /// ASPRS LAS 1.0 to 1.4, uncompressed, point formats 0 to 10.
 std::unique_ptr<CloudReader> open_las(MappedFile file);
@@ -38,10 +56,12 @@ struct MeshLimits {
 /// More than any sound mesh of that size takes.
 MeshLimits mesh_limits(std::size_t file_bytes);
 
-/// Triangles of any format that assimp reads, sampled evenly by area. The file is read in a child
-/// process: if assimp crashes there, that is an InputError here. Throws InputError if the
-/// program was built without assimp.
+/// Triangles of a PLY, an OBJ or any format that assimp reads, sampled evenly by area. What assimp
+/// reads it reads in a child process: if it crashes there, that is an InputError here. Throws
+/// InputError, for these formats also if the program was built without assimp.
+/// @param format  Extension in lower case: ".ply".
 std::unique_ptr<CloudReader> open_mesh(const std::string& path,
+                                       const std::string& format,
                                        const MeshSampling& sampling,
                                        const MeshLimits& limits,
                                        const Progress& progress = {});

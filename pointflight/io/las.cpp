@@ -48,24 +48,39 @@ class LasReader : public CloudReader {
   }
 
   bool read(std::vector<CloudPoint>& batch) override {
-    const std::uint64_t count = std::min<std::uint64_t>(kBatch, points_ - next_);
-    batch.resize(count);
-    for (std::uint64_t i = 0; i < count; ++i) {
-      const std::byte* p = file_.bytes().data() + data_ + (next_ + i) * point_size_;
+    batch.clear();
+    for (; batch.size() < kBatch && next_ < points_; ++next_) {
+      const std::byte* p = file_.bytes().data() + data_ + next_ * point_size_;
+      if (is_flagged(p)) continue;
+      CloudPoint& point = batch.emplace_back();
       for (int axis = 0; axis < 3; ++axis) {
-        batch[i].position[axis] = load<std::int32_t>(p + 4 * axis) * scale_[axis] + offset_[axis];
+        point.position[axis] = load<std::int32_t>(p + 4 * axis) * scale_[axis] + offset_[axis];
       }
-      batch[i].intensity = static_cast<float>(load<std::uint16_t>(p + 12));
-      if (has_color_) batch[i].color = color_of(p);
+      point.intensity = static_cast<float>(load<std::uint16_t>(p + 12));
+      if (has_color_) point.color = color_of(p);
     }
-    next_ += count;
     file_.release_before(data_ + next_ * point_size_);
-    return count > 0;
+    return !batch.empty();
   }
 
   [[nodiscard]] bool has_intensity() const override { return has_intensity_; }
   [[nodiscard]] bool has_color() const override { return has_color_; }
   [[nodiscard]] std::optional<FileUnit> unit() const override { return unit_; }
+  /// Of flagged points: those that were read so far.
+  [[nodiscard]] FileColumns columns() const override {
+    FileColumns columns;
+    if (has_intensity_) columns.intensity = "intensity";
+    columns.left_out = {"returns", "classification", "scan angle"};
+    if (has_time_) columns.left_out.emplace_back("gps time");
+    if (withheld_ > 0) {
+      columns.notes.push_back(fmt::format("{} points that it withholds are left out", withheld_));
+    }
+    if (noise_ > 0) {
+      columns.notes.push_back(
+          fmt::format("{} points that it classes as noise (7, 18) are left out", noise_));
+    }
+    return columns;
+  }
   [[nodiscard]] double share_read() const override {
     return points_ == 0 ? 1.0 : static_cast<double>(next_) / static_cast<double>(points_);
   }
@@ -85,6 +100,8 @@ class LasReader : public CloudReader {
     }
     if (format > 10) fail(104, fmt::format("point format {} is unknown; 0 to 10", format));
     color_at_ = kColorAt[format];
+    has_wide_classes_ = format >= 6;
+    has_time_ = format != 0 && format != 2;
     data_ = load<std::uint32_t>(bytes.data() + 96);
     point_size_ = load<std::uint16_t>(bytes.data() + 105);
     if (point_size_ < kMinPointSize[format]) {
@@ -110,6 +127,22 @@ class LasReader : public CloudReader {
                        point_size_,
                        (bytes.size() - data_) / point_size_));
     }
+  }
+
+  /// Withheld (a flag of its own), or classed as noise; counted.
+  bool is_flagged(const std::byte* point) {
+    const auto flags = std::to_integer<unsigned>(point[15]);
+    const unsigned number = has_wide_classes_ ? std::to_integer<unsigned>(point[16]) : flags & 31u;
+    if ((flags & (has_wide_classes_ ? 4u : 128u)) != 0) {
+      ++withheld_;
+      return true;
+    }
+    // low points; since 1.4 high ones as well
+    if (number == 7 || (has_wide_classes_ && number == 18)) {
+      ++noise_;
+      return true;
+    }
+    return false;
   }
 
   /// Every point has room for an intensity and, by its format, for a colour; files without them
@@ -148,6 +181,10 @@ class LasReader : public CloudReader {
   std::uint64_t next_ = 0;
   std::size_t color_at_ = 0;
   unsigned color_shift_ = 0;
+  bool has_wide_classes_ = false;  // a byte of its own; before, 5 bits beside the flags
+  bool has_time_ = false;
+  std::uint64_t withheld_ = 0;
+  std::uint64_t noise_ = 0;
   bool has_intensity_ = false;
   bool has_color_ = false;
   std::optional<FileUnit> unit_;

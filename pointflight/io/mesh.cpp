@@ -1,181 +1,78 @@
 #include <fmt/format.h>
-#include <sys/stat.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstring>
 #include <limits>
-#include <optional>
+#include <string_view>
 #include <utility>
 
-#include "pointflight/core/child_process.hpp"
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/core/random.hpp"
-#include "pointflight/geometry/shape_scene.hpp"
 #include "pointflight/io/byte_cursor.hpp"
-#include "pointflight/io/file_unit.hpp"
 #include "pointflight/io/formats.hpp"
-
-#ifdef POINTFLIGHT_HAS_ASSIMP
-#include <assimp/DefaultIOSystem.h>
-#include <assimp/config.h>
-#include <assimp/postprocess.h>
-#include <assimp/scene.h>
-
-#include <assimp/Importer.hpp>
-#endif
+#include "pointflight/io/internal/mesh_triangles.hpp"
 
 namespace pointflight {
-
-#ifdef POINTFLIGHT_HAS_ASSIMP
-
 namespace {
 
-using Corners = std::array<float, 9>;  ///< Of a triangle, in the mesh's unit.
-
-/// A mesh may name others (materials, buffers): only what is a file, never a pipe or a device.
-class RegularFiles : public Assimp::DefaultIOSystem {
- public:
-  bool Exists(const char* path) const override {  // the default opens it
-    struct stat status {};
-    return ::stat(path, &status) == 0 && S_ISREG(status.st_mode);
-  }
-  Assimp::IOStream* Open(const char* path, const char* mode) override {
-    return Exists(path) ? DefaultIOSystem::Open(path, mode) : nullptr;
-  }
-};
-
-std::string cannot_read(const std::string& path, const std::string& why) {
-  constexpr std::size_t kLongest = 160;
-  return fmt::format("{}: cannot read as a mesh: {}; open it in a mesh editor and export it again",
-                     path,
-                     excerpt(why, kLongest));
-}
-
-Corners corners_of(const aiMesh& mesh, const aiFace& face, const std::string& path) {
-  Corners corners{};
-  for (unsigned i = 0; i < 3; ++i) {
-    if (face.mIndices[i] >= mesh.mNumVertices) {
-      throw InputError(cannot_read(
-          path,
-          fmt::format(
-              "a face names vertex {}, the mesh has {}", face.mIndices[i], mesh.mNumVertices)));
-    }
-    const aiVector3D& p = mesh.mVertices[face.mIndices[i]];
-    corners[3 * i] = p.x;
-    corners[3 * i + 1] = p.y;
-    corners[3 * i + 2] = p.z;
-  }
-  return corners;
-}
-
-/// Reads a mesh by assimp and writes its triangles; to be run in a child process, for damaged files
-/// make assimp crash.
-void import_triangles(const std::string& path, ChildOutput& output) {
-  Assimp::Importer importer;
-  importer.SetIOHandler(new RegularFiles);  // the importer's from now on
-  // the file's own axes, whatever its header says of them: --up is the user's word
-  importer.SetPropertyBool(AI_CONFIG_IMPORT_COLLADA_IGNORE_UP_DIRECTION, true);
-  const aiScene* scene =
-      importer.ReadFile(path,
-                        aiProcess_ValidateDataStructure | aiProcess_Triangulate |
-                            aiProcess_PreTransformVertices | aiProcess_SortByPType);
-  if (scene == nullptr) throw InputError(cannot_read(path, importer.GetErrorString()));
-  constexpr std::size_t kBatch = 4096;
-  std::vector<Corners> batch;
-  for (unsigned m = 0; m < scene->mNumMeshes; ++m) {
-    const aiMesh& mesh = *scene->mMeshes[m];
-    for (unsigned f = 0; f < mesh.mNumFaces; ++f) {
-      // points and lines have no area
-      if (mesh.mFaces[f].mNumIndices != 3) continue;
-      batch.push_back(corners_of(mesh, mesh.mFaces[f], path));
-      if (batch.size() < kBatch) continue;
-      output.write(std::as_bytes(std::span(batch)));
-      batch.clear();
-    }
-  }
-  output.write(std::as_bytes(std::span(batch)));
-}
-
-/// The bytes of the triangles of a mesh, each of type Corners.
-std::vector<std::byte> read_triangles(const std::string& path,
-                                      const MeshLimits& limits,
-                                      const Progress& progress) {
-  ChildResult result = run_in_child([&](ChildOutput& output) { import_triangles(path, output); },
-                                    {limits.cpu_seconds, limits.memory_bytes},
-                                    [&] { report(progress, "reading the mesh", 0.0); });
-  if (result.failure.rfind(path, 0) == 0) throw InputError(result.failure);
-  if (!result.failure.empty()) {
-    throw InputError(cannot_read(path, fmt::format("the importer failed: {}", result.failure)));
-  }
-  if (result.bytes.empty()) {
-    throw InputError(fmt::format("{}: the mesh has no faces; is it a cloud?", path));
-  }
-  return std::move(result.bytes);
-}
-
-/// The unit in the first comments of an OBJ; what other formats say, assimp has heeded.
-std::optional<FileUnit> unit_of_mesh(const std::string& path) {
-  constexpr std::size_t kMostLines = 100;
-  if (!path.ends_with(".obj")) return std::nullopt;
-  const MappedFile file(path);
-  LineCursor lines(as_text(file.bytes()));
-  std::string_view line;
-  while (lines.number() < kMostLines && lines.next(line)) {
-    if (line.empty() || line.front() != '#') continue;
-    if (auto unit = unit_in_comment(line)) return unit;
-  }
-  return std::nullopt;
-}
+constexpr std::uint64_t kReportFaces = 65536;  // faces
 
 /// Points drawn evenly by area from triangles, in a fixed order.
 class MeshReader : public CloudReader {
  public:
   MeshReader(const std::string& path,
              const MeshSampling& sampling,
-             const MeshLimits& limits,
+             std::unique_ptr<MeshTriangles> triangles,
+             std::optional<char> up,
              const Progress& progress)
-      : sampling_(sampling),
-        bytes_(read_triangles(path, limits, progress)),
-        faces_(bytes_.size() / sizeof(Corners)),
-        unit_(unit_of_mesh(path)) {
-    check_size(path);
+      : sampling_(sampling), triangles_(std::move(triangles)), up_(up) {
+    check_size(path, progress);
+    triangles_->restart();
   }
 
   bool read(std::vector<CloudPoint>& batch) override {
     batch.clear();
-    while (batch.size() < kBatch && face_ < faces_) {
-      if (pending_ == 0) next_face();
+    while (batch.size() < kBatch) {
+      if (pending_ == 0 && !next_face()) break;
       const RandomStream random(0, StreamId::kCloudSampling, static_cast<std::uint32_t>(face_));
       while (pending_ > 0 && batch.size() < kBatch) {
         const auto [u, v] = random.uniform2(--pending_);
         batch.push_back({point_on(triangle_, u, v) / sampling_.unit, 0.0f});
       }
-      if (pending_ == 0) ++face_;
     }
     return !batch.empty();
   }
 
   [[nodiscard]] bool has_intensity() const override { return false; }
-  [[nodiscard]] std::optional<FileUnit> unit() const override { return unit_; }
-  [[nodiscard]] double share_read() const override {
-    return static_cast<double>(face_) / static_cast<double>(faces_);
-  }
+  [[nodiscard]] std::optional<FileUnit> unit() const override { return triangles_->unit(); }
+  [[nodiscard]] std::optional<char> up_axis() const override { return up_; }
+  [[nodiscard]] double share_read() const override { return triangles_->share_read(); }
 
  private:
+  /// In metres; false after the last one.
+  bool next_triangle(Triangle& triangle) {
+    if (!triangles_->next(triangle)) return false;
+    for (Vector3d* corner : {&triangle.a, &triangle.b, &triangle.c}) *corner *= sampling_.unit;
+    return true;
+  }
+
   /// What a wrong unit or single precision would spoil is said before hours of sampling.
-  void check_size(const std::string& path) const {
+  void check_size(const std::string& path, const Progress& progress) {
     constexpr double kMostPoints = 2e9;
     constexpr double kCoarsestStep = 0.01;  // m
     double points = 0.0;
-    double farthest = 0.0;
-    for (std::size_t face = 0; face < faces_; ++face) {
-      const double wanted = area(triangle(face)) * sampling_.points_per_square_metre;
+    double farthest = 0.0;  // m
+    std::uint64_t faces = 0;
+    for (Triangle t{}; next_triangle(t); ++faces) {
+      if (faces % kReportFaces == 0) report(progress, "measuring the mesh", share_read());
+      const double wanted = area(t) * sampling_.points_per_square_metre;
       points += std::isfinite(wanted) ? wanted : 0.0;
-      for (const float c : corners(face)) {
-        if (std::isfinite(c)) farthest = std::max(farthest, std::abs(static_cast<double>(c)));
+      for (const Vector3d& corner : {t.a, t.b, t.c}) {
+        if (corner.allFinite()) farthest = std::max(farthest, corner.cwiseAbs().maxCoeff());
       }
+    }
+    if (faces == 0) {
+      throw InputError(fmt::format("{}: the mesh has no faces; is it a cloud?", path));
     }
     if (points > kMostPoints) {
       throw InputError(fmt::format(
@@ -185,71 +82,69 @@ class MeshReader : public CloudReader {
           points / sampling_.points_per_square_metre,
           points));
     }
-    const double step = farthest * sampling_.unit * std::numeric_limits<float>::epsilon();
-    if (step > kCoarsestStep) {
-      throw InputError(
-          fmt::format("{}: coordinates up to {:.3g} are read in steps of {:.2g} m (single "
-                      "precision); move the mesh near its origin first",
-                      path,
-                      farthest,
-                      step));
+    const double step = farthest * std::numeric_limits<float>::epsilon();
+    if (triangles_->is_single_precision() && step > kCoarsestStep) {
+      throw InputError(fmt::format(
+          "{}: coordinates up to {:.3g} are kept in steps of {:.2g} m (single precision); move the "
+          "mesh near its origin before it is saved, or save it as OBJ, or as PLY with doubles",
+          path,
+          farthest / sampling_.unit,
+          step));
     }
   }
 
-  [[nodiscard]] Corners corners(std::size_t face) const {
-    return load<Corners>(bytes_.data() + face * sizeof(Corners));
-  }
-
-  /// In metres.
-  [[nodiscard]] Triangle triangle(std::size_t face) const {
-    const Corners c = corners(face);
-    const auto corner = [&](std::size_t i) -> Vector3d {
-      return sampling_.unit * Vector3f(c.data() + 3 * i).cast<double>();
-    };
-    return {corner(0), corner(1), corner(2)};
-  }
-
-  void next_face() {
-    triangle_ = triangle(face_);
-    const double wanted = area(triangle_) * sampling_.points_per_square_metre;
-    if (!std::isfinite(wanted)) return;
-    owed_ += wanted;
-    pending_ = static_cast<std::uint64_t>(owed_);
-    owed_ -= static_cast<double>(pending_);
+  /// The next triangle that points are due of; false after the last one.
+  bool next_face() {
+    while (next_triangle(triangle_)) {
+      ++face_;
+      const double wanted = area(triangle_) * sampling_.points_per_square_metre;
+      if (!std::isfinite(wanted)) continue;
+      owed_ += wanted;
+      pending_ = static_cast<std::uint64_t>(owed_);
+      owed_ -= static_cast<double>(pending_);
+      if (pending_ > 0) return true;
+    }
+    return false;
   }
 
   MeshSampling sampling_;
-  std::vector<std::byte> bytes_;
-  std::size_t faces_;
-  std::optional<FileUnit> unit_;
-  std::size_t face_ = 0;
+  std::unique_ptr<MeshTriangles> triangles_;
+  std::optional<char> up_;
+  std::uint64_t face_ = 0;  // from 1
   Triangle triangle_{};
   std::uint64_t pending_ = 0;
   double owed_ = 0.0;
 };
 
+/// The axis that a file of this kind says is up: glTF by its standard, Collada in its header.
+std::optional<char> up_axis_of(const std::string& path, std::string_view format) {
+  if (format == ".gltf" || format == ".glb") return 'y';
+  if (format != ".dae") return std::nullopt;
+  constexpr std::size_t kHead = 65536;
+  const MappedFile file(path);
+  const std::string_view head = as_text(file.bytes()).substr(0, kHead);
+  constexpr std::string_view kTag = "<up_axis>";
+  const std::size_t at = head.find(kTag);
+  if (at == std::string_view::npos) return 'y';  // Collada 1.4, <up_axis>: the default
+  const std::size_t axis = head.find_first_not_of(" \t\r\n", at + kTag.size());
+  if (axis == std::string_view::npos) return std::nullopt;
+  return head[axis] == 'Y' ? 'y' : head[axis] == 'X' ? 'x' : 'z';
+}
+
 }  // namespace
 
 std::unique_ptr<CloudReader> open_mesh(const std::string& path,
+                                       const std::string& format,
                                        const MeshSampling& sampling,
                                        const MeshLimits& limits,
                                        const Progress& progress) {
-  return std::make_unique<MeshReader>(path, sampling, limits, progress);
+  std::unique_ptr<MeshTriangles> triangles =
+      format == ".ply"   ? ply_triangles(MappedFile(path), progress)
+      : format == ".obj" ? obj_triangles(MappedFile(path), progress)
+                         : imported_triangles(path, limits, progress);
+  return std::make_unique<MeshReader>(
+      path, sampling, std::move(triangles), up_axis_of(path, format), progress);
 }
-
-#else
-
-std::unique_ptr<CloudReader> open_mesh(const std::string& path,
-                                       const MeshSampling& /*sampling*/,
-                                       const MeshLimits& /*limits*/,
-                                       const Progress& /*progress*/) {
-  throw InputError(fmt::format(
-      "{}: meshes need assimp, which this program was built without; install libassimp-dev and "
-      "build again",
-      path));
-}
-
-#endif
 
 MeshLimits mesh_limits(std::size_t file_bytes) {
   const double megabytes = 1e-6 * static_cast<double>(file_bytes);

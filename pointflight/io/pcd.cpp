@@ -10,6 +10,7 @@
 #include "pointflight/io/byte_cursor.hpp"
 #include "pointflight/io/file_unit.hpp"
 #include "pointflight/io/formats.hpp"
+#include "pointflight/io/internal/column_names.hpp"
 #include "pointflight/io/internal/pcd_header.hpp"
 
 // PCD 0.7 as documented by the Point Cloud Library, "The PCD (Point Cloud Data) file format".
@@ -35,28 +36,7 @@ double load_number(const std::byte* p, char type, std::size_t size) {
 class PcdReader : public CloudReader {
  public:
   explicit PcdReader(MappedFile file) : file_(std::move(file)), header_(parse_pcd_header(file_)) {
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const std::string name(1, "xyz"[axis]);
-      const PcdColumn* field = find(name);
-      if (field == nullptr) {
-        throw InputError(fmt::format(
-            "{}: no field '{}' in the PCD header; x, y and z are needed", file_.path(), name));
-      }
-      position_[axis] = *field;
-    }
-    if (const PcdColumn* field = find("intensity")) intensity_ = *field;
-    for (const char* name : {"rgb", "rgba"}) {
-      const PcdColumn* field = find(name);
-      if (field != nullptr && field->size == 4) color_ = *field;
-    }
-    for (const char* name : {"time", "t", "timestamp", "time_stamp", "offset_time"}) {
-      const PcdColumn* field = find(name);
-      if (field != nullptr && !time_) time_ = *field;
-    }
-    for (const char* name : {"ring", "line", "channel"}) {
-      const PcdColumn* field = find(name);
-      if (field != nullptr && !ring_) ring_ = *field;
-    }
+    find_columns();
     if (header_.encoding == PcdEncoding::kAscii) {
       lines_.emplace(as_text(file_.bytes()).substr(header_.data_offset));
     } else if (header_.encoding == PcdEncoding::kBinary) {
@@ -84,7 +64,9 @@ class PcdReader : public CloudReader {
   [[nodiscard]] bool has_intensity() const override { return intensity_.has_value(); }
   [[nodiscard]] bool has_color() const override { return color_.has_value(); }
   [[nodiscard]] std::span<const double> times() const override { return times_; }
+  [[nodiscard]] double time_unit() const override { return time_unit_; }
   [[nodiscard]] std::span<const std::int32_t> rings() const override { return rings_; }
+  [[nodiscard]] FileColumns columns() const override { return about_; }
   [[nodiscard]] std::optional<FileUnit> unit() const override { return header_.unit; }
   [[nodiscard]] double share_read() const override {
     return header_.points == 0 ? 1.0
@@ -92,11 +74,36 @@ class PcdReader : public CloudReader {
   }
 
  private:
-  [[nodiscard]] const PcdColumn* find(const std::string& name) const {
+  void find_columns() {
+    std::vector<std::string> names;
     for (const PcdColumn& field : header_.fields) {
-      if (field.name == name && field.count > 0) return &field;
+      names.push_back(field.count > 0 ? field.name : std::string());
     }
-    return nullptr;
+    const NamedColumns columns(names);
+    const auto find = [&](ColumnRole role) -> std::optional<PcdColumn> {
+      const auto column = columns.find(role);
+      return column ? std::optional(header_.fields[*column]) : std::nullopt;
+    };
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const auto field = find(static_cast<ColumnRole>(axis));
+      if (!field) {
+        throw InputError(fmt::format("{}: no field '{}' in the PCD header; x, y and z are needed",
+                                     file_.path(),
+                                     "xyz"[axis]));
+      }
+      position_[axis] = *field;
+    }
+    intensity_ = find(ColumnRole::kIntensity);
+    time_ = find(ColumnRole::kTime);
+    ring_ = find(ColumnRole::kRing);
+    color_ = find(ColumnRole::kPackedColor);
+    if (color_ && color_->size != 4) color_.reset();
+    about_ = columns.about();
+    if (!header_.viewpoint.empty()) {
+      about_.notes.push_back(
+          fmt::format("its VIEWPOINT {} is not applied: points stay as they are in the file",
+                      header_.viewpoint));
+    }
   }
 
   void check_binary_length() const {
@@ -175,9 +182,11 @@ class PcdReader : public CloudReader {
 
   /// Drivers write seconds (Velodyne: time, RoboSense: timestamp), nanoseconds as whole numbers
   /// (Ouster: t, Livox: offset_time) or as doubles since 1970 (Livox: timestamp).
-  [[nodiscard]] double seconds_of(double value) const {
+  [[nodiscard]] double seconds_of(double value) {
     constexpr double kSecondsEnd = 1e11;  // the year 5138
-    return time_->type != 'F' || std::abs(value) > kSecondsEnd ? 1e-9 * value : value;
+    const bool is_nanoseconds = time_->type != 'F' || std::abs(value) > kSecondsEnd;
+    time_unit_ = is_nanoseconds ? 1e-9 : 1.0;
+    return time_unit_ * value;
   }
 
   /// -1 if it is none.
@@ -243,6 +252,7 @@ class PcdReader : public CloudReader {
 
   MappedFile file_;
   PcdHeader header_;
+  FileColumns about_;
   std::array<PcdColumn, 3> position_;
   std::optional<PcdColumn> intensity_;
   std::optional<PcdColumn> color_;
@@ -253,6 +263,7 @@ class PcdReader : public CloudReader {
   std::vector<double> words_;
   std::vector<double> times_;
   std::vector<std::int32_t> rings_;
+  double time_unit_ = 1.0;
   std::uint64_t next_ = 0;
 };
 

@@ -223,6 +223,24 @@ void check_sections(std::span<const MapSection> sections,
 
 }  // namespace
 
+void set_section(MapDescription& description, const char* name, std::vector<std::byte> bytes) {
+  std::erase_if(description.extra, [&](const ExtraSection& extra) { return extra.name == name; });
+  if (!bytes.empty()) description.extra.push_back({name, std::move(bytes)});
+}
+
+void set_levels(MapDescription& description, const IntensityLevels& levels) {
+  description.intensity_offset = levels.of_code[0];
+  // what a reader makes of it that does not know the section
+  description.intensity_step =
+      levels.is_linear ? levels.step : levels.of_code[1] - levels.of_code[0];
+  std::vector<std::byte> bytes;
+  if (!levels.is_linear) {
+    const auto data = std::as_bytes(std::span(levels.of_code));
+    bytes.assign(data.begin(), data.end());
+  }
+  set_section(description, kLevelsSection, std::move(bytes));
+}
+
 void write_map(OutputFile file, const Bvh8& tree, const MapDescription& description) {
   const Layout layout = lay_out(tree, description);
   file.write(layout.header);
@@ -305,6 +323,17 @@ void SurfelMap::attach(std::span<const std::byte> bytes, const std::string& name
   if (const auto known = section(KnownSpace::kSection); !known.empty()) {
     known_ = KnownSpace::from_section(known);
     if (!known_) corrupt(KnownSpace::kSection, known);
+  }
+  levels_ = IntensityLevels::linear(properties_.intensity_offset, properties_.intensity_step);
+  if (const auto levels = section(kLevelsSection); !levels.empty()) {
+    if (levels.size() != sizeof levels_.of_code) corrupt(kLevelsSection, levels);
+    std::memcpy(levels_.of_code.data(), levels.data(), sizeof levels_.of_code);
+    levels_.is_linear = false;
+    const bool is_finite = std::all_of(
+        levels_.of_code.begin(), levels_.of_code.end(), [](float v) { return std::isfinite(v); });
+    if (!is_finite || !std::is_sorted(levels_.of_code.begin(), levels_.of_code.end())) {
+      corrupt(kLevelsSection, levels);
+    }
   }
   if (const auto scale = section(kReflectivitySection); !scale.empty()) {
     if (scale.size() == sizeof reflectivity_) {

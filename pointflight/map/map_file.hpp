@@ -20,6 +20,8 @@
 ///   optional
 ///   ...         section: known_space  which space a survey saw (known_space.hpp); optional
 ///   ...         section: reflectivity  f64: reflectivity per unit of intensity; optional
+///   ...         section: levels     f32[256]: intensity of each byte, if steps are not equal;
+///   optional
 ///   ...         any others, which readers that do not know them leave alone
 ///
 /// Version 1 had these four sections and no names for them: its table is four MapSectionV1.
@@ -80,6 +82,12 @@ struct MapDescription : MapProperties {
   std::string metadata;             ///< JSON.
   std::vector<ExtraSection> extra;  ///< Further sections; edits keep what they know.
 };
+
+/// Puts an extra section in place of one of the same name; empty bytes remove it.
+void set_section(MapDescription& description, const char* name, std::vector<std::byte> bytes);
+
+/// Says what the codes of intensities stand for.
+void set_levels(MapDescription& description, const IntensityLevels& levels);
 
 /// Writes and commits a map: it appears under its name only when complete. Throws InputError.
 void write_map(OutputFile file, const Bvh8& tree, const MapDescription& description);

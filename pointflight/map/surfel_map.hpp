@@ -11,6 +11,7 @@
 
 #include "pointflight/geometry/types.hpp"
 #include "pointflight/map/bvh8.hpp"
+#include "pointflight/map/intensity_levels.hpp"
 #include "pointflight/map/known_space.hpp"
 #include "pointflight/map/surfel_scale.hpp"
 
@@ -126,15 +127,14 @@ class SurfelMap {
            resolution() * (Vector3d(leaf.x, leaf.y, leaf.z) + center_voxels(word).cast<double>());
   }
 
-  /// Codes of the intensities beside `words`, empty without: offset + step * code.
+  /// What the codes of intensities stand for.
+  [[nodiscard]] const IntensityLevels& intensity_levels() const { return levels_; }
+  /// Codes of the intensities beside `words`, empty without.
   [[nodiscard]] std::span<const std::uint8_t> intensity_codes() const { return intensity_; }
 
   /// Intensity of the surfel at a word index, in the cloud's own scale; 0 without intensities.
   [[nodiscard]] float intensity(std::uint32_t word) const {
-    return word < intensity_.size()
-               ? properties_.intensity_offset +
-                     properties_.intensity_step * static_cast<float>(intensity_[word])
-               : 0.0f;
+    return word < intensity_.size() ? levels_.of_code[intensity_[word]] : 0.0f;
   }
 
   /// The nearest surfel within `max_distance` of a point: distance to its oriented box with half
@@ -172,6 +172,7 @@ class SurfelMap {
   std::string_view metadata_;
   std::optional<KnownSpace> known_;
   MapProperties properties_;
+  IntensityLevels levels_;
   SurfelScale scale_;
   std::uint64_t file_size_ = 0;
   double reflectivity_ = 0.0;

@@ -222,6 +222,7 @@ class RecordedScanReader : public ScanReader {
     const std::size_t end = std::min(cloud_.content.points.size(), at_ + kBatch);
     const auto first = cloud_.content.points.begin();
     batch.scan = number_ - 1;
+    batch.time_unit = cloud_.content.time_unit;
     batch.points.assign(first + static_cast<std::ptrdiff_t>(at_),
                         first + static_cast<std::ptrdiff_t>(end));
     at_ = end;
@@ -325,6 +326,7 @@ RecordedSurvey::RecordedSurvey(const RecordingOpener& opener,
                     to_seconds(poses.front().time),
                     to_seconds(poses.back().time)));
   }
+  settle_times(options.time_unit, options.name);
   about_ += fmt::format("; {} scans", scans_.size());
   if (scans_.size() < times.size()) {
     about_ += fmt::format(", {} before the first or after the last pose left out",

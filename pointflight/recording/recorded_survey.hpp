@@ -27,7 +27,8 @@ struct RecordedSurveyOptions {
   /// Where the sensor is in the frame that the poses are of. Nothing: by /tf_static if the
   /// clouds' frame is another than the poses'.
   std::optional<Pose> T_pose_sensor;
-  bool is_deskewed = false;  ///< Times of points are left aside.
+  bool is_deskewed = false;           ///< Times of points are left aside.
+  std::optional<TimeUnit> time_unit;  ///< Of times of points; nothing: recognised.
 };
 
 /// What a recording holds that a survey could be of.

@@ -2,7 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
+#include <map>
 #include <utility>
 
 #include "pointflight/core/input_error.hpp"
@@ -50,6 +53,7 @@ class PosedScanReader : public SurveyReader {
                             poses_apart(poses, start) <= kMostApart;
     const Pose at_start = pose_on(poses, start);
     const std::string path = uses_times ? survey_.source_->path(points_.scan) : "";
+    const double scale = survey_.time_unit_ > 0.0 ? survey_.time_unit_ / points_.time_unit : 1.0;
     for (const RecordedPoint& point : points_.points) {
       if (point.position.isZero(0.0)) continue;  // drivers say so: no return
       Pose pose = at_start;
@@ -60,16 +64,14 @@ class PosedScanReader : public SurveyReader {
       }
       const double range = seen.norm();
       if (!(range >= kNearest && range < kFarthest)) continue;  // NaN as well
-      if (uses_times && std::isfinite(point.time)) pose = pose_of(point, start, path);
+      if (uses_times && std::isfinite(point.time)) pose = pose_of(scale * point.time, start, path);
       batch.push_back(survey_ray(pose, seen, points_.is_return));
       batch.back().intensity = point.intensity;
     }
   }
 
   /// Of a point with a time; `path` is its scan's, for messages.
-  [[nodiscard]] Pose pose_of(const RecordedPoint& point,
-                             SimTime start,
-                             const std::string& path) const {
+  [[nodiscard]] Pose pose_of(double time, SimTime start, const std::string& path) const {
     const SurveyPoses& trajectory = survey_.trajectory_;
     if (!trajectory.has_times) {
       throw InputError(
@@ -78,7 +80,7 @@ class PosedScanReader : public SurveyReader {
                       path,
                       survey_.poses_name_));
     }
-    return pose_on(trajectory.poses, time_of_point(trajectory.poses, start, point.time, path));
+    return pose_on(trajectory.poses, time_of_point(trajectory.poses, start, time, path));
   }
 
   static constexpr auto kNone = static_cast<std::size_t>(-1);
@@ -102,6 +104,84 @@ std::unique_ptr<SurveyReader> PosedScans::open(
   return std::make_unique<PosedScanReader>(*this, chosen);
 }
 
+namespace {
+
+/// Times of a scan's points.
+struct TimesOfScan {
+  double first = std::numeric_limits<double>::infinity();
+  double last = -std::numeric_limits<double>::infinity();
+  double unit = 1.0;  ///< That they were taken to be in, s.
+  [[nodiscard]] bool any() const { return first <= last; }
+  [[nodiscard]] double span() const { return last - first; }
+};
+
+}  // namespace
+
+void PosedScans::settle_times(const std::optional<TimeUnit>& given, const std::string& name) {
+  constexpr std::size_t kLooks = 5;  // scans
+  if (given) time_unit_ = given->seconds;
+  if (point_times_ != PointTimes::kUsed || scans_.size() < 3 || !trajectory_.has_times) return;
+  std::vector<double> intervals;
+  for (std::size_t i = 1; i < scans_.size(); ++i) {
+    intervals.push_back(to_seconds(scans_[i].time - scans_[i - 1].time));
+  }
+  std::nth_element(intervals.begin(),
+                   intervals.begin() + static_cast<std::ptrdiff_t>(intervals.size() / 2),
+                   intervals.end());
+  const double interval = intervals[intervals.size() / 2];
+  std::map<std::size_t, TimesOfScan> times;
+  ScanBatch batch;
+  const auto reader = source_->open([&](std::size_t scan) {
+    return std::any_of(
+        scans_.begin(),
+        scans_.begin() + static_cast<std::ptrdiff_t>(std::min(kLooks, scans_.size())),
+        [&](const Posed& posed) { return posed.number == scan; });
+  });
+  while (times.size() <= kLooks && reader->read(batch)) {
+    TimesOfScan& scan = times[batch.scan];
+    scan.unit = batch.time_unit;
+    for (const RecordedPoint& point : batch.points) {
+      if (!std::isfinite(point.time)) continue;
+      scan.first = std::min(scan.first, point.time);
+      scan.last = std::max(scan.last, point.time);
+    }
+  }
+  std::vector<TimesOfScan> with;
+  for (const auto& [number, scan] : times) {
+    if (scan.any()) with.push_back(scan);
+  }
+  if (with.empty()) {
+    about_times_ = fmt::format(
+        "{}: its points have no times (time, t, timestamp, offset_time): motion within a scan is "
+        "not taken out, and surfaces smear while the sensor turns",
+        name);
+    return;
+  }
+  std::nth_element(with.begin(),
+                   with.begin() + static_cast<std::ptrdiff_t>(with.size() / 2),
+                   with.end(),
+                   [](const auto& a, const auto& b) { return a.span() < b.span(); });
+  const TimesOfScan& usual = with[with.size() / 2];
+  const double raw = usual.span() / usual.unit;
+  const double unit = given ? given->seconds : usual.unit;
+  if (raw == 0.0 || !(interval > 0.0) || fits_interval(raw * unit, interval)) return;
+  const auto found = given ? std::nullopt : unit_by_span(raw, interval);
+  if (found) time_unit_ = found->seconds;
+  about_times_ = fmt::format(
+      "{}: times of points are taken to be in {}: {}; --time-unit says otherwise",
+      name,
+      found              ? found->name
+      : given            ? given->name
+      : usual.unit < 1.0 ? "ns"
+                         : "s",
+      found ? fmt::format(
+                  "scans come every {:.3g} s and take {:.3g} s so", interval, raw * found->seconds)
+            : fmt::format(
+                  "a scan takes {:.3g} s so, and scans come every {:.3g} s; surfaces may smear",
+                  raw * unit,
+                  interval));
+}
+
 SurveyFolder::SurveyFolder(const SurveyFiles& files) {
   trajectory_ = read_survey_poses(files.poses, files.T_pose_sensor);
   poses_name_ = files.poses;
@@ -112,6 +192,7 @@ SurveyFolder::SurveyFolder(const SurveyFiles& files) {
   const std::vector<TimedPose>& poses = trajectory_.poses;
   if (names.size() == poses.size()) {
     for (std::size_t i = 0; i < names.size(); ++i) scans_.push_back({i, poses[i].time});
+    settle_times(files.time_unit, files.scans);
     return;
   }
   for (std::size_t i = 0; i < names.size(); ++i) {
@@ -136,6 +217,7 @@ SurveyFolder::SurveyFolder(const SurveyFiles& files) {
     }
     scans_.push_back({i, at});
   }
+  settle_times(files.time_unit, files.scans);
 }
 
 }  // namespace pointflight

@@ -4,12 +4,14 @@
 #include <cstddef>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "pointflight/survey/scan_source.hpp"
 #include "pointflight/survey/survey_poses.hpp"
 #include "pointflight/survey/survey_rays.hpp"
+#include "pointflight/survey/time_unit.hpp"
 
 namespace pointflight {
 
@@ -24,7 +26,15 @@ class PosedScans : public SurveySource {
   [[nodiscard]] std::unique_ptr<SurveyReader> open(
       const std::function<bool(std::size_t scan)>& chosen = {}) const override;
 
+  /// What a person should know of the times of the points; empty: nothing.
+  [[nodiscard]] const std::string& about_times() const { return about_times_; }
+
  protected:
+  /// Reads the first scans and settles the unit of their points' times: the given one, or the one
+  /// that was assumed, or, if a scan would take no time that fits the scans' interval in it,
+  /// another in which it does. To be called when all else is there; `name` is for messages.
+  void settle_times(const std::optional<TimeUnit>& given, const std::string& name);
+
   /// A scan of the source whose pose is known.
   struct Posed {
     std::size_t number = 0;  ///< In the source.
@@ -44,6 +54,8 @@ class PosedScans : public SurveySource {
   PointTimes point_times_ = PointTimes::kUsed;  ///< As the source needs it.
 
  private:
+  double time_unit_ = 0.0;  ///< s; 0: as the source assumes.
+  std::string about_times_;
   friend class PosedScanReader;
 };
 
@@ -58,6 +70,7 @@ struct SurveyFiles {
   /// Times of points are ignored: motion within a scan was taken out of it.
   bool is_deskewed = false;
   Pose T_pose_sensor = {};  ///< Where the sensor is in the frame that the poses are of.
+  std::optional<TimeUnit> time_unit = {};  ///< Of times of points; nothing: recognised.
 };
 
 /// A survey in a folder. Which pose is which scan's: by the file's ninth column; else as many poses

@@ -108,6 +108,7 @@ class ScanFolderReader : public ScanReader {
   void fill(ScanBatch& batch) const {
     batch.scan = scans_[next_ - 1];
     batch.is_return = is_return_;
+    batch.time_unit = cloud_->time_unit();
     batch.points.resize(points_.size());
     const auto times = cloud_->times();
     const auto rings = cloud_->rings();

@@ -20,6 +20,7 @@ struct ScanBatch {
   std::size_t scan = 0;   ///< Its number.
   bool is_return = true;  ///< False: shots without a return, each up to where nothing was.
   std::vector<RecordedPoint> points;  ///< In the recording's order.
+  double time_unit = 1.0;             ///< That their times were taken to be in, s.
 };
 
 /// Reads scans front to back in batches: a scan is never in memory as a whole.

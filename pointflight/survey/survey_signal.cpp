@@ -151,8 +151,7 @@ void paint_reflectivity(EditedMap& edited,
   report.reflectivities = {reflectivity(0.05), reflectivity(0.5), reflectivity(0.95)};
   edited.tree.intensity = std::move(codes);
   edited.description.has_intensity = true;
-  edited.description.intensity_offset = 0.0f;
-  edited.description.intensity_step = kStep;
+  set_levels(edited.description, IntensityLevels::linear(0.0f, kStep));
   set_reflectivity(edited.description, kPerIntensity);
   append_note(edited,
               fmt::format("intensities are reflectivities in percent, from the survey's signals, "

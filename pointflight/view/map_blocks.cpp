@@ -67,8 +67,10 @@ std::vector<std::byte> MapBlocks::index() const {
   put(out, static_cast<std::uint32_t>(map_->has_intensity() ? 1 : 0));
   for (int axis = 0; axis < 3; ++axis) put(out, map_->origin_world()[axis]);
   put(out, map_->resolution());
-  put(out, map_->properties().intensity_offset);
-  put(out, map_->properties().intensity_step);
+  // as if steps were equal: bright outliers are white
+  const IntensityLevels& levels = map_->intensity_levels();
+  put(out, levels.of_code[0]);
+  put(out, levels.is_linear ? levels.step : levels.of_code[1] - levels.of_code[0]);
   const auto r = static_cast<float>(map_->resolution());
   for (const Block& block : blocks()) {
     for (std::size_t k = 0; k < 3; ++k) put(out, r * static_cast<float>(block.low[k]));

@@ -3,7 +3,10 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <functional>
 #include <limits>
+#include <set>
 
 #include "pointflight/io/cloud_writer.hpp"
 #include "tests/support.hpp"
@@ -147,6 +150,68 @@ TEST(ImportCheck, ColoursBecomeIntensitiesWhereThereAreNone) {
       EXPECT_NEAR(map->intensity(word), wanted, 1.0f);
     });
   }
+}
+
+/// Points on a wall at a position, as text with so many decimals, or as floats.
+std::string wall_at(const Vector3d& at, const std::function<std::string(double)>& text) {
+  std::string rows;
+  for (int i = 0; i < 60; ++i) {
+    for (int k = 0; k < 40; ++k) {
+      rows += text(at.x() + 0.0513 * i) + " " + text(at.y() + 0.0137 * i) + " " +
+              text(at.z() + 0.0507 * k) + "\n";
+    }
+  }
+  return rows;
+}
+
+TEST(ImportCheck, CoordinatesWithTooFewDigitsAreSaid) {
+  const testing::TemporaryFolder folder;
+  const Vector3d utm(836422.8, 4818054.7, 301.5);
+  const auto said = [&](const Vector3d& at, const std::function<std::string(double)>& text) {
+    testing::write_file(folder / "a.xyz", wall_at(at, text));
+    std::string all;
+    ImportOptions options;
+    options.resolution = 0.2;
+    for (const std::string& line : warnings(folder / "a.xyz", options)) {
+      if (line.find("stored in steps") != std::string::npos) all += line;
+    }
+    return all;
+  };
+  const auto exact = [](double v) { return fmt::format("{:.3f}", v); };
+  const auto single = [](double v) { return fmt::format("{}", static_cast<float>(v)); };
+  const auto six_digits = [](double v) { return fmt::format("{:.6g}", v); };
+  const auto lattice = [](double v) { return fmt::format("{:.2f}", 0.05 * std::round(v / 0.05)); };
+  EXPECT_EQ(said(utm, exact), "");
+  EXPECT_EQ(said(utm, lattice), "") << "a lattice of 5 cm is meant";
+  EXPECT_EQ(said({12.0, -30.0, 1.0}, single), "");
+  EXPECT_EQ(said({12.0, -30.0, 1.0}, lattice), "");
+  expect_contains(said(utm, single), "up to 4.82e+06 are stored in steps of 0.5 m");
+  EXPECT_NE(said({8364.2, 4818.7, 301.5}, six_digits), "") << "what streams print by default";
+}
+
+TEST(ImportCheck, OneBrightPointDoesNotTakeTheStepsFromAllOthers) {
+  const testing::TemporaryFolder folder;
+  std::string rows;
+  for (int i = 0; i < 100; ++i) {
+    for (int k = 0; k < 100; ++k) {
+      const int bright = i == 50 && k == 50 ? 65535 : 10 + (i + k) % 181;
+      rows += fmt::format("{} {} 0 {}\n", 0.1 * i, 0.1 * k, bright);
+    }
+  }
+  testing::write_file(folder / "a.xyz", rows);
+  ImportOptions options;
+  options.resolution = 0.1;
+  const ImportedMap made = import_clouds({folder / "a.xyz"}, options, Executor(2));
+  EXPECT_GT(made.report.intensity_outliers_from, 150.0);
+  const auto map = SurfelMap::from_bytes(map_bytes(made.tree, made.description), "a.pfmap");
+  std::set<float> levels;
+  float brightest = 0.0f;
+  map->for_each_surfel([&](const Vector3d&, const Vector3d&, double, std::uint32_t word) {
+    levels.insert(map->intensity(word));
+    brightest = std::max(brightest, map->intensity(word));
+  });
+  EXPECT_GT(levels.size(), 100u);
+  EXPECT_GT(brightest, 10000.0f) << "and it is still bright";
 }
 
 }  // namespace

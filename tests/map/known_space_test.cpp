@@ -12,6 +12,7 @@
 #include "pointflight/core/random.hpp"
 #include "pointflight/geometry/rotation.hpp"
 #include "pointflight/map/edit/map_edit.hpp"
+#include "tests/map/edited_map.hpp"
 #include "tests/support.hpp"
 
 namespace pointflight {
@@ -19,6 +20,7 @@ namespace {
 
 using testing::error_of;
 using testing::expect_contains;
+using testing::opened;
 
 struct Way {
   Vector3d from;
@@ -177,12 +179,6 @@ std::shared_ptr<const SurfelMap> wall_and_what_is_known() {
   EditedMap edited = transform_map(*map, {}, {}, Executor(1));
   set_section(edited.description, KnownSpace::kSection, builder.section());
   return SurfelMap::from_bytes(map_bytes(edited.tree, edited.description), "wall");
-}
-
-std::shared_ptr<const SurfelMap> opened(const EditedMap& edited) {
-  const auto map = SurfelMap::from_bytes(map_bytes(edited.tree, edited.description), "edited");
-  map->verify();
-  return map;
 }
 
 constexpr double kBefore = 2.0;  // x before the wall

@@ -15,6 +15,7 @@
 #include "pointflight/map/import/import_check.hpp"
 #include "pointflight/map/import/map_points.hpp"
 #include "pointflight/render/renderer.hpp"
+#include "tests/map/edited_map.hpp"
 #include "tests/support.hpp"
 
 namespace pointflight {
@@ -22,6 +23,7 @@ namespace {
 
 using testing::error_of;
 using testing::expect_contains;
+using testing::opened;
 using testing::map_of;
 
 /// A room with a pillar, a table and a ball.
@@ -32,12 +34,6 @@ ShapeScene room() {
   scene.add_box({4, 3, 0}, {5.5, 4, 0.8});
   scene.shapes.emplace_back(SceneSphere{{6, 1.5, 1.2}, 0.5});
   return scene;
-}
-
-std::shared_ptr<const SurfelMap> opened(const EditedMap& edited) {
-  const auto map = SurfelMap::from_bytes(map_bytes(edited.tree, edited.description), "edited");
-  map->verify();
-  return map;
 }
 
 /// What a surfel is in the world, to the last bit of its word but for where its leaf begins.

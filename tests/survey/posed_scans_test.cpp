@@ -95,6 +95,70 @@ TEST(SurveyFolder, PointsWithTimesGetPosesBetween) {
   }
 }
 
+TEST(TimeUnit, IsTheOneInWhichAScanTakesWhatItShould) {
+  EXPECT_STREQ(unit_by_span(0.0997, 0.1)->name, "s");
+  EXPECT_STREQ(unit_by_span(99.7, 0.1)->name, "ms");
+  EXPECT_STREQ(unit_by_span(99700, 0.1)->name, "us");
+  EXPECT_STREQ(unit_by_span(99.7e6, 0.1)->name, "ns");
+  EXPECT_STREQ(unit_by_span(10e6, 0.1)->name, "ns") << "a camera's shutter";
+  EXPECT_STREQ(unit_by_span(100e6, 1.0)->name, "ns") << "key frames";
+  EXPECT_EQ(unit_by_span(1e15, 0.1), std::nullopt);
+  EXPECT_EQ(unit_by_span(0.0, 0.1), std::nullopt);
+}
+
+/// Five scans, 1 m and 1 s apart along x, whose second point is measured half a second after the
+/// first; `unit` s is what their times are in.
+struct FiveScans {
+  TemporaryFolder folder;
+  FiveScans(const char* field, double unit) {
+    std::filesystem::create_directories(folder / "scans");
+    std::string poses;
+    for (int i = 0; i < 5; ++i) {
+      write_scan(folder / fmt::format("scans/{}.pcd", i),
+                 fmt::format("3 0 0 0\n3 0 0 {:.0f}\n", 0.5 / unit),
+                 field);
+      poses += fmt::format("{} {} 0 1 0 0 0 1\n", i, i);
+    }
+    write_file(folder / "poses.tum", poses);
+  }
+  [[nodiscard]] SurveyFiles files() const { return {folder / "scans", folder / "poses.tum", ""}; }
+};
+
+TEST(SurveyFolder, RecognisesTheUnitOfTimes) {
+  // t is whole and taken for ns, time is a float and taken for s
+  for (const auto& [field, unit, said] : {std::tuple{"t", 1e-9, ""},
+                                          {"t", 1e-6, "taken to be in us"},
+                                          {"time", 1e-3, "taken to be in ms"},
+                                          {"time", 1e-6, "taken to be in us"},
+                                          {"time", 1e-9, "taken to be in ns"}}) {
+    SCOPED_TRACE(fmt::format("{} {}", field, unit));
+    const FiveScans scans(field, unit);
+    const SurveyFolder survey(scans.files());
+    if (*said == '\0') {
+      EXPECT_EQ(survey.about_times(), "");
+    } else {
+      expect_contains(survey.about_times(), said);
+    }
+    const auto rays = all_of(*survey.open());
+    ASSERT_EQ(rays.size(), 10u);
+    EXPECT_NEAR(rays[5].origin_world.x(), 2.5, 1e-6);
+  }
+  const FiveScans scans("t", 1e-6);
+  SurveyFiles files = scans.files();
+  files.time_unit = kTimeUnits[3];
+  const SurveyFolder told(files);
+  expect_contains(told.about_times(), "taken to be in ns: a scan takes 0.0005 s so");
+  EXPECT_NEAR(all_of(*told.open())[5].origin_world.x(), 2.0005, 1e-6) << "the user's word counts";
+}
+
+TEST(SurveyFolder, SaysWhereNothingTellsTheTimes) {
+  const FiveScans scans("label", 1.0);
+  expect_contains(SurveyFolder(scans.files()).about_times(), "its points have no times");
+  SurveyFiles deskewed = scans.files();
+  deskewed.is_deskewed = true;
+  EXPECT_EQ(SurveyFolder(deskewed).about_times(), "");
+}
+
 TEST(SurveyFolder, PosesFarApartSayNothingOfMotionWithinAScan) {
   const TwoScans two;
   write_file(two.folder / "poses.tum", "0 0 0 1 0 0 0 1\n60 1 0 1 0 0 0 1\n");

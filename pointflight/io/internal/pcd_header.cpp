@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/io/byte_cursor.hpp"
@@ -20,8 +21,10 @@ class PcdHeaderParser {
     while (lines_.next(line)) {
       const std::string_view key = take_word(line);
       if (!key.empty() && key.front() == '#' && !header_.unit) header_.unit = unit_in_comment(line);
-      if (key.empty() || key.front() == '#' || key == "VERSION" || key == "VIEWPOINT") continue;
-      if (key == "FIELDS" || key == "COLUMNS") {
+      if (key.empty() || key.front() == '#' || key == "VERSION") continue;
+      if (key == "VIEWPOINT") {
+        parse_viewpoint(line);
+      } else if (key == "FIELDS" || key == "COLUMNS") {
         parse_fields(line);
       } else if (key == "SIZE") {
         integers(line, "SIZE", 1, 8, sizes_);
@@ -105,6 +108,19 @@ class PcdHeaderParser {
     }
   }
 
+  /// Where the sensor was: position and quaternion w x y z.
+  void parse_viewpoint(std::string_view line) {
+    constexpr std::array<double, 7> kIdentity = {0, 0, 0, 1, 0, 0, 0};
+    const std::string_view text = line.substr(std::min(line.size(), line.find_first_not_of(" \t")));
+    for (const double wanted : kIdentity) {
+      double value = 0.0;
+      const std::string_view word = take_word(line);
+      if (!word.empty() && parse_number(word, value) && value == wanted) continue;
+      header_.viewpoint = excerpt(text);
+      return;
+    }
+  }
+
   void parse_fields(std::string_view line) {
     header_.fields.clear();
     for (auto name = take_word(line); !name.empty(); name = take_word(line)) {
@@ -114,10 +130,11 @@ class PcdHeaderParser {
   }
 
   char parse_type(std::string_view word) {
-    if (word != "F" && word != "I" && word != "U") {
+    const std::size_t type = std::string_view("FIUfiu").find(word);
+    if (word.size() != 1 || type == std::string_view::npos) {
       fail(fmt::format("TYPE '{}' is unknown; F, I or U for each field", excerpt(word)));
     }
-    return word.front();
+    return "FIU"[type % 3];
   }
 
   void parse_encoding(std::string_view word) {

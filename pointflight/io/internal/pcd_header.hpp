@@ -32,6 +32,7 @@ struct PcdHeader {
   std::size_t data_offset = 0;
   std::size_t data_line = 0;
   std::optional<FileUnit> unit;
+  std::string viewpoint;  ///< As the file has it, if it is not the identity.
 };
 
 /// Throws InputError with line or byte.

@@ -179,4 +179,15 @@ PlyHeader parse_ply_header(const MappedFile& file) {
   return PlyHeaderParser(file).parse();
 }
 
+std::size_t vertex_element(const PlyHeader& header, const std::string& path) {
+  const auto found =
+      std::find_if(header.elements.begin(), header.elements.end(), [](const PlyElement& element) {
+        return element.name == "vertex";
+      });
+  if (found == header.elements.end()) {
+    throw InputError(fmt::format("{}: no 'vertex' element in the PLY header", path));
+  }
+  return static_cast<std::size_t>(found - header.elements.begin());
+}
+
 }  // namespace pointflight

@@ -43,4 +43,7 @@ struct PlyHeader {
 /// Throws InputError with line or byte.
 PlyHeader parse_ply_header(const MappedFile& file);
 
+/// The number of the element of vertices. Throws InputError if there is none.
+std::size_t vertex_element(const PlyHeader& header, const std::string& path);
+
 }  // namespace pointflight

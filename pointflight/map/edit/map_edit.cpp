@@ -111,32 +111,29 @@ void join_known_space(const std::vector<PlacedMap>& maps, EditedMap& joined) {
 }
 
 /// One scale of intensities for several maps.
-void join_intensities(const std::vector<PlacedMap>& maps, MapDescription& description) {
-  float low = std::numeric_limits<float>::infinity();
-  float high = -low;
-  for (const PlacedMap& placed : maps) {
-    if (!placed.map->has_intensity()) continue;
-    low = std::min(low, placed.map->properties().intensity_offset);
-    high = std::max(high,
-                    placed.map->properties().intensity_offset +
-                        255.0f * placed.map->properties().intensity_step);
-  }
-  description.has_intensity = low <= high;
+IntensityLevels join_intensities(const std::vector<PlacedMap>& maps, MapDescription& description) {
   const double scale = maps.front().map->reflectivity_per_intensity();
   const bool is_shared = std::all_of(maps.begin(), maps.end(), [&](const PlacedMap& placed) {
     return placed.map->reflectivity_per_intensity() == scale;
   });
   if (!is_shared) set_reflectivity(description, 0.0);
-  if (!description.has_intensity) return;
-  description.intensity_offset = low;
-  description.intensity_step = (high - low) / 255.0f;
-}
-
-std::uint8_t code_in(const MapDescription& description, float intensity) {
-  if (!(description.intensity_step > 0.0f)) return 0;
-  const float code =
-      std::round((intensity - description.intensity_offset) / description.intensity_step);
-  return static_cast<std::uint8_t>(std::clamp(code, 0.0f, 255.0f));
+  IntensityLevels levels = maps.front().map->intensity_levels();
+  const bool is_one = std::all_of(maps.begin(), maps.end(), [&](const PlacedMap& placed) {
+    return placed.map->has_intensity() && placed.map->intensity_levels().of_code == levels.of_code;
+  });
+  description.has_intensity = is_one;
+  if (is_one) return levels;
+  IntensityHistogram intensities;
+  for (const PlacedMap& placed : maps) {
+    if (!placed.map->has_intensity()) continue;
+    for_each_surfel(placed.map->words(), [&](const LeafHeader&, std::size_t word) {
+      intensities.add(placed.map->intensity(static_cast<std::uint32_t>(word)));
+    });
+  }
+  description.has_intensity = !intensities.is_empty();
+  levels = intensities.levels();
+  set_levels(description, levels);
+  return levels;
 }
 
 [[noreturn]] void refuse_width(double resolution) {
@@ -153,16 +150,11 @@ MapDescription description_of(const SurfelMap& map) {
   static_cast<MapProperties&>(d) = map.properties();
   d.has_intensity = map.has_intensity();
   d.metadata = std::string(map.metadata());
-  for (const char* name : {KnownSpace::kSection, kReflectivitySection}) {
+  for (const char* name : {KnownSpace::kSection, kReflectivitySection, kLevelsSection}) {
     const auto bytes = map.section(name);
     if (!bytes.empty()) d.extra.push_back({name, {bytes.begin(), bytes.end()}});
   }
   return d;
-}
-
-void set_section(MapDescription& description, const char* name, std::vector<std::byte> bytes) {
-  std::erase_if(description.extra, [&](const ExtraSection& extra) { return extra.name == name; });
-  if (!bytes.empty()) description.extra.push_back({name, std::move(bytes)});
 }
 
 void set_reflectivity(MapDescription& description, double per_intensity) {
@@ -260,7 +252,7 @@ EditedMap merge_maps(const std::vector<PlacedMap>& maps,
   std::size_t most = 0;
   for (const PlacedMap& placed : maps) most += count_surfels(*placed.map);
   MapDescription description = description_of(first);
-  join_intensities(maps, description);
+  const IntensityLevels levels = join_intensities(maps, description);
   const Vector3d base =
       first_stays ? Vector3d(first.origin_world() + T_first.translation)
                   : T_first * (0.5 * (first.bounds_world().min + first.bounds_world().max));
@@ -276,7 +268,7 @@ EditedMap merge_maps(const std::vector<PlacedMap>& maps,
       }
       const std::uint8_t code =
           description.has_intensity
-              ? code_in(description, map.intensity(static_cast<std::uint32_t>(word)))
+              ? levels.code_of(map.intensity(static_cast<std::uint32_t>(word)))
               : std::uint8_t{0};
       if (m == 0 && first_stays) {
         gathering.add_as_is(leaf, map.words()[word], code);

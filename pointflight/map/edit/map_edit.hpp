@@ -36,9 +36,6 @@ struct EditOptions {
 /// scale of reflectivities.
 MapDescription description_of(const SurfelMap& map);
 
-/// Puts a section in the place of what has its name; empty bytes take it away.
-void set_section(MapDescription& description, const char* name, std::vector<std::byte> bytes);
-
 /// Says what reflectivity a unit of the map's intensity stands for; 0: that it is not known.
 void set_reflectivity(MapDescription& description, double per_intensity);
 

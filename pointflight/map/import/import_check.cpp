@@ -16,6 +16,7 @@ constexpr double kSparsest = 2.0;     // m between points: what a drone hits has
 constexpr double kSmallest = 1.0;     // m, of the whole world
 constexpr double kWidestMesh = 50e3;  // m
 constexpr double kHighest = 5e3;      // m, of the whole world
+constexpr double kHighestMesh = 1e3;  // m: a hall in millimetres is higher
 constexpr double kUsualWidth = 50.0;  // m
 
 /// The unit among a few in which the world would be as wide as places to fly in are.
@@ -48,11 +49,22 @@ std::string about_unit(const SourceUnit& named, double scale) {
       scale == 1.0 ? "" : fmt::format(", and --scale {:.7g} was given", scale));
 }
 
+std::string about_steps(const CoarseSource& coarse, double scale) {
+  return fmt::format(
+      "{}: coordinates up to {:.3g} are stored in steps of {:.3g} m (single precision, or too few "
+      "digits): surfaces are rough and have holes; shift the cloud near zero before it is saved, "
+      "or save it with doubles",
+      coarse.source,
+      coarse.coordinates.farthest,
+      coarse.coordinates.step * scale);
+}
+
 std::string about_size(const ImportReport& report, const Vector3d& size, double scale) {
   const double width = size.maxCoeff();
   const bool sparse = !report.has_mesh && report.spacing > kSparsest;
   const bool wide = report.has_mesh && width > kWidestMesh;
-  if (!sparse && !wide && size.z() < kHighest && width > kSmallest) return {};
+  const double highest = report.has_mesh ? kHighestMesh : kHighest;
+  if (!sparse && !wide && size.z() < highest && width > kSmallest) return {};
   const double factor = likely_factor(width);
   const std::string apart = report.has_mesh || report.spacing <= 0.0
                                 ? std::string()
@@ -94,6 +106,14 @@ std::vector<std::string> import_warnings(const ImportReport& report,
   for (const SourceUnit& named : report.units) {
     const double off = named.unit.metres / options.scale - 1.0;
     if (std::abs(off) > 1e-3) warnings.push_back(about_unit(named, options.scale));
+  }
+  for (const CoarseSource& coarse : report.coarse) {
+    warnings.push_back(about_steps(coarse, options.scale));
+  }
+  for (const std::string& source : report.y_up) {
+    if (options.up == 'z') {
+      warnings.push_back(fmt::format("{}: its header says that y is up; --up y turns it", source));
+    }
   }
   if (!bounds_world.empty() && report.surfels > 1) {
     const std::string size = about_size(report, bounds_world.size(), options.scale);

@@ -82,6 +82,9 @@ class Import {
     report.points_read = 0;
     report.points_not_finite = 0;
     report.units.clear();
+    report.columns.clear();
+    report.coarse.clear();
+    report.y_up.clear();
     for (std::size_t i = 0; i < names_.size(); ++i) {
       const auto reader = opener_(i);
       require_argument(reader != nullptr, "build_map: the opener gave no reader");
@@ -89,11 +92,14 @@ class Import {
       report.has_intensity = report.has_intensity || reader->has_intensity() || by_color;
       report.intensity_from_colors = report.intensity_from_colors || by_color;
       if (const auto unit = reader->unit()) report.units.push_back({report.sources[i], *unit});
+      if (reader->up_axis() == 'y') report.y_up.push_back(report.sources[i]);
+      CoordinateSteps steps;
       // while one batch is used, the next one is read
       ReadAhead ahead(*reader, executor_.threads() > 1);
       std::vector<CloudPoint> batch;
       while (ahead.read(batch)) {
         report.points_read += batch.size();
+        steps.add(batch);
         std::size_t finite = 0;
         for (const CloudPoint& point : batch) {
           const Vector3d p = to_world(point.position);
@@ -107,6 +113,10 @@ class Import {
             progress_,
             what,
             (static_cast<double>(i) + ahead.share_read()) / static_cast<double>(names_.size()));
+      }
+      report.columns.push_back({report.sources[i], reader->columns()});
+      if (const auto coarse = steps.coarse(options_.scale)) {
+        report.coarse.push_back({report.sources[i], *coarse});
       }
     }
     if (report.points_read == 0) throw InputError(fmt::format("{}: no points", names_.front()));
@@ -216,10 +226,11 @@ class Import {
     report.planar_surfels = chosen.planar;
     report.points_per_cell = chosen.points_per_planar;
     report.tau = options_.tau.value_or(static_cast<float>(tau_for(report.points_per_cell)));
-    map_.description.intensity_offset = chosen.intensity_offset;
-    map_.description.intensity_step = chosen.intensity_step;
+    set_levels(map_.description, chosen.levels);
+    report.intensity_outliers_from = chosen.levels.is_linear ? 0.0 : chosen.levels.usual_end();
     map_.description.bounds_world =
         bounds_of(chosen.surfels.span(), cells_.frame().base_world, report.resolution);
+    report.size = map_.description.bounds_world.size();
     cells_ = {};  // room for the tree
     pointflight::report(progress_, "building the hierarchy", 0.0);
     TreeInput input{chosen.surfels, chosen.intensity, {}, report.resolution};

@@ -12,6 +12,7 @@
 #include "pointflight/io/cloud_reader.hpp"
 #include "pointflight/map/floor_plane.hpp"
 #include "pointflight/map/import/internal/cell_accumulator.hpp"
+#include "pointflight/map/import/internal/coordinate_steps.hpp"
 #include "pointflight/map/import/internal/noise_projection.hpp"
 #include "pointflight/map/import/internal/outliers.hpp"
 #include "pointflight/map/map_file.hpp"
@@ -39,6 +40,18 @@ struct SourceUnit {
   FileUnit unit;       ///< As its file names it.
 };
 
+/// What of a file's columns was read, if there is something to say.
+struct SourceColumns {
+  std::string source;   ///< File name without folder.
+  FileColumns columns;  ///< As its reader says.
+};
+
+/// A source whose coordinates have too few digits.
+struct CoarseSource {
+  std::string source;             ///< File name without folder.
+  CoarseCoordinates coordinates;  ///< In the file's unit.
+};
+
 /// What an import did, for the user and for the map's metadata.
 struct ImportReport {
   std::vector<std::string> sources;       ///< File names without folders.
@@ -59,6 +72,7 @@ struct ImportReport {
   float tau = 0.0f;                       ///< Coverage that makes a return.
   std::uint64_t grown_surfels = 0;        ///< Widened if the scan is thin.
   double resolution = 0.0;                ///< r, m.
+  Vector3d size = Vector3d::Zero();       ///< Of the box around the surfels, m.
   double spacing = 0.0;                   ///< Median nearest-neighbour distance, m; 0 if unknown.
   double supported_resolution = 0.0;      ///< 2 spacings.
   bool resolution_was_chosen = false;     ///< True: by the spacing, since no option gave one.
@@ -66,6 +80,10 @@ struct ImportReport {
   bool intensity_from_colors = false;     ///< Of a source that has colours and no intensity.
   bool has_mesh = false;                  ///< A source was sampled.
   std::vector<SourceUnit> units;          ///< Of the sources that name one.
+  std::vector<SourceColumns> columns;     ///< Of the sources that say something.
+  std::vector<CoarseSource> coarse;       ///< The sources whose points are rounded too much.
+  std::vector<std::string> y_up;          ///< The sources that say that y is up.
+  double intensity_outliers_from = 0.0;   ///< Steps are coarser above; 0: they are all equal.
   std::optional<FloorPlane> floor;        ///< Where one was found.
   std::vector<std::string> warnings;      ///< What looks wrong about this world, one line each.
 };

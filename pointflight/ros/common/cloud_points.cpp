@@ -79,9 +79,10 @@ const msg::PointField* field_of(const msg::PointCloud2& cloud,
   return nullptr;
 }
 
-double seconds_of(double time, bool is_whole) {
+/// s
+double unit_of(double time, bool is_whole) {
   constexpr double kNanosFrom = 1e11;  // as seconds, the year 5138
-  return is_whole || std::abs(time) > kNanosFrom ? time * 1e-9 : time;
+  return is_whole || std::abs(time) > kNanosFrom ? 1e-9 : 1.0;
 }
 
 }  // namespace
@@ -122,7 +123,10 @@ CloudMessagePoints points_of(const msg::PointCloud2& cloud) {
         const double number = number_of(at, *ring);
         point.ring = number >= 0.0 && number < 65536.0 ? static_cast<std::int32_t>(number) : -1;
       }
-      if (time != nullptr) point.time = seconds_of(number_of(at, *time), is_whole);
+      if (time == nullptr) continue;
+      const double number = number_of(at, *time);
+      found.time_unit = unit_of(number, is_whole);
+      point.time = number * found.time_unit;
     }
   }
   return found;
@@ -131,6 +135,7 @@ CloudMessagePoints points_of(const msg::PointCloud2& cloud) {
 CloudMessagePoints points_of(const msg::CustomMsg& cloud) {
   CloudMessagePoints found;
   found.has_intensity = true;
+  found.time_unit = 1e-9;
   found.points.reserve(cloud.points.size());
   for (const msg::CustomPoint& p : cloud.points) {
     const Vector3d position(

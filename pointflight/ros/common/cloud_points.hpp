@@ -12,6 +12,7 @@ namespace pointflight {
 struct CloudMessagePoints {
   std::vector<RecordedPoint> points;  ///< In the cloud's order.
   bool has_intensity = false;         ///< intensity, reflectivity, i
+  double time_unit = 1.0;             ///< That times were taken to be in, s.
 };
 
 /// Reads x, y, z, an intensity and times: whole numbers are ns; others are s, or, if they are

@@ -1,8 +1,6 @@
 #include "pointflight/map/import/internal/chosen_surfels.hpp"
 
 #include <algorithm>
-#include <cmath>
-#include <limits>
 
 namespace pointflight {
 namespace {
@@ -67,15 +65,13 @@ ChosenSurfels choose_surfels(const CellTiles& cells,
   std::vector<std::uint64_t> planar_with(kMostPoints + 1, 0);
   ChosenSurfels chosen;
   std::size_t count = 0;
-  float min = std::numeric_limits<float>::infinity();
-  float max = -min;
+  IntensityHistogram intensities;
   const auto for_each = [&](const auto& visit) {
     for_each_chosen(cells, of_cells, covered, wide, small, visit);
   };
   for_each([&](const SurfelPiece& piece) {
     ++count;
-    min = std::min(min, piece.mean_intensity);
-    max = std::max(max, piece.mean_intensity);
+    if (has_intensity) intensities.add(piece.mean_intensity);
     if (!is_planar(piece.surfel.word)) return;
     ++chosen.planar;
     ++planar_with[std::min<std::size_t>(piece.n, kMostPoints)];
@@ -89,18 +85,12 @@ ChosenSurfels choose_surfels(const CellTiles& cells,
   }
   chosen.surfels = ScratchArray<BuildSurfel>(scratch, count);
   if (has_intensity) {
-    const float step = (max - min) / 255.0f;
-    chosen.intensity_offset = min;
-    chosen.intensity_step = std::isfinite(step) ? step : 0.0f;
+    chosen.levels = intensities.levels();
     chosen.intensity = ScratchArray<std::uint8_t>(scratch, count);
   }
   std::size_t at = 0;
   for_each([&](const SurfelPiece& piece) {
-    if (has_intensity) {
-      const float step = chosen.intensity_step;
-      const float code = step > 0.0f ? std::round((piece.mean_intensity - min) / step) : 0.0f;
-      chosen.intensity[at] = static_cast<std::uint8_t>(std::clamp(code, 0.0f, 255.0f));
-    }
+    if (has_intensity) chosen.intensity[at] = chosen.levels.code_of(piece.mean_intensity);
     chosen.surfels[at++] = piece.surfel;
   });
   return chosen;

@@ -5,6 +5,7 @@
 
 #include "pointflight/map/import/internal/cell_tiles.hpp"
 #include "pointflight/map/import/internal/surfel_piece.hpp"
+#include "pointflight/map/intensity_levels.hpp"
 
 namespace pointflight {
 
@@ -12,8 +13,7 @@ namespace pointflight {
 struct ChosenSurfels {
   ScratchArray<BuildSurfel> surfels;     ///< In Morton order, at most eight at a voxel.
   ScratchArray<std::uint8_t> intensity;  ///< Codes beside them; empty without intensities.
-  float intensity_offset = 0.0f;         ///< Of code 0.
-  float intensity_step = 0.0f;           ///< From one code to the next.
+  IntensityLevels levels;                ///< Of the codes.
   std::uint64_t planar = 0;              ///< Of thickness class 0.
   double points_per_planar = 0.0;        ///< Median of the points that each of those stands for.
 };
