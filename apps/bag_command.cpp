@@ -5,6 +5,7 @@
 
 #include "apps/cli.hpp"
 #include "apps/commands.hpp"
+#include "apps/input_kind.hpp"
 #include "apps/modules.hpp"
 #include "apps/settings_json.hpp"
 #include "apps/terminal.hpp"
@@ -37,6 +38,7 @@ nlohmann::ordered_json json_of(const std::string& path, const RecordingInfo& inf
 }
 
 void show(const std::string& path, bool as_json) {
+  require_kind(path, {InputKind::kRecording}, "a recording (.mcap, .bag)");
   require_regular_file(path);
   const bool is_bag = path.ends_with(".bag") || path.ends_with(".bag.active");
   const RecordingInfo info =

@@ -15,6 +15,7 @@
 #include "apps/campaign_results.hpp"
 #include "apps/cli.hpp"
 #include "apps/commands.hpp"
+#include "apps/input_kind.hpp"
 #include "apps/modules.hpp"
 #include "apps/terminal.hpp"
 #include "pointflight/campaign/campaign.hpp"
@@ -248,6 +249,7 @@ void check_flags(const CampaignFlags& flags) {
 
 int run_campaign(const CampaignFlags& flags) {
   check_flags(flags);
+  require_kind(flags.study, {InputKind::kYaml}, "a study (.yaml)");
   std::signal(SIGCHLD, SIG_DFL);  // whoever started us may ignore it: no child's end would be known
   std::vector<Condition> conditions;
   for (const std::string& text : flags.fail_if) conditions.emplace_back(text);

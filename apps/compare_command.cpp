@@ -11,6 +11,7 @@
 #include "apps/commands.hpp"
 #include "apps/error_table.hpp"
 #include "apps/flags.hpp"
+#include "apps/input_kind.hpp"
 #include "apps/settings_json.hpp"
 #include "apps/surroundings_flags.hpp"
 #include "apps/survey_flags.hpp"
@@ -164,6 +165,7 @@ void print_sensor(const SensorComparison& made) {
 void compare(const CompareFlags& flags) {
   if (!flags.png.empty()) make_picture_folder(flags.png, flags.force);
   const Executor executor(flags.threads);
+  require_kind(flags.map, {InputKind::kMap}, "a map (.pfmap)");
   const auto map = SurfelMap::open(flags.map);
   std::optional<LidarSettings> lidar;
   if (!flags.lidar.empty()) lidar = load_lidar(flags.lidar);

@@ -12,6 +12,7 @@
 #include "apps/commands.hpp"
 #include "apps/flags.hpp"
 #include "apps/fly_links.hpp"
+#include "apps/input_kind.hpp"
 #include "apps/ros_flags.hpp"
 #include "apps/scenario_command.hpp"
 #include "apps/settings_json.hpp"
@@ -86,7 +87,9 @@ Scenario scenario_for_map(const FlyFlags& flags,
   // with ROS somebody else will say where to fly
   wish.mission = !flags.ros.has_ros() && flags.mission.empty();
   if (wish.mission || !wish.start) log(fmt::format("looking for a way through {}", flags.input));
-  Scenario scenario = make_scenario(wish, executor);
+  MadeScenario made = make_scenario(wish, executor);
+  for (const std::string& note : made.notes) log("note: " + note);
+  Scenario scenario = std::move(made.scenario);
   scenario.path.clear();
   if (!wish.mission) scenario.vehicles.front().mission.waypoints.clear();
   return scenario;
@@ -248,12 +251,8 @@ void say_warnings(const Simulation& simulation, const Executor& executor) {
 }
 
 int fly(const FlyFlags& flags) {
-  if (has_cloud_extension(flags.input)) {
-    throw InputError(
-        fmt::format("{0}: is a point cloud; import it first: pointflight map import {0} -o {1}",
-                    flags.input,
-                    fs::path(flags.input).stem().string() + ".pfmap"));
-  }
+  require_kind(
+      flags.input, {InputKind::kYaml, InputKind::kMap}, "a scenario (.yaml) or a map (.pfmap)");
   if (flags.output.empty() && !flags.ros.any()) {
     throw InputError(
         "give a folder for the results with -o, or --view, --ros1, --ros2 or --record");

@@ -8,6 +8,7 @@
 #include "apps/commands.hpp"
 #include "apps/flags.hpp"
 #include "apps/import_report.hpp"
+#include "apps/input_kind.hpp"
 #include "apps/map_edit.hpp"
 #include "apps/settings_json.hpp"
 #include "apps/terminal.hpp"
@@ -202,6 +203,7 @@ void print_info(const SurfelMap& map, const SurfelCount& count, const InfoFlags&
 
 void show_info(const InfoFlags& flags) {
   check_outputs({flags.png}, {flags.map}, flags.force);
+  require_kind(flags.map, {InputKind::kMap}, "a map (.pfmap)");
   const auto map = SurfelMap::open(flags.map);
   if (flags.verify) map->verify();
   if (flags.json) {

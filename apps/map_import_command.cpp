@@ -9,6 +9,7 @@
 #include "apps/cli.hpp"
 #include "apps/flags.hpp"
 #include "apps/import_report.hpp"
+#include "apps/input_kind.hpp"
 #include "apps/map_edit.hpp"
 #include "apps/survey_flags.hpp"
 #include "apps/terminal.hpp"
@@ -70,6 +71,12 @@ void print_end(const ImportFlags& flags,
 }
 
 void check_files(const ImportFlags& flags) {
+  check_map_name(flags.output);
+  for (const std::string& input : flags.inputs) {
+    if (flags.format.empty()) {
+      require_kind(input, {InputKind::kCloud, InputKind::kMesh}, "a cloud or a mesh");
+    }
+  }
   std::vector<std::string> inputs = survey_inputs(flags.fit);
   inputs.insert(inputs.end(), flags.inputs.begin(), flags.inputs.end());
   check_outputs({flags.output, flags.outliers_out, flags.fit.ghosts_out}, inputs, flags.force);

@@ -15,6 +15,7 @@
 #include "apps/cli.hpp"
 #include "apps/commands.hpp"
 #include "apps/flags.hpp"
+#include "apps/input_kind.hpp"
 #include "apps/terminal.hpp"
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/core/mapped_file.hpp"
@@ -249,6 +250,11 @@ void add_picture_command(CLI::App& parent, int& /*exit_code*/) {
   add_force_flag(*app, flags->force);
   app->footer("Example: pointflight picture run --video run.mp4");
   app->callback([flags] {
+    require_kind(flags->run, {InputKind::kRun}, "the folder of a run (fly -o)");
+    if (!fs::exists(flags->run)) {
+      throw InputError(flags->run + ": no such folder; give the one that `fly -o` wrote");
+    }
+
     if (!flags->video.empty() || !flags->frames.empty()) return film(*flags);
     const std::string own = (fs::path(flags->run) / kOverview).string();
     const std::string path = flags->output.empty() ? own : flags->output;

@@ -7,6 +7,7 @@
 #include "apps/cli.hpp"
 #include "apps/commands.hpp"
 #include "apps/flags.hpp"
+#include "apps/input_kind.hpp"
 #include "apps/settings_json.hpp"
 #include "apps/surroundings_flags.hpp"
 #include "apps/terminal.hpp"
@@ -83,6 +84,7 @@ void print_scan(const Scan& scan, const ScanFlags& flags) {
 void take_scan(const ScanFlags& flags) {
   const Pose pose = parse_pose(flags.pose, "--pose");
   check_outputs({flags.output, flags.png}, {flags.map, flags.lidar}, flags.force);
+  require_kind(flags.map, {InputKind::kMap}, "a map (.pfmap)");
   const auto map = SurfelMap::open(flags.map);
   LidarSettings settings = load_lidar(flags.lidar);
   if (flags.sub_rays >= 0) settings.optics.sub_rays = flags.sub_rays;

@@ -10,6 +10,7 @@
 #include "apps/cli.hpp"
 #include "apps/commands.hpp"
 #include "apps/flags.hpp"
+#include "apps/input_kind.hpp"
 #include "apps/settings_json.hpp"
 #include "apps/terminal.hpp"
 #include "pointflight/core/input_error.hpp"
@@ -40,6 +41,7 @@ struct NewFlags {
 };
 
 void new_scenario(const NewFlags& flags) {
+  require_kind(flags.map, {InputKind::kMap}, "a map (.pfmap)");
   const Executor executor;
   check_outputs({flags.output}, {flags.map, flags.lidar, flags.vehicle}, flags.force);
   ScenarioRequest wish;
@@ -50,7 +52,9 @@ void new_scenario(const NewFlags& flags) {
   wish.length = flags.length;
   wish.speed = flags.speed;
   if (!flags.start_in.empty()) wish.bounds = box_from(flags.start_in, "--start-in");
-  Scenario scenario = make_scenario(wish, executor);
+  MadeScenario made = make_scenario(wish, executor);
+  for (const std::string& note : made.notes) log("note: " + note);
+  Scenario& scenario = made.scenario;
   VehicleSetup& vehicle = scenario.vehicles.front();
   for (std::string* model : {&vehicle.lidars.front().model, &vehicle.model}) {
     if (is_model_path(*model)) *model = path_in_file(flags.output, *model);
@@ -101,6 +105,7 @@ void print_scenario(const std::string& path, const Simulation& simulation) {
 }
 
 void check_scenario(const std::string& path, bool as_json) {
+  require_kind(path, {InputKind::kYaml}, "a scenario (.yaml)");
   const Scenario scenario = load_scenario(path);
   const auto map = scenario.open_map();
   const Executor executor;

@@ -6,6 +6,7 @@
 #include "apps/cli.hpp"
 #include "apps/commands.hpp"
 #include "apps/flags.hpp"
+#include "apps/input_kind.hpp"
 #include "apps/settings_json.hpp"
 #include "apps/terminal.hpp"
 #include "pointflight/campaign/study.hpp"
@@ -22,6 +23,7 @@ struct NewStudyFlags {
 };
 
 void new_study(const NewStudyFlags& flags) {
+  require_kind(flags.scenario, {InputKind::kYaml}, "a scenario (.yaml)");
   check_outputs({flags.output}, {flags.scenario}, flags.force);
   load_scenario(flags.scenario);
   OutputFile file(flags.output);

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "apps/flags.hpp"
+#include "apps/input_kind.hpp"
 #include "apps/modules.hpp"
 #include "apps/terminal.hpp"
 #include "pointflight/core/input_error.hpp"
@@ -76,6 +77,9 @@ std::unique_ptr<SurveySource> open_survey(const ScansFlags& flags, const Progres
   SurveyFiles files = flags.files;
   std::optional<Pose> T_pose_sensor;
   if (!flags.sensor_pose.empty()) T_pose_sensor = parse_pose(flags.sensor_pose, "--sensor-pose");
+  require_kind(files.scans,
+               {InputKind::kRecording, InputKind::kRecordingFolder},
+               "a folder of clouds or a recording (.mcap, .bag)");
   const auto recording = recording_of(files.scans);
   if (!recording) {
     if (files.poses.empty()) throw InputError("--scans: a folder of clouds wants --poses");

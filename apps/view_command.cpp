@@ -11,6 +11,7 @@
 
 #include "apps/cli.hpp"
 #include "apps/commands.hpp"
+#include "apps/input_kind.hpp"
 #include "apps/survey_flags.hpp"
 #include "apps/terminal.hpp"
 #include "apps/view_flags.hpp"
@@ -86,7 +87,9 @@ void view_recording(const ViewCommandFlags& flags) {
 /// The recording in a folder that `ros2 bag record` made; nothing if it is another folder.
 std::optional<std::string> recording_in(const std::string& folder) {
   std::error_code ignored;
-  if (!fs::exists(fs::path(folder) / "metadata.yaml", ignored)) return std::nullopt;
+  const bool is_recording = kind_of_input(folder) == InputKind::kRecordingFolder ||
+                            fs::exists(fs::path(folder) / "metadata.yaml", ignored);
+  if (!is_recording) return std::nullopt;
   const std::vector<std::string> found = recordings_in(folder);
   if (found.empty()) {
     throw InputError(fmt::format(
@@ -104,6 +107,10 @@ std::optional<std::string> recording_in(const std::string& folder) {
 
 int view(ViewCommandFlags flags) {
   std::error_code ignored;
+  require_kind(
+      flags.input,
+      {InputKind::kMap, InputKind::kRun, InputKind::kRecording, InputKind::kRecordingFolder},
+      "a map (.pfmap), the folder of a run or a recording (.mcap)");
   const bool is_folder = fs::is_directory(flags.input, ignored);
   if (const auto inside = is_folder ? recording_in(flags.input) : std::nullopt) {
     flags.input = *inside;

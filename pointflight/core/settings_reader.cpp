@@ -5,6 +5,7 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <map>
 #include <optional>
 #include <set>
 
@@ -92,6 +93,41 @@ struct SettingsReader::Document {
     std::string text;
   };
   std::vector<Condition> conditions;
+
+  /// A key that the settings do not know. It is refused in the end, when all known ones have been
+  /// asked for: it may belong elsewhere.
+  struct Unknown {
+    YAML::Node key;
+    std::string path;  ///< Of its section.
+  };
+  std::optional<Unknown> unknown;
+  std::map<std::string, std::set<std::string>> asked_at;  ///< Known keys by their section's path.
+
+  void refuse_unknown() const {
+    if (!unknown) return;
+    const std::string& name = unknown->key.Scalar();
+    const std::set<std::string>& asked = asked_at.at(unknown->path);
+    const std::vector<std::string> known(asked.begin(), asked.end());
+    // a section or more higher up
+    std::string section = unknown->path;
+    while (!section.empty()) {
+      section.pop_back();
+      const std::string inner = section.substr(section.rfind('.') + 1);
+      section.resize(section.size() - inner.size());
+      const auto above = asked_at.find(section);
+      if (above == asked_at.end() || above->second.count(name) == 0) continue;
+      fail(unknown->key,
+           unknown->path + name,
+           fmt::format("is no key of `{}`; it stands beside it, with the same indent as `{}:`",
+                       inner,
+                       inner));
+    }
+    const std::string guess = closest_word(name, known);
+    fail(unknown->key,
+         unknown->path + name,
+         guess.empty() ? fmt::format("unknown key; known here: {}", fmt::join(known, ", "))
+                       : fmt::format("unknown key; did you mean '{}'?", guess));
+  }
 
   [[nodiscard]] std::string location(const YAML::Node& node) const {
     return fmt::format("{}:{}", name, node.Mark().line + 1);
@@ -217,6 +253,7 @@ void SettingsReader::leave_as_is(std::string_view name, std::string& yaml) {
 
 void SettingsReader::finish() {
   while (!document_->levels.empty()) leave();
+  document_->refuse_unknown();
 }
 
 void SettingsReader::leave() {
@@ -224,14 +261,9 @@ void SettingsReader::leave() {
   for (const auto& entry : level.node) {
     const std::string& name = entry.first.Scalar();
     if (level.asked.count(name) != 0) continue;
-    const std::vector<std::string> known(level.asked.begin(), level.asked.end());
-    const std::string guess = closest_word(name, known);
-    document_->fail(entry.first,
-                    level.path + name,
-                    guess.empty()
-                        ? fmt::format("unknown key; known here: {}", fmt::join(known, ", "))
-                        : fmt::format("unknown key; did you mean '{}'?", guess));
+    if (!document_->unknown) document_->unknown = Document::Unknown{entry.first, level.path};
   }
+  document_->asked_at[level.path].insert(level.asked.begin(), level.asked.end());
   document_->levels.pop_back();
 }
 

@@ -2,6 +2,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "pointflight/core/parallel.hpp"
 #include "pointflight/sim/scenario.hpp"
@@ -21,9 +22,15 @@ struct ScenarioRequest {
   bool mission = true;               ///< Else nothing is looked for if there is a start.
 };
 
-/// A scenario for a map: a free start, waypoints and a heading along the first leg. Throws
-/// InputError if no free position is found.
-Scenario make_scenario(const ScenarioRequest& wish, const Executor& executor);
+/// A scenario that was made up.
+struct MadeScenario {
+  Scenario scenario;               ///< As a file would have it.
+  std::vector<std::string> notes;  ///< What the user should know of it, a line each.
+};
+
+/// A scenario for a map: a free start, waypoints and a heading along the first leg. A start that is
+/// given stays, with waypoints or without. Throws InputError if no free position is found.
+MadeScenario make_scenario(const ScenarioRequest& wish, const Executor& executor);
 
 /// "1.0, 2.0, 3.0 and 4.0, 5.0, 6.0": the corners of a box, for messages.
 std::string box_text(const Aabb& box);

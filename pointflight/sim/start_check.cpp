@@ -48,6 +48,10 @@ std::optional<double> vertical_distance(const Renderer& renderer, const Vector3d
 
 }  // namespace
 
+bool is_below_floor(const Renderer& renderer, const Vector3d& p_world) {
+  return !vertical_distance(renderer, p_world, -1.0f) && vertical_distance(renderer, p_world, 1.0f);
+}
+
 bool is_lost(const SurfelMap& map, const Vector3d& p_world) {
   if (map.surfel_count() == 0) return false;
   const Aabb& b = map.bounds_world();
@@ -155,7 +159,7 @@ std::vector<std::string> start_warnings(const Simulation& simulation, const Exec
     const double radius = bounding_radius(agent.hull());
     const auto ground = vertical_distance(*renderer, p, -1.0f);
     std::string what;
-    if (!ground && vertical_distance(*renderer, p, 1.0f)) {
+    if (is_below_floor(*renderer, p)) {
       what = "is below the floor: the map is above it and nothing below";
     } else if (agent.setup().landed && (!ground || *ground > radius + map.resolution())) {
       what = ground ? fmt::format("starts landed, but the ground is {:.2f} m below", *ground)

@@ -9,6 +9,7 @@
 
 namespace pointflight {
 
+class Renderer;
 class Simulation;
 
 /// Names make folders and topics: each its own, and nothing but plain letters. Throws InputError.
@@ -35,6 +36,10 @@ void check_start_is_free(const Scenario& scenario,
                          std::span<const StartingVehicle> others,
                          std::span<const Body> obstacles,
                          const Executor& executor);
+
+/// True if the map is above a position and nothing of it below: that is below the floor, or there
+/// is no ground.
+bool is_below_floor(const Renderer& renderer, const Vector3d& p_world);
 
 /// What is odd about where vehicles start, in words for the user with file and line: below the
 /// floor, or landed if there is no ground.

@@ -18,6 +18,13 @@ constexpr double kGroundMax = 3.5;
 
 using Index3 = std::array<int, 3>;
 
+/// At which heights a vehicle may be.
+enum class Heights {
+  kNearGround,   ///< Where people fly drones.
+  kAboveGround,  ///< Wherever something is below.
+  kAny
+};
+
 /// A coarse grid over the map that knows where a vehicle fits and what surrounds the position.
 class FreeSpaceGrid {
  public:
@@ -49,17 +56,19 @@ class FreeSpaceGrid {
     return low_ + cell_ * Vector3d(i[0] + 0.5, i[1] + 0.5, i[2] + 0.5);
   }
 
-  /// Cells where a vehicle may be: free, with ground below, and walls in at least `sides` of the
-  /// eight horizontal directions.
-  [[nodiscard]] std::vector<bool> usable(int sides, bool near_ground) const {
+  /// Cells where a vehicle may be: free, at that height, and walls in at least `sides` of the eight
+  /// horizontal directions.
+  [[nodiscard]] std::vector<bool> usable(int sides, Heights heights) const {
     // neighbouring cells must be connected by a free line: half a cell of reserve
     const double needed = options_.radius + options_.margin + 0.5 * cell_;
     std::vector<bool> ok(count());
     for (std::size_t i = 0; i < ok.size(); ++i) {
-      const bool height_ok = !near_ground || (ground_[i] >= static_cast<float>(kGroundMin) &&
-                                              ground_[i] <= static_cast<float>(kGroundMax));
-      ok[i] = distance_[i] > static_cast<float>(needed) && ground_[i] >= 0.0f &&
-              sides_[i] >= sides && height_ok && is_inside(center(i));
+      const bool height_ok = heights == Heights::kAny ||
+                             (heights == Heights::kAboveGround && ground_[i] >= 0.0f) ||
+                             (ground_[i] >= static_cast<float>(kGroundMin) &&
+                              ground_[i] <= static_cast<float>(kGroundMax));
+      ok[i] = distance_[i] > static_cast<float>(needed) && sides_[i] >= sides && height_ok &&
+              is_inside(center(i)) && (heights == Heights::kAny || is_accepted(i));
     }
     return ok;
   }
@@ -92,6 +101,14 @@ class FreeSpaceGrid {
   }
 
  private:
+  /// Asked once for each cell.
+  [[nodiscard]] bool is_accepted(std::size_t at) const {
+    if (!options_.accepts) return true;
+    if (accepted_.empty()) accepted_.assign(count(), kUnasked);
+    if (accepted_[at] == kUnasked) accepted_[at] = options_.accepts(center(at)) ? 1 : 0;
+    return accepted_[at] == 1;
+  }
+
   [[nodiscard]] std::size_t flat(const Index3& i) const {
     return (static_cast<std::size_t>(i[2]) * static_cast<std::size_t>(size_[1]) +
             static_cast<std::size_t>(i[1])) *
@@ -149,7 +166,7 @@ class FreeSpaceGrid {
       }
     }
     for (std::size_t at = 0; at < count(); ++at) {
-      if (ground_[at] < 0.0f || occupied(at)) continue;
+      if (occupied(at)) continue;
       for (const Index3& d : kDirections) sides_[at] += blocked(at, d) ? 1 : 0;
     }
   }
@@ -173,6 +190,8 @@ class FreeSpaceGrid {
   std::vector<float> distance_;
   std::vector<float> ground_;
   std::vector<int> sides_;
+  static constexpr std::int8_t kUnasked = -1;
+  mutable std::vector<std::int8_t> accepted_;
 };
 
 constexpr int kUnreached = -1;
@@ -322,9 +341,12 @@ std::optional<Tour> find_tour(const SurfelMap& map,
   const FreeSpaceGrid grid(map, options, executor);
   // well enclosed positions if they make a tour long enough, else the longest of all
   Tour best;
-  for (const bool near_ground : {true, false}) {
+  for (const Heights heights : {Heights::kNearGround, Heights::kAboveGround, Heights::kAny}) {
+    // where there is ground nobody wants to be without
+    if (heights == Heights::kAny && best.points_world.size() >= 2) break;
     for (const int sides : {6, 4, 2, 0}) {
-      Tour tour = tour_in(map, options, grid, grid.usable(sides, near_ground));
+      Tour tour = tour_in(map, options, grid, grid.usable(sides, heights));
+      tour.has_ground = heights != Heights::kAny;
       if (tour.length > best.length) best = std::move(tour);
       if (best.length >= options.length_min) return best;
     }
@@ -343,15 +365,17 @@ std::optional<Vector3d> nearest_free_position(const SurfelMap& map,
     options.radius = radius;
     options.margin = margin;
     const FreeSpaceGrid grid(map, options, executor);
-    const std::vector<bool> usable = grid.usable(0, false);
-    std::optional<Vector3d> best;
-    for (std::size_t i = 0; i < usable.size(); ++i) {
-      const Vector3d place = grid.center(i);
-      const bool nearer =
-          !best || (place - near_world).squaredNorm() < (*best - near_world).squaredNorm();
-      if (usable[i] && nearer) best = place;
+    for (const Heights heights : {Heights::kAboveGround, Heights::kAny}) {
+      const std::vector<bool> usable = grid.usable(0, heights);
+      std::optional<Vector3d> best;
+      for (std::size_t i = 0; i < usable.size(); ++i) {
+        const Vector3d at = grid.center(i);
+        const bool nearer =
+            !best || (at - near_world).squaredNorm() < (*best - near_world).squaredNorm();
+        if (usable[i] && nearer) best = at;
+      }
+      if (best) return best;
     }
-    if (best) return best;
   }
   return std::nullopt;
 }

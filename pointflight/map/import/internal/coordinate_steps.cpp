@@ -1,6 +1,7 @@
 #include "pointflight/map/import/internal/coordinate_steps.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace pointflight {
@@ -20,8 +21,16 @@ int binary_step(double value) {
   return exponent - 53 + __builtin_ctzll(static_cast<unsigned long long>(bits));
 }
 
+constexpr int kLeastDecimal = -6;
+constexpr std::array kPowersOfTen = {
+    1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9};
+
+double power_of_ten(int decimal) {
+  return kPowersOfTen[static_cast<std::size_t>(decimal - kLeastDecimal)];
+}
+
 bool is_multiple_of_power_of_ten(double value, int decimal) {
-  const double units = value / std::pow(10.0, decimal);
+  const double units = value / power_of_ten(decimal);
   return std::abs(units - std::round(units)) < 1e-6;
 }
 
@@ -35,7 +44,8 @@ void CoordinateSteps::add(std::span<const CloudPoint> points) {
       if (!std::isfinite(value) || value == 0.0 || std::abs(value) > 1e15) continue;
       Axis& axis = axes_[k];
       axis.binary = std::min(axis.binary, binary_step(value));
-      while (axis.decimal > -6 && !is_multiple_of_power_of_ten(value, axis.decimal)) --axis.decimal;
+      while (axis.decimal > kLeastDecimal && !is_multiple_of_power_of_ten(value, axis.decimal))
+        --axis.decimal;
       axis.farthest = std::max(axis.farthest, std::abs(value));
       if (axis.count++ == 0) axis.first = value;
       axis.varies = axis.varies || value != axis.first;
@@ -47,7 +57,7 @@ std::optional<CoarseCoordinates> CoordinateSteps::coarse(double metres_per_unit)
   std::optional<CoarseCoordinates> found;
   for (const Axis& axis : axes_) {
     if (axis.count < kFewest || !axis.varies) continue;
-    const double step = std::max(std::ldexp(1.0, axis.binary), std::pow(10.0, axis.decimal));
+    const double step = std::max(std::ldexp(1.0, axis.binary), power_of_ten(axis.decimal));
     const double steps = axis.farthest / step;
     const bool is_rounding = steps >= kFewestSteps && steps <= kFloatSteps;
     if (!is_rounding || step * metres_per_unit < kFinest) continue;
