@@ -36,3 +36,19 @@ endforeach()
 
 # Random123 is headers only.
 find_path(POINTFLIGHT_RANDOM123 Random123/philox.h REQUIRED)
+
+# what Eigen aligns matrices to by the flags of this build
+include(CheckCXXSourceCompiles)
+set(CMAKE_REQUIRED_LIBRARIES Eigen3::Eigen)
+foreach(bytes IN ITEMS 16 32 64)
+  check_cxx_source_compiles("#include <Eigen/Core>
+    static_assert(EIGEN_MAX_ALIGN_BYTES == ${bytes});
+    int main() {}" POINTFLIGHT_EIGEN_ALIGNS_${bytes})
+  if(POINTFLIGHT_EIGEN_ALIGNS_${bytes})
+    set(POINTFLIGHT_EIGEN_ALIGNMENT ${bytes})
+  endif()
+endforeach()
+unset(CMAKE_REQUIRED_LIBRARIES)
+if(NOT POINTFLIGHT_EIGEN_ALIGNMENT)
+  message(FATAL_ERROR "Eigen's alignment of matrices could not be found out")
+endif()

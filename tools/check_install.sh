@@ -63,6 +63,14 @@ for of in user "$source/examples"; do
 done
 build/scan_a_room
 build/step_a_flight
+# as somebody builds for his own processor
+if grep -qs avx2 /proc/cpuinfo; then
+  { cmake -S "$source/examples" -B "$folder/newer" -G Ninja -DCMAKE_PREFIX_PATH="$folder/usr" \
+          -DCMAKE_BUILD_TYPE=RelWithDebInfo -DCMAKE_CXX_FLAGS=-march=x86-64-v3 &&
+    cmake --build "$folder/newer" --target step_a_flight scan_a_room; } >"$folder/log" 2>&1 ||
+    { cat "$folder/log"; exit 1; }
+  newer/step_a_flight && newer/scan_a_room || fail "a program for newer processors fails"
+fi
 build/own_parts
 usr/bin/pointflight bag info own_parts.mcap | grep -q /drone0/pressure ||
   fail "a message that a program has added was not recorded"
