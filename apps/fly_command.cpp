@@ -173,6 +173,10 @@ void print_vehicle(const Simulation& simulation, std::size_t v) {
   fmt::print("  tracking error    {:.0f} mm RMS, {:.0f} mm at most\n",
              s.tracking_error_rms * 1e3,
              s.tracking_error_max * 1e3);
+  if (s.off_track.count() > 0) {
+    fmt::print("  off its way       {:.1f} s over 3 m away from where it should be\n",
+               to_seconds(s.off_track));
+  }
   print_limits(s);
   if (simulation.vehicle(v).setup().battery) {
     fmt::print("  battery           {:.2f} Ah used, {:.1f} V now{}{}\n",

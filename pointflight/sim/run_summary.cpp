@@ -29,6 +29,7 @@ nlohmann::ordered_json json_of(const Simulation& simulation, std::size_t number)
   json["speed_max"] = s.speed_max;
   json["tracking_error_rms"] = s.tracking_error_rms;
   json["tracking_error_max"] = s.tracking_error_max;
+  json["off_track_time"] = to_seconds(s.off_track);
   json["states"] = s.states;
   json["imu_samples"] = s.imu_samples;
   json["scans"] = s.scans;

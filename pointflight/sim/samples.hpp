@@ -72,8 +72,8 @@ struct CollisionEvent {
 struct VehicleEvent {
   std::uint32_t vehicle = 0;  ///< Number in the fleet, from 0.
   SimTime time;               ///< Of the step that it was noticed in.
-  /// "battery_low", "battery_empty", "rotor_lost", "beyond_limits"; of shared runs "lost", "back",
-  /// "left", "missed_contact".
+  /// "off_track", "battery_low", "battery_empty", "rotor_lost", "beyond_limits"; of shared runs
+  /// "lost", "back", "left", "missed_contact".
   std::string kind;
   std::string words;                          ///< One line for users.
   Vector3d vehicle_world = Vector3d::Zero();  ///< The body's origin, m.

@@ -91,7 +91,10 @@ void VehicleAgent::control(VehicleStatus& status,
   summary.tracking_error_rms =
       std::sqrt(status.squared_error_sum / static_cast<double>(status.steps));
   summary.speed_max = std::max(summary.speed_max, body.v_world.norm());
-  if (status.autopilot.armed && !status.landed) watch_limits(status, step);
+  if (status.autopilot.armed && !status.landed) {
+    watch_limits(status, step);
+    watch_track(status, error, now, step);
+  }
 
   status.conditions.ground_z = ground_below(status);
   if (!wind_.is_calm()) {
@@ -169,6 +172,32 @@ void VehicleAgent::watch_limits(VehicleStatus& status, Duration step) const {
   if (reached.acceleration) summary.acceleration_limited += step;
   if (reached.tilt) summary.tilt_limited += step;
   if (reached.rotors) summary.rotors_limited += step;
+}
+
+/// A mission, a trajectory or a hover is a way that it should be on; a position far away that it is
+/// sent to is none.
+void VehicleAgent::watch_track(VehicleStatus& status,
+                               double error,
+                               SimTime now,
+                               Duration step) const {
+  constexpr double kOff = 3.0;   // m
+  constexpr double kBack = 1.0;  // m
+  const bool has_way = status.autopilot.trajectory != nullptr || status.autopilot.hold.has_value();
+  if (!has_way || error < kBack) {
+    status.off_track = false;
+    return;
+  }
+  if (error < kOff) return;
+  status.summary.off_track += step;
+  if (std::exchange(status.off_track, true)) return;
+  note(status,
+       now,
+       "off_track",
+       fmt::format("is {:.1f} m from where it should be{}",
+                   error,
+                   status.conditions.wind_world.norm() > 1.0
+                       ? fmt::format(" in wind of {:.0f} m/s", status.conditions.wind_world.norm())
+                       : std::string()));
 }
 
 void VehicleAgent::watch_battery(VehicleStatus& status, SimTime now) const {

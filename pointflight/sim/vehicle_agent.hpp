@@ -33,6 +33,7 @@ struct VehicleSummary {
   std::uint64_t beams = 0;                 ///< Fired in them.
   std::uint64_t points = 0;                ///< Returns in them.
   std::uint64_t collisions = 0;            ///< Times that its hull entered something.
+  Duration off_track{0};                   ///< How long it was over 3 m off a way that it flew.
   Duration speed_limited{0};               ///< How long its speed limit cut what was asked for.
   Duration acceleration_limited{0};        ///< The same for the horizontal or climbing one.
   Duration tilt_limited{0};                ///< The same for its greatest tilt.
@@ -71,6 +72,7 @@ struct VehicleStatus {
   ProximityState proximity;            ///< What its hull is near to or touches.
   bool landed = false;                 ///< The ground carries it.
   bool crashed = false;                ///< Rotors off for good.
+  bool off_track = false;              ///< Far off its way, and not back yet.
   bool commanded = false;              ///< A program has told it something.
   std::vector<VehicleEvent> events;    ///< Not yet delivered.
   std::size_t next_command = 0;        ///< Of the scenario's.
@@ -193,6 +195,7 @@ class VehicleAgent {
   void note(VehicleStatus& status, SimTime now, const char* kind, const std::string& words) const;
   void come_down_spinning(VehicleStatus& status, SimTime now) const;
   void watch_limits(VehicleStatus& status, Duration step) const;
+  void watch_track(VehicleStatus& status, double error, SimTime now, Duration step) const;
   void watch_battery(VehicleStatus& status, SimTime now) const;
   [[nodiscard]] bool touches_down(const VehicleStatus& status) const;
   [[nodiscard]] double ground_below(const VehicleStatus& status) const;

@@ -194,6 +194,31 @@ TEST(Feasibility, SaysWhatIsBeyondWithBothNumbers) {
   expect_contains(*leap, "a leap in speed of 3.0 m/s");
 }
 
+TEST(OffTrack, AVehicleThatCannotHoldAgainstTheWindIsSaid) {
+  Scenario scenario = hovering();
+  scenario.duration = 4.0;
+  const Executor executor(1);
+  EventSink calm;
+  EXPECT_EQ(run(scenario, calm, executor).summary(0).off_track, Duration{0});
+  EXPECT_TRUE(calm.on_board.empty());
+  scenario.air.wind.mean = {25, 0, 0};
+  EventSink sink;
+  const Simulation blown = run(scenario, sink, executor);
+  ASSERT_GE(sink.on_board.size(), 1u);
+  EXPECT_EQ(sink.on_board[0].kind, "off_track");
+  expect_contains(sink.on_board[0].words, "3.0 m from where it should be in wind of 25 m/s");
+  EXPECT_GT(to_seconds(blown.summary(0).off_track), 1.0);
+  expect_contains(summary_json(blown), "\"off_track_time\"");
+  // a position far away that it is sent to is no way
+  scenario.air.wind.mean.setZero();
+  EventSink sent;
+  Simulation simulation(scenario, hall(), executor);
+  EXPECT_FALSE(simulation.command(0, PositionCommand{.p_world = {16, 6, 3}}));
+  while (simulation.step(sent)) {
+  }
+  EXPECT_TRUE(sent.on_board.empty());
+}
+
 TEST(Feasibility, IsSaidWhenTheCommandIsTakenAndInTheSummary) {
   Scenario scenario = hovering();
   scenario.duration = 12.0;
@@ -206,9 +231,12 @@ TEST(Feasibility, IsSaidWhenTheCommandIsTakenAndInTheSummary) {
   EXPECT_FALSE(simulation.command(0, TrajectoryCommand{circle}));
   while (simulation.step(sink)) {
   }
-  ASSERT_EQ(sink.on_board.size(), 1u);
+  ASSERT_GE(sink.on_board.size(), 1u);
   EXPECT_EQ(sink.on_board[0].kind, "beyond_limits");
   EXPECT_EQ(sink.on_board[0].time, SimTime{} + std::chrono::seconds(1));
+  for (std::size_t i = 1; i < sink.on_board.size(); ++i) {
+    EXPECT_EQ(sink.on_board[i].kind, "off_track") << "what came of it";
+  }
   expect_contains(sink.on_board[0].words, "a tilt of");
   const VehicleSummary& summary = simulation.summary(0);
   EXPECT_EQ(summary.beyond_limits, 1u);
