@@ -27,12 +27,15 @@ std::string write_input(const std::uint8_t* data, std::size_t size) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::string path = write_input(data, size);
   try {
-    if (pointflight::is_mesh(path)) return 0;  // assimp's to read
-    const auto reader = pointflight::open_cloud(path);
+    const bool is_mesh = pointflight::is_mesh(path);
+    pointflight::MeshSampling sampling;
+    sampling.points_per_square_metre = 1e-3;
+    const auto reader = pointflight::open_cloud(path, sampling);
     std::vector<pointflight::CloudPoint> batch;
     std::size_t count = 0;
-    while (reader->read(batch)) count += batch.size();
-    if (count <= kPointsToImport) {
+    // of a mesh any number may be wanted
+    while ((!is_mesh || count < kPointsToImport) && reader->read(batch)) count += batch.size();
+    if (!is_mesh && count <= kPointsToImport) {
       pointflight::import_clouds({path}, {}, pointflight::Executor(1));
     }
   } catch (const pointflight::InputError& error) {
