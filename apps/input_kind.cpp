@@ -130,10 +130,11 @@ void check_map_name(const std::string& path) {
   const std::string extension = lower_extension(path);
   const std::string others = known_cloud_formats() + " .yaml .mcap .bag .png ";
   if (extension.empty() || others.find(extension + " ") == std::string::npos) return;
-  throw InputError(fmt::format("{}: a map is written, which is no {}; name it {}",
-                               path,
-                               extension,
-                               fs::path(path).replace_extension(".pfmap").string()));
+  throw InputError(
+      fmt::format("{}: a map is written, which is no {}; give it another name, such as {}",
+                  path,
+                  extension,
+                  fs::path(path).replace_extension(".pfmap").string()));
 }
 
 }  // namespace pointflight::apps

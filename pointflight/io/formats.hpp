@@ -58,8 +58,8 @@ MeshLimits mesh_limits(std::size_t file_bytes);
 
 /// Triangles of a PLY, an OBJ or any format that assimp reads, sampled evenly by area. What assimp
 /// reads it reads in a child process: if it crashes there, that is an InputError here. Throws
-/// InputError, for these formats also if the program was built without assimp.
-/// @param format  Extension in lower case: ".ply".
+/// InputError, for these formats also if the program was built without assimp. `format` is an
+/// extension in lower case: ".ply".
 std::unique_ptr<CloudReader> open_mesh(const std::string& path,
                                        const std::string& format,
                                        const MeshSampling& sampling,

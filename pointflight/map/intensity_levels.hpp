@@ -8,9 +8,9 @@
 
 namespace pointflight {
 
-/// What the codes of a map's intensities stand for, ascending: value of code k.
+/// What the codes of a map's intensities stand for.
 struct IntensityLevels {
-  std::array<float, 256> of_code{};
+  std::array<float, 256> of_code{};  ///< Ascending.
   bool is_linear = true;  ///< Equal steps; said by a map's header, else by a section of its own.
   float step = 0.0f;      ///< From one to the next, if they are equal.
 
@@ -28,6 +28,7 @@ class IntensityHistogram {
   IntensityHistogram();
   /// A finite intensity.
   void add(float intensity);
+  /// Nothing was added.
   [[nodiscard]] bool is_empty() const { return count_ == 0; }
 
   /// Linear from the least to the greatest value, unless a few outliers would take the steps from

@@ -332,6 +332,15 @@ Tour tour_in(const SurfelMap& map,
   return tour;
 }
 
+/// True if a vehicle could be somewhere above ground, within the bounds or elsewhere.
+bool has_ground(const SurfelMap& map, const TourOptions& options, const Executor& executor) {
+  TourOptions anywhere = options;
+  anywhere.bounds.reset();
+  const std::vector<bool> usable =
+      FreeSpaceGrid(map, anywhere, executor).usable(0, Heights::kAboveGround);
+  return std::find(usable.begin(), usable.end(), true) != usable.end();
+}
+
 }  // namespace
 
 std::optional<Tour> find_tour(const SurfelMap& map,
@@ -342,8 +351,11 @@ std::optional<Tour> find_tour(const SurfelMap& map,
   // well enclosed positions if they make a tour long enough, else the longest of all
   Tour best;
   for (const Heights heights : {Heights::kNearGround, Heights::kAboveGround, Heights::kAny}) {
-    // where there is ground nobody wants to be without
-    if (heights == Heights::kAny && best.points_world.size() >= 2) break;
+    // where a map has ground nobody wants to be without
+    if (heights == Heights::kAny &&
+        (best.points_world.size() >= 2 || has_ground(map, options, executor))) {
+      break;
+    }
     for (const int sides : {6, 4, 2, 0}) {
       Tour tour = tour_in(map, options, grid, grid.usable(sides, heights));
       tour.has_ground = heights != Heights::kAny;

@@ -109,8 +109,7 @@ TEST_F(Program, SaysWhichCommandOrFlagWasMeant) {
   write_file(folder / "hall.pcd", "");
   expect_user_error(run(fmt::format("fly {}", folder / "hall.pcd")),
                     "import it first: pointflight map import");
-  expect_user_error(run(fmt::format("picture {}", folder / "nosuch")),
-                    "nosuch: cannot open the folder");
+  expect_user_error(run(fmt::format("picture {}", folder / "nosuch")), "nosuch: no such folder");
   const Result version = run("--version");
   EXPECT_EQ(version.code, 0);
   for (const char* words : {"pointflight 0.", "(commit ", "meshes ", "ROS 1 ", "ROS 2 "}) {
