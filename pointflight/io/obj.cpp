@@ -186,7 +186,8 @@ CloudPoint ObjLines::vertex(std::string_view rest, bool& has_color) const {
   has_color = count == numbers.size();
   for (std::size_t c = 0; c < 3 && has_color; ++c) {
     const double part = numbers[3 + c];  // not a number: black
-    point.color[c] = part > 0.0 ? static_cast<std::uint8_t>(255.0 * std::min(part, 1.0) + 0.5) : 0;
+    point.color[c] =
+        part > 0.0 ? static_cast<std::uint8_t>(std::lround(255.0 * std::min(part, 1.0))) : 0;
   }
   return point;
 }

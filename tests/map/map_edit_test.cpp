@@ -23,8 +23,8 @@ namespace {
 
 using testing::error_of;
 using testing::expect_contains;
-using testing::opened;
 using testing::map_of;
+using testing::opened;
 
 /// A room with a pillar, a table and a ball.
 ShapeScene room() {
