@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <map>
 #include <utility>
@@ -131,11 +132,12 @@ void PosedScans::settle_times(const std::optional<TimeUnit>& given, const std::s
   const double interval = intervals[intervals.size() / 2];
   std::map<std::size_t, TimesOfScan> times;
   ScanBatch batch;
+  // with one more, whose first points say that the others are complete: no recording is read on
+  const std::size_t looks = std::min(kLooks + 1, scans_.size());
   const auto reader = source_->open([&](std::size_t scan) {
-    return std::any_of(
-        scans_.begin(),
-        scans_.begin() + static_cast<std::ptrdiff_t>(std::min(kLooks, scans_.size())),
-        [&](const Posed& posed) { return posed.number == scan; });
+    return std::any_of(scans_.begin(),
+                       scans_.begin() + static_cast<std::ptrdiff_t>(looks),
+                       [&](const Posed& posed) { return posed.number == scan; });
   });
   while (times.size() <= kLooks && reader->read(batch)) {
     TimesOfScan& scan = times[batch.scan];
@@ -146,6 +148,7 @@ void PosedScans::settle_times(const std::optional<TimeUnit>& given, const std::s
       scan.last = std::max(scan.last, point.time);
     }
   }
+  if (times.size() > kLooks) times.erase(std::prev(times.end()));
   std::vector<TimesOfScan> with;
   for (const auto& [number, scan] : times) {
     if (scan.any()) with.push_back(scan);
