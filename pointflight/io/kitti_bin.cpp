@@ -15,6 +15,11 @@ constexpr std::size_t kKitti = 4;  // numbers of a point
 constexpr std::size_t kNuScenes = 5;
 constexpr std::size_t kGuessedFrom = 1000;  // points that tell what a file is
 
+/// -1 if it is none.
+std::int32_t kitti_ring(float value) {
+  return value >= 0.0f && value < 65536.0f ? static_cast<std::int32_t>(value) : -1;
+}
+
 class KittiReader : public CloudReader {
  public:
   explicit KittiReader(MappedFile file) : file_(std::move(file)), numbers_(numbers_of_a_point()) {
@@ -31,7 +36,7 @@ class KittiReader : public CloudReader {
         point.position[static_cast<int>(axis)] = static_cast<double>(number(next_, axis, numbers_));
       }
       point.intensity = number(next_, 3, numbers_);
-      if (numbers_ == kNuScenes) rings_.push_back(static_cast<int>(number(next_, 4, numbers_)));
+      if (numbers_ == kNuScenes) rings_.push_back(kitti_ring(number(next_, 4, numbers_)));
     }
     file_.release_before(next_ * row());
     return !batch.empty();
