@@ -11,6 +11,7 @@
 
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/core/shell_words.hpp"
+#include "pointflight/io/byte_cursor.hpp"
 #include "pointflight/io/cloud_reader.hpp"
 #include "pointflight/map/map_file.hpp"
 
@@ -46,11 +47,7 @@ InputKind kind_of_folder(const fs::path& folder) {
 }
 
 std::string lower_extension(const std::string& path) {
-  std::string extension = fs::path(path).extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(), [](char c) {
-    return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  });
-  return extension;
+  return lower_case(fs::path(path).extension().string());
 }
 
 /// What it is, and what to do with it.

@@ -1,9 +1,16 @@
 #include "pointflight/io/byte_cursor.hpp"
 
+#include <cctype>
 #include <charconv>
 #include <cstdlib>
 
 namespace pointflight {
+
+std::string lower_case(std::string_view text) {
+  std::string lower(text);
+  for (char& c : lower) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return lower;
+}
 
 bool parse_number(std::string_view word, double& value) {
   if (!word.empty() && word.front() == '+') word.remove_prefix(1);

@@ -79,6 +79,9 @@ inline std::string_view take_word(std::string_view& line) {
 /// Parses a number; "nan", "inf" and a leading '+' are numbers too. False if `word` is not one.
 bool parse_number(std::string_view word, double& value);
 
+/// ASCII letters in lower case.
+std::string lower_case(std::string_view text);
+
 /// A file's bytes as text.
 inline std::string_view as_text(std::span<const std::byte> bytes) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};

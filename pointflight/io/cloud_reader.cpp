@@ -5,7 +5,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <filesystem>
 #include <utility>
@@ -69,11 +68,6 @@ constexpr Refusal kRefusals[] = {
 
 [[noreturn]] void refuse(const Refusal& refusal, const std::string& name) {
   throw InputError(name + ": " + fmt::format(fmt::runtime(refusal.words), name));
-}
-
-std::string lower_case(std::string text) {
-  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return text;
 }
 
 /// ".las" of "las", ".las" or ".LAS".

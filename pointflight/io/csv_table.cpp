@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <cctype>
 #include <limits>
 
 #include "pointflight/core/input_error.hpp"
@@ -46,10 +45,7 @@ void CsvTable::parse(std::string_view text) {
     if (unquoted(line).empty() || unquoted(line).front() == '#') continue;
     const auto cells = cells_of(line);
     if (names_.empty()) {
-      for (const std::string_view cell : cells) {
-        std::string& name = names_.emplace_back(cell);
-        for (char& c : name) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-      }
+      for (const std::string_view cell : cells) names_.push_back(lower_case(cell));
       continue;
     }
     if (cells.size() != names_.size()) {

@@ -65,7 +65,7 @@ class ObjTriangles : public MeshTriangles {
     std::string_view rest;
     while (lines_.next(keyword, rest)) {
       if (keyword == "v") ++seen_;
-      if (keyword != "f" && keyword != "fo") continue;
+      if (keyword != "f") continue;
       corners_.clear();
       for (auto word = take_word(rest); !word.empty() && word.front() != '#';
            word = take_word(rest)) {
@@ -193,13 +193,12 @@ CloudPoint ObjLines::vertex(std::string_view rest, bool& has_color) const {
 }
 
 bool obj_has_faces(const MappedFile& file) {
-  ObjLines lines(file);
-  std::string_view keyword;
-  std::string_view rest;
-  while (lines.next(keyword, rest)) {
-    if (keyword == "f" || keyword == "fo") return true;
-  }
-  return false;
+  // a search alone: faces usually come after all vertices
+  const std::string_view text = as_text(file.bytes());
+  const auto begins = [&](std::string_view line) {
+    return text.starts_with(line.substr(1)) || text.find(line) != std::string_view::npos;
+  };
+  return begins("\nf ") || begins("\nf\t");
 }
 
 std::unique_ptr<MeshTriangles> obj_triangles(MappedFile file, const Progress& progress) {

@@ -4,10 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <limits>
-#include <map>
+#include <optional>
 #include <utility>
+#include <vector>
 
 #include "pointflight/core/input_error.hpp"
 
@@ -116,6 +116,45 @@ struct TimesOfScan {
   [[nodiscard]] double span() const { return last - first; }
 };
 
+/// Those of the first scans of a reader that have times, at most `most`; it is not read on.
+std::vector<TimesOfScan> times_of_first_scans(ScanReader& reader, std::size_t most) {
+  std::vector<TimesOfScan> scans;
+  ScanBatch batch;
+  std::size_t read = 0;  // scans
+  for (std::optional<std::size_t> scan; reader.read(batch);) {
+    if (scan != batch.scan) {
+      if (read++ == most) break;  // the others are complete
+      scan = batch.scan;
+      if (scans.empty() || scans.back().any()) scans.emplace_back();
+    }
+    scans.back().unit = batch.time_unit;
+    for (const RecordedPoint& point : batch.points) {
+      if (!std::isfinite(point.time)) continue;
+      scans.back().first = std::min(scans.back().first, point.time);
+      scans.back().last = std::max(scans.back().last, point.time);
+    }
+  }
+  if (!scans.empty() && !scans.back().any()) scans.pop_back();
+  return scans;
+}
+
+/// The median by a measure of each.
+template <class T, class Measure>
+T median_by(std::vector<T> values, const Measure& measure) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end(), [&](const T& a, const T& b) {
+    return measure(a) < measure(b);
+  });
+  return *middle;
+}
+
+const char* name_of_unit(double seconds) {
+  for (const TimeUnit& unit : kTimeUnits) {
+    if (unit.seconds == seconds) return unit.name;
+  }
+  return "";
+}
+
 }  // namespace
 
 void PosedScans::settle_times(const std::optional<TimeUnit>& given, const std::string& name) {
@@ -126,63 +165,32 @@ void PosedScans::settle_times(const std::optional<TimeUnit>& given, const std::s
   for (std::size_t i = 1; i < scans_.size(); ++i) {
     intervals.push_back(to_seconds(scans_[i].time - scans_[i - 1].time));
   }
-  std::nth_element(intervals.begin(),
-                   intervals.begin() + static_cast<std::ptrdiff_t>(intervals.size() / 2),
-                   intervals.end());
-  const double interval = intervals[intervals.size() / 2];
-  std::map<std::size_t, TimesOfScan> times;
-  ScanBatch batch;
-  // with one more, whose first points say that the others are complete: no recording is read on
-  const std::size_t looks = std::min(kLooks + 1, scans_.size());
-  const auto reader = source_->open([&](std::size_t scan) {
-    return std::any_of(scans_.begin(),
-                       scans_.begin() + static_cast<std::ptrdiff_t>(looks),
-                       [&](const Posed& posed) { return posed.number == scan; });
-  });
-  while (times.size() <= kLooks && reader->read(batch)) {
-    TimesOfScan& scan = times[batch.scan];
-    scan.unit = batch.time_unit;
-    for (const RecordedPoint& point : batch.points) {
-      if (!std::isfinite(point.time)) continue;
-      scan.first = std::min(scan.first, point.time);
-      scan.last = std::max(scan.last, point.time);
-    }
-  }
-  if (times.size() > kLooks) times.erase(std::prev(times.end()));
-  std::vector<TimesOfScan> with;
-  for (const auto& [number, scan] : times) {
-    if (scan.any()) with.push_back(scan);
-  }
-  if (with.empty()) {
+  const double interval = median_by(intervals, [](double seconds) { return seconds; });
+  const std::size_t first = scans_.front().number;
+  const auto reader = source_->open([first](std::size_t scan) { return scan >= first; });
+  const std::vector<TimesOfScan> times = times_of_first_scans(*reader, kLooks);
+  if (times.empty()) {
     about_times_ = fmt::format(
         "{}: its points have no times (time, t, timestamp, offset_time): motion within a scan is "
         "not taken out, and surfaces smear while the sensor turns",
         name);
     return;
   }
-  std::nth_element(with.begin(),
-                   with.begin() + static_cast<std::ptrdiff_t>(with.size() / 2),
-                   with.end(),
-                   [](const auto& a, const auto& b) { return a.span() < b.span(); });
-  const TimesOfScan& usual = with[with.size() / 2];
-  const double raw = usual.span() / usual.unit;
+  const TimesOfScan usual = median_by(times, [](const TimesOfScan& scan) { return scan.span(); });
+  const double in_file = usual.span() / usual.unit;
   const double unit = given ? given->seconds : usual.unit;
-  if (raw == 0.0 || !(interval > 0.0) || fits_interval(raw * unit, interval)) return;
-  const auto found = given ? std::nullopt : unit_by_span(raw, interval);
+  if (in_file == 0.0 || !(interval > 0.0) || fits_interval(in_file * unit, interval)) return;
+  const auto found = given ? std::nullopt : unit_by_span(in_file, interval);
   if (found) time_unit_ = found->seconds;
+  const double settled = found ? found->seconds : unit;
   about_times_ = fmt::format(
-      "{}: times of points are taken to be in {}: {}; --time-unit says otherwise",
+      "{}: times of points are taken to be in {}: a scan takes {:.3g} s so, and scans come every "
+      "{:.3g} s{}; --time-unit says otherwise",
       name,
-      found              ? found->name
-      : given            ? given->name
-      : usual.unit < 1.0 ? "ns"
-                         : "s",
-      found ? fmt::format(
-                  "scans come every {:.3g} s and take {:.3g} s so", interval, raw * found->seconds)
-            : fmt::format(
-                  "a scan takes {:.3g} s so, and scans come every {:.3g} s; surfaces may smear",
-                  raw * unit,
-                  interval));
+      name_of_unit(settled),
+      in_file * settled,
+      interval,
+      found ? "" : ", surfaces may smear");
 }
 
 SurveyFolder::SurveyFolder(const SurveyFiles& files) {

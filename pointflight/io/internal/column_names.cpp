@@ -1,8 +1,9 @@
 #include "pointflight/io/internal/column_names.hpp"
 
 #include <algorithm>
-#include <cctype>
 #include <string_view>
+
+#include "pointflight/io/byte_cursor.hpp"
 
 namespace pointflight {
 namespace {
@@ -66,12 +67,6 @@ bool is_padding(const std::string& name) {
 }
 
 }  // namespace
-
-std::string lower_case(std::string_view text) {
-  std::string lower(text);
-  for (char& c : lower) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return lower;
-}
 
 NamedColumns::NamedColumns(const std::vector<std::string>& names) {
   std::vector<std::string> plain;

@@ -53,7 +53,4 @@ class NamedColumns {
   FileColumns about_;
 };
 
-/// ASCII letters in lower case.
-std::string lower_case(std::string_view text);
-
 }  // namespace pointflight
