@@ -69,7 +69,7 @@ class Probe : public Link {
   int ready_after = 0;
   int steps = 0;
   int idle = 0;
-  int scans = 0;
+  std::atomic<int> scans = 0;  ///< Orders are taken on the run's thread, samples on the link's.
   SimTime last, paused_at, reset_at;
   bool used = true;
   bool failing = false;
