@@ -50,14 +50,15 @@ void show(const std::string& path, bool as_json) {
   }
   fmt::print("{}\n", path);
   fmt::print("  format       {}{}\n",
-             info.format,
-             info.library.empty() ? "" : fmt::format(", written by {}", info.library));
+             printable(info.format),
+             info.library.empty() ? "" : fmt::format(", written by {}", printable(info.library)));
   fmt::print("  complete     {}\n",
              info.complete ? "yes" : "no: cut short; what follows is what can be read");
   fmt::print("  messages     {}{}\n",
              info.messages,
-             info.chunks > 0 ? fmt::format(" in {} chunks ({})", info.chunks, info.compression)
-                             : std::string());
+             info.chunks > 0
+                 ? fmt::format(" in {} chunks ({})", info.chunks, printable(info.compression))
+                 : std::string());
   if (info.messages > 0) {
     fmt::print("  time         {:.3f} to {:.3f}, {:.3f} s\n",
                1e-9 * static_cast<double>(info.start),
@@ -65,11 +66,15 @@ void show(const std::string& path, bool as_json) {
                seconds);
   }
   for (const auto& attachment : info.attachments) {
-    fmt::print("  attachment   {}, {} bytes\n", attachment.name, attachment.size);
+    fmt::print("  attachment   {}, {} bytes\n", printable(attachment.name), attachment.size);
   }
   for (const auto& topic : info.topics) {
     const double rate = seconds > 0.0 ? static_cast<double>(topic.messages) / seconds : 0.0;
-    fmt::print("  {:>8}  {:>7.1f} Hz  {}  {}\n", topic.messages, rate, topic.name, topic.type);
+    fmt::print("  {:>8}  {:>7.1f} Hz  {}  {}\n",
+               topic.messages,
+               rate,
+               printable(topic.name),
+               printable(topic.type));
   }
 }
 

@@ -7,6 +7,7 @@
 
 #include "apps/campaign_report.hpp"
 #include "apps/settings_json.hpp"
+#include "apps/terminal.hpp"
 #include "pointflight/core/output_file.hpp"
 
 namespace pointflight::apps {
@@ -114,7 +115,7 @@ void print_results(const Campaign& campaign,
   for (std::size_t i = 0; i < std::min(kMost, failed.size()); ++i) {
     fmt::print("  flight {} failed: {}; log: {}\n    again: {}\n",
                failed[i].number,
-               failed[i].reason,
+               printable(failed[i].reason),
                failed[i].log,
                failed[i].command);
   }

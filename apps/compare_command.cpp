@@ -163,7 +163,7 @@ void print_sensor(const SensorComparison& made) {
 }
 
 void compare(const CompareFlags& flags) {
-  if (!flags.png.empty()) make_picture_folder(flags.png, flags.force);
+  const PictureFolder pictures(flags.png, flags.force);
   const Executor executor(flags.threads);
   require_kind(flags.map, {InputKind::kMap}, "a map (.pfmap)");
   const auto map = SurfelMap::open(flags.map);

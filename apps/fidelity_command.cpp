@@ -209,8 +209,8 @@ void complete_survey_flags(const CLI::App& app, FidelityFlags& flags) {
 
 void fidelity(const FidelityFlags& flags) {
   const Executor executor(flags.threads);
-  if (!flags.survey.out.empty()) make_picture_folder(flags.survey.out, flags.force);
-  if (!flags.png.empty()) make_picture_folder(flags.png, flags.force);
+  const PictureFolder survey(flags.survey.out, flags.force);
+  const PictureFolder pictures(flags.png, flags.force);
   std::vector<ExactScene> scenes;
   for (const std::string& name : flags.scenes) scenes.push_back(load_scene(name));
   for (std::size_t i = 1; i < scenes.size() && !flags.survey.out.empty(); ++i) {

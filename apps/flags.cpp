@@ -150,17 +150,30 @@ void check_outputs(const std::vector<std::string>& outputs,
   }
 }
 
-void make_picture_folder(const std::string& folder, bool force) {
+PictureFolder::PictureFolder(const std::string& folder, bool force) {
+  if (folder.empty()) return;
+  namespace fs = std::filesystem;
   std::error_code error;
-  std::filesystem::create_directories(folder, error);
-  if (std::error_code ignored; !std::filesystem::is_directory(folder, ignored)) {
+  std::vector<fs::path> missing;
+  for (fs::path at = fs::absolute(folder).lexically_normal(); !fs::exists(at, error);
+       at = at.parent_path()) {
+    if (at.has_filename()) missing.push_back(at);
+  }
+  fs::create_directories(folder, error);
+  if (std::error_code ignored; !fs::is_directory(folder, ignored)) {
     throw InputError(fmt::format(
         "{}: cannot make the folder: {}", folder, error ? error.message() : "is a file"));
   }
-  if (!force && !std::filesystem::is_empty(folder, error)) {
+  if (!force && !fs::is_empty(folder, error)) {
     throw InputError(
         fmt::format("{}: is not empty; choose another folder or give --force", folder));
   }
+  made_ = std::move(missing);
+}
+
+PictureFolder::~PictureFolder() {
+  // one that holds something stays
+  for (const auto& folder : made_) ::rmdir(folder.c_str());
 }
 
 std::vector<CloudSource> cloud_sources(const std::vector<std::string>& inputs,

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -45,9 +46,20 @@ void check_outputs(const std::vector<std::string>& outputs,
                    const std::vector<std::string>& inputs,
                    bool force);
 
-/// Makes a folder for a command's pictures. Throws InputError if it cannot be made, or if it
-/// holds anything that may not be replaced.
-void make_picture_folder(const std::string& folder, bool force);
+/// A folder that a command makes for its pictures. A command that fails before it has written
+/// one leaves no folder that was not there.
+class PictureFolder {
+ public:
+  /// An empty name is none. Throws InputError if the folder cannot be made, or if it holds
+  /// anything and `force` is not given.
+  PictureFolder(const std::string& folder, bool force);
+  ~PictureFolder();
+  PictureFolder(const PictureFolder&) = delete;
+  PictureFolder& operator=(const PictureFolder&) = delete;
+
+ private:
+  std::vector<std::filesystem::path> made_;  ///< With those above it, from the lowest.
+};
 
 /// The clouds of a command line; "-" is standard input, kept in `scratch` if it has to be read
 /// again. `format`: what all of them are, empty: by their names. Throws InputError.

@@ -197,12 +197,14 @@ void fit_lidar(const SensorFitFlags& flags) {
     log("it turns counter-clockwise; sensor files know clockwise ones: rings will be mirrored in "
         "time");
   }
+  OutputSet outputs;
   if (!flags.output.empty()) write_sensor(flags, fit);
   if (!flags.png.empty()) {
     picture::draw_sensor_fit(
         fit, "Noise of " + fs::path(flags.input).filename().string(), flags.png);
     log("picture: " + flags.png);
   }
+  outputs.commit();
   if (flags.json) {
     print_json(json_of(fit));
   } else {

@@ -8,6 +8,8 @@
 #include <exception>
 #include <new>
 #include <string>
+#include <string_view>
+#include <system_error>
 #include <vector>
 
 #include "apps/cli.hpp"
@@ -88,6 +90,25 @@ void allow_many_files() {
   ::setrlimit(RLIMIT_NOFILE, &limit);
 }
 
+/// Throws InputError where deep calls would end in a crash without a word.
+void require_stack() {
+  constexpr rlim_t kLeast = 256 << 10;
+  rlimit limit{};
+  if (::getrlimit(RLIMIT_STACK, &limit) != 0 || limit.rlim_cur >= kLeast) return;
+  throw pointflight::InputError(
+      fmt::format("the stack is limited to {} KB; allow 8 MB, as is usual: ulimit -s 8192",
+                  limit.rlim_cur / 1024));
+}
+
+/// What helps where memory has run out.
+std::string memory_remedy(int argc, char** argv) {
+  const std::string_view verb = argc > 1 ? argv[1] : "";
+  const std::string_view limit = "raise the limit (ulimit -v, a container's)";
+  if (verb == "map") return fmt::format("give a coarser --resolution, or {}", limit);
+  if (verb == "campaign") return fmt::format("give fewer --jobs, or {}", limit);
+  return fmt::format("{} or close other programs", limit);
+}
+
 /// Runs the program; every error becomes a line and an exit code.
 int guarded_run(int argc, char** argv) {
   // a full file-size limit or a closed pipe is an error of a write, not the end of the process
@@ -98,6 +119,7 @@ int guarded_run(int argc, char** argv) {
   using pointflight::apps::end_progress;
   using pointflight::apps::say;
   try {
+    require_stack();
     const int code = run(argc, argv);
     if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return code;
     say("pointflight: standard output: cannot write; is the disk full?\n");
@@ -110,10 +132,17 @@ int guarded_run(int argc, char** argv) {
     say(fmt::format("pointflight: {}\n", error.what()));
   } catch (const std::bad_alloc&) {
     end_progress();
-    say("pointflight: out of memory; give a coarser --resolution\n");
+    say(fmt::format("pointflight: out of memory; {}\n", memory_remedy(argc, argv)));
   } catch (const std::exception& error) {
     end_progress();
-    say(fmt::format("pointflight: {}\n", error.what()));
+    // TBB's words and the library's own
+    const auto* system = dynamic_cast<const std::system_error*>(&error);
+    const bool no_thread =
+        std::string_view(error.what()).starts_with("pthread_create") ||
+        (system != nullptr && system->code() == std::errc::resource_unavailable_try_again);
+    say(no_thread ? "pointflight: the system allows no further thread; allow more (ulimit -u) or "
+                    "more memory, or give --threads 1\n"
+                  : fmt::format("pointflight: {}\n", error.what()));
   }
   return pointflight::apps::kWrongInput;
 }

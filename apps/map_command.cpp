@@ -197,8 +197,9 @@ void print_info(const SurfelMap& map, const SurfelCount& count, const InfoFlags&
   if (flags.verify) fmt::print("  checksums   match\n");
   fmt::print("  made\n");
   for (const auto& [key, value] : metadata.items())
-    fmt::print(
-        "    {} {}\n", key, value.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
+    fmt::print("    {} {}\n",
+               printable(key),
+               value.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
 }
 
 void show_info(const InfoFlags& flags) {

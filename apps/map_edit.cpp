@@ -98,6 +98,7 @@ std::shared_ptr<const SurfelMap> open_sound_map(const std::string& path) {
 
 void finish_map(const EditFlags& flags, OutputFile output, const EditedMap& edited) {
   end_progress();
+  OutputSet outputs;
   write_map(std::move(output), edited.tree, edited.description);
   log(fmt::format(
       "surfels       {} of {}{}",
@@ -120,6 +121,7 @@ void finish_map(const EditFlags& flags, OutputFile output, const EditedMap& edit
                          flags.png);
     log("picture: " + flags.png);
   }
+  outputs.commit();
   fmt::print("{}\n", flags.output);
 }
 
@@ -143,6 +145,7 @@ void CloudOutput::finish(std::uint64_t points_read,
   if (writer_->count() == 0) {
     throw InputError(fmt::format("{}: no point is left; nothing is written", flags_.output));
   }
+  OutputSet outputs;
   writer_->commit();
   log(fmt::format("{:14}{} points of {}{}",
                   title,
@@ -159,6 +162,7 @@ void CloudOutput::finish(std::uint64_t points_read,
                          flags_.png);
     log("picture: " + flags_.png);
   }
+  outputs.commit();
   fmt::print("{}\n", flags_.output);
 }
 

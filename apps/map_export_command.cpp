@@ -212,6 +212,7 @@ void diff(const DiffFlags& flags) {
     flush();
   }
   end_progress();
+  OutputSet outputs;
   if (writer) {
     writer->commit();
     log(
@@ -222,6 +223,7 @@ void diff(const DiffFlags& flags) {
                     10.0 * distance));
   }
   if (!flags.png.empty()) draw_diff(flags, ways, distance, all);
+  outputs.commit();
   if (flags.json) {
     print_json(json_of(ways, distance));
   } else {

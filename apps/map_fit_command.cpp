@@ -40,8 +40,10 @@ void run_fit(const MapFitFlags& flags) {
       measure_rays(*written, rays, fit_options(flags.fit).right, {}, executor, progress);
   end_progress();
   print_fit(report, after);
+  OutputSet outputs;
   finish_map(flags, std::move(output), fitted);
   write_ghosts(std::move(ghosts), report);
+  outputs.commit();
 }
 
 }  // namespace

@@ -125,11 +125,13 @@ void import_survey(const ImportFlags& flags) {
   EditOptions edit;
   edit.scratch_folder = options.scratch_folder;
   paint_by_signal(made.map, flags.fit, *survey, edit, executor, progress);
+  OutputSet outputs;
   write_map(std::move(output), made.map.tree, made.map.description);
   if (outliers) {
     write_cloud_pcd(std::move(*outliers), made.outliers, made.imported.has_intensity);
   }
   write_ghosts(std::move(ghosts), made.fit);
+  outputs.commit();
   print_report(made.imported, options);
   for (const TriedResolution& tried : made.tried) {
     log(fmt::format(
@@ -161,8 +163,10 @@ void import_map(const ImportFlags& flags) {
   ImportedMap map = import_clouds(sources, options, executor, progress);
   end_progress();
   calibrate(flags, map.description);
+  OutputSet outputs;
   if (outliers) write_cloud_pcd(std::move(*outliers), map.outliers, map.report.has_intensity);
   write_map(std::move(output), map.tree, map.description);
+  outputs.commit();
   print_report(map.report, options);
   print_end(flags, map.report, start);
 }

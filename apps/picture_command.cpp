@@ -5,11 +5,8 @@
 #include <cerrno>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <optional>
-#include <sstream>
 #include <system_error>
 
 #include "apps/cli.hpp"
@@ -18,12 +15,10 @@
 #include "apps/input_kind.hpp"
 #include "apps/terminal.hpp"
 #include "pointflight/core/input_error.hpp"
-#include "pointflight/core/mapped_file.hpp"
 #include "pointflight/core/owned_files.hpp"
-#include "pointflight/io/cloud_reader.hpp"
-#include "pointflight/io/csv_table.hpp"
 #include "pointflight/picture/film.hpp"
 #include "pointflight/picture/pictures.hpp"
+#include "pointflight/picture/run_folder_picture.hpp"
 #include "pointflight/sim/run_folder.hpp"
 
 namespace pointflight::apps {
@@ -37,121 +32,10 @@ struct PictureFlags {
   std::string output;
   std::string frames;
   std::string video;
-  std::size_t follow = 0;
+  std::optional<std::size_t> follow;
   double rate = 20.0;
   bool force = false;
 };
-
-/// Lines of a text file split at commas, the first left out; for tables with words in them.
-std::vector<std::vector<std::string>> rows_of(const fs::path& path) {
-  std::error_code ignored;
-  if (!fs::exists(path, ignored))
-    throw InputError(fmt::format("{}: cannot open; is this a run's folder?", path.string()));
-  require_regular_file(path.string());
-  std::ifstream file(path);
-  std::vector<std::vector<std::string>> rows;
-  std::string line;
-  std::getline(file, line);
-  while (std::getline(file, line)) {
-    std::vector<std::string> cells;
-    std::stringstream cut(line);
-    for (std::string cell; std::getline(cut, cell, ',');) cells.push_back(cell);
-    rows.push_back(std::move(cells));
-  }
-  return rows;
-}
-
-double number_of(const std::string& text, const fs::path& path) {
-  char* end = nullptr;
-  const double value = std::strtod(text.c_str(), &end);
-  if (end == text.c_str()) {
-    throw InputError(fmt::format("{}: '{}' is no number", path.string(), text));
-  }
-  return value;
-}
-
-void read_vehicle(const fs::path& folder, std::size_t number, picture::RunPicture& picture) {
-  const CsvTable table((folder / "trajectory.csv").string());
-  const int x = table.require("px");
-  const int y = table.require("py");
-  const int z = table.require("pz");
-  for (std::size_t row = 0; row < table.rows(); ++row) {
-    picture.add_path_point(number, {table.at(row, x), table.at(row, y), table.at(row, z)});
-  }
-  const fs::path scans = folder / "scans.csv";
-  if (!fs::exists(scans)) return;
-  constexpr std::size_t kColumns = 14;
-  std::size_t offered = 0;
-  const Folder own(folder.string());
-  for (const auto& row : rows_of(scans)) {
-    if (row.size() < kColumns) throw InputError(fmt::format("{}: short row", scans.string()));
-    std::array<double, 7> pose{};
-    for (std::size_t i = 0; i < pose.size(); ++i) pose[i] = number_of(row[7 + i], scans);
-    const Pose T_world_sensor{Quaterniond(pose[3], pose[4], pose[5], pose[6]).normalized(),
-                              {pose[0], pose[1], pose[2]}};
-    const auto reader = open_cloud(file_of_run(own, row[0], scans.string()));
-    std::vector<CloudPoint> points;
-    while (reader->read(points)) {
-      for (const CloudPoint& point : points) {
-        if (offered++ % picture::RunPicture::kSeenStride == 0) {
-          picture.seen.add(T_world_sensor * point.position);
-        }
-      }
-    }
-  }
-}
-
-picture::RunPicture read_run(const fs::path& folder) {
-  picture::RunPicture picture;
-  nlohmann::json summary;
-  try {
-    require_regular_file((folder / "summary.json").string());
-    summary = nlohmann::json::parse(std::ifstream(folder / "summary.json"));
-    const auto& vehicles = summary.at("vehicles");
-    picture::RunFigures figures;
-    figures.vehicles = vehicles.size();
-    if (summary.contains("others")) figures.others = summary.at("others").size();
-    figures.time = summary.at("simulated_time").get<double>();
-    figures.end = summary.at("end").get<std::string>();
-    for (const auto& vehicle : vehicles) {
-      const std::string name = vehicle.at("name").get<std::string>();
-      // one of several, if other processes flew the rest
-      const bool has_folder = fs::exists(folder / name / "trajectory.csv");
-      read_vehicle(has_folder ? folder / name : folder, picture.names.size(), picture);
-      picture.names.push_back(name);
-      figures.flown += vehicle.at("distance_flown").get<double>();
-      figures.scans += vehicle.at("scans").get<std::uint64_t>();
-      figures.points += vehicle.at("points").get<std::uint64_t>();
-      figures.collisions += vehicle.at("collisions").get<std::uint64_t>();
-      if (vehicle.at("closest_approach").is_number()) {
-        figures.add_closest(vehicle.at("closest_approach").get<double>());
-      }
-    }
-    picture::write_titles(figures, picture);
-  } catch (const nlohmann::json::exception&) {
-    throw InputError(fmt::format("{}: not the summary of a run; give the folder of `fly -o`",
-                                 (folder / "summary.json").string()));
-  }
-  const fs::path obstacles = folder / "obstacles.csv";
-  if (fs::exists(obstacles) && fs::file_size(obstacles) > 0) {
-    const auto rows = rows_of(obstacles);
-    for (const auto& row : rows) {
-      if (row.size() < 12) throw InputError(fmt::format("{}: short row", obstacles.string()));
-      picture.add_obstacle(static_cast<std::uint32_t>(number_of(row[1], obstacles)),
-                           {number_of(row[2], obstacles),
-                            number_of(row[3], obstacles),
-                            number_of(row[4], obstacles)},
-                           number_of(row[9], obstacles));
-    }
-  }
-  const fs::path events = folder / "events.csv";
-  for (const auto& row : rows_of(events)) {
-    if (row.size() < 10 || row[1] != "collision") continue;
-    picture.collisions.add(
-        {number_of(row[7], events), number_of(row[8], events), number_of(row[9], events)});
-  }
-  return picture;
-}
 
 /// The scenario that a run was flown from; nothing if its folder has none.
 std::optional<Scenario> scenario_of(const PictureFlags& flags) {
@@ -215,7 +99,7 @@ void list_picture(const std::string& run) {
 
 void film(const PictureFlags& flags) {
   check_outputs({flags.video}, {flags.run, flags.map}, flags.force);
-  if (!flags.frames.empty()) make_picture_folder(flags.frames, flags.force);
+  const PictureFolder frames(flags.frames, flags.force);
   const Executor executor(0);
   RecordedRun run(flags.run, executor);
   const FrameFolder own;
@@ -242,7 +126,9 @@ void add_picture_command(CLI::App& parent, int& /*exit_code*/) {
   app->add_option(
       "--video", flags->video, "Instead: a film of it (.mp4), from behind a vehicle; takes ffmpeg");
   app->add_option("--frames", flags->frames, "The same as pictures, in a folder");
-  app->add_option("--follow", flags->follow, "Number of the vehicle that is followed")
+  app->add_option("--follow",
+                  flags->follow,
+                  "Number of the vehicle that is followed; else the first of this folder")
       ->check(CLI::Range(0, 100000));
   app->add_option("--fps", flags->rate, "Pictures per second of the run")
       ->check(within(0.1, 240.0))
@@ -263,10 +149,15 @@ void add_picture_command(CLI::App& parent, int& /*exit_code*/) {
     check_outputs({path}, {flags->run, flags->map}, flags->force || is_own);
     const auto scenario = scenario_of(*flags);
     const auto map = map_of(*flags, scenario);
-    picture::RunPicture picture = read_run(flags->run);
+    picture::RunPicture picture = picture::read_run_picture(flags->run);
     if (scenario) {
+      // of a shared run the folder has some of them
+      picture.waypoints.resize(picture.names.size());
       for (const VehicleSetup& vehicle : scenario->fleet()) {
-        picture.waypoints.push_back(vehicle.mission.waypoints);
+        const auto name = std::ranges::find(picture.names, vehicle.name);
+        if (name == picture.names.end()) continue;
+        picture.waypoints[static_cast<std::size_t>(name - picture.names.begin())] =
+            vehicle.mission.waypoints;
       }
     }
     picture::draw_overview(*map, picture, path);

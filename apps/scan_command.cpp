@@ -105,11 +105,13 @@ void take_scan(const ScanFlags& flags) {
     log("no beam hit anything: is the pose inside the map? (pointflight map info shows its "
         "extent)");
   }
+  OutputSet outputs;
   if (!flags.output.empty()) write_scan_pcd(flags.output, scan);
   if (!flags.png.empty()) {
     const std::uint64_t index = lidar.pattern_scan(flags.index, flags.seed);
     picture::draw_scan(lidar.beams(index, executor), scan, settings, {*map, pose}, flags.png);
   }
+  outputs.commit();
   print_scan(scan, flags);
 }
 

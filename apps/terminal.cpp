@@ -62,9 +62,15 @@ void end_progress() {
   if (progress_line_open.exchange(false)) say("\r\033[K");
 }
 
+std::string printable(std::string_view text) {
+  std::string shown(text);
+  for (char& c : shown) c = static_cast<unsigned char>(c) < ' ' || c == '\x7f' ? '?' : c;
+  return shown;
+}
+
 void log(std::string_view text) {
   end_progress();
-  say(fmt::format("{}\n", text));
+  say(printable(text) + "\n");
 }
 
 std::string command_line() {

@@ -24,7 +24,11 @@ void end_progress();
 /// Text on stderr, as it is; never fails.
 void say(std::string_view text);
 
-/// A line on stderr.
+/// Text that quotes a file, for a terminal: control characters, escape sequences among them, become
+/// '?'.
+std::string printable(std::string_view text);
+
+/// A line on stderr, made `printable`.
 void log(std::string_view text);
 
 /// This process's command line, quoted if a shell would need it.

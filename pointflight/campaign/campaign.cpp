@@ -261,8 +261,10 @@ std::size_t Campaign::remove_leftovers() const {
     // NOLINTNEXTLINE(cert-err34-c): names are made by `make_attempt`; others are left alone
     const int fields = std::sscanf(rest.c_str(), "%d-%d%n", &pid, &attempt, &read);
     if (fields != 2 || rest.size() != static_cast<std::size_t>(read)) continue;
-    if (pid <= 0 || pid == getpid()) continue;
-    if (kill(static_cast<pid_t>(pid), 0) == 0 || errno != ESRCH) continue;
+    if (pid <= 0) continue;
+    const bool is_gone =
+        pid == getpid() || (kill(static_cast<pid_t>(pid), 0) != 0 && errno == ESRCH);
+    if (!is_gone) continue;
     if (runs->entry(name) != Entry::kFolder) continue;
     try {
       // containers have process numbers of their own: whoever flies there holds the folder

@@ -38,7 +38,8 @@ class Campaign {
   /// Removes results of flights that failed, so that they are flown again; what the user's program
   /// wrote beside them is set aside. Returns how many.
   std::size_t forget_failed();
-  /// Removes what attempts left that cannot go on: those of this machine whose process is gone.
+  /// Removes what attempts left that cannot go on: those of this machine whose process is gone, and
+  /// those of this process, while it flies none.
   /// Returns how many folders stay for what the user's program has written into them.
   std::size_t remove_leftovers() const;
 

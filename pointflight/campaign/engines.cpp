@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <exception>
 #include <mutex>
+#include <system_error>
 #include <thread>
 
 #include "pointflight/core/input_error.hpp"
@@ -35,12 +36,21 @@ void fly_here(const Campaign& campaign,
     }
   };
   // a thread for each, which lives as long as its process: processes end with theirs
-  std::vector<std::thread> threads;
+  std::vector<std::jthread> threads;
   const auto most = std::min<std::size_t>(numbers.size(), static_cast<std::size_t>(jobs));
   threads.reserve(most);
-  for (std::size_t i = 0; i < most; ++i) threads.emplace_back(work);
-  for (std::thread& thread : threads) thread.join();
-  if (error) std::rethrow_exception(error);
+  try {
+    for (std::size_t i = 0; i < most; ++i) threads.emplace_back(work);
+  } catch (const std::system_error&) {
+    // fewer than asked for: the machine allows no more (ulimit -u), and so many fly all the same
+    if (threads.empty()) {
+      throw InputError("the system allows no further thread; allow more (ulimit -u)");
+    }
+  }
+  for (std::jthread& thread : threads) thread.join();
+  if (!error) return;
+  campaign.remove_leftovers();
+  std::rethrow_exception(error);
 }
 
 Share parse_share(const std::string& text) {

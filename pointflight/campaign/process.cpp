@@ -129,7 +129,10 @@ pid_t start_process(const ProcessRequest& request) {
                     getpid()};
   const pid_t child = fork();
   if (child == 0) become(start);
-  if (child < 0) throw InputError(fmt::format("no process for a run: {}", reason(errno)));
+  if (child < 0) {
+    throw InputError(fmt::format(
+        "no process for a run: {}; give fewer --jobs, or allow more (ulimit -u)", reason(errno)));
+  }
   setpgid(child, child);  // whoever comes first
   write_end.reset();
   int error = 0;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <utility>
@@ -11,6 +12,7 @@
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/core/mapped_file.hpp"
 #include "pointflight/core/settings.hpp"
+#include "pointflight/core/whole_number.hpp"
 
 namespace pointflight {
 namespace {
@@ -41,10 +43,35 @@ std::optional<json> read_json(const fs::path& path) {
   return parsed(MappedFile(path.string()).text(), path.string());
 }
 
+/// A figure whose square is a number, too: statistics are made of it. Throws InputError.
+double figure_of(const std::string& key, const json& value) {
+  constexpr double kMost = 1e100;
+  const auto number = value.get<double>();
+  if (std::abs(number) <= kMost) return number;
+  throw InputError(fmt::format("{}: {} is no figure of a run", key, number));
+}
+
 std::optional<double> number_in(const json& object, const char* key) {
   const auto found = object.find(key);
   if (found == object.end() || !found->is_number()) return std::nullopt;
-  return found->get<double>();
+  return figure_of(key, *found);
+}
+
+/// Throws InputError if it is no number of collisions.
+std::int64_t collisions_of(double number) {
+  constexpr std::int64_t kMost = 1'000'000'000'000;
+  if (const auto count = whole_number<std::int64_t>(number, 0, kMost)) return *count;
+  throw InputError(fmt::format("collisions: {} is no number of them", number));
+}
+
+/// Runs `read`; what is wrong is said of the file.
+template <class Read>
+void in_file(const std::string& path, const Read& read) {
+  try {
+    read();
+  } catch (const InputError& problem) {
+    throw InputError(fmt::format("{}: {}", path, problem.what()));
+  }
 }
 
 /// Takes `value` if there is none yet or it is farther out.
@@ -65,7 +92,7 @@ void read_summary(const json& summary, RunRecord& record) {
   for (const json& vehicle : *vehicles) {
     if (!vehicle.is_object()) continue;
     if (const auto collisions = number_in(vehicle, "collisions")) {
-      record.collisions = record.collisions.value_or(0) + static_cast<std::int64_t>(*collisions);
+      record.collisions = record.collisions.value_or(0) + collisions_of(*collisions);
     }
     if (const auto distance = number_in(vehicle, "distance_flown")) {
       record.distance_flown = record.distance_flown.value_or(0.0) + *distance;
@@ -86,7 +113,7 @@ void take_figure(const std::string& name, double value, RunRecord& record) {
   };
   if (name == "collisions") {
     if (record.collisions) has_already();
-    record.collisions = static_cast<std::int64_t>(value);
+    record.collisions = collisions_of(value);
     return;
   }
   for (const SummaryFigure& figure : kSummaryFigures) {
@@ -128,7 +155,8 @@ RunRecord parse_record(std::string_view text, const std::string& name) {
                                    std::end(kStatuses),
                                    [&](const auto& row) { return row.name == word; });
   if (found == std::end(kStatuses)) {
-    throw InputError(fmt::format("{}: is no result of a run; remove its folder", name));
+    throw InputError(
+        fmt::format("{}: is no result of a run; remove its folder, and it is flown again", name));
   }
   record.status = found->value;
   for (const auto& [key, to] :
@@ -136,29 +164,33 @@ RunRecord parse_record(std::string_view text, const std::string& name) {
     const auto at = value.find(key);
     if (at != value.end() && at->is_string()) *to = at->get<std::string>();
   }
-  record.wall_seconds = number_in(value, "wall_seconds").value_or(0.0);
-  if (const auto collisions = number_in(value, "collisions")) {
-    record.collisions = static_cast<std::int64_t>(*collisions);
-  }
-  for (const SummaryFigure& figure : kSummaryFigures) {
-    record.*figure.value = number_in(value, figure.name);
-  }
-  record.real_time_factor = number_in(value, "real_time_factor");
-  const auto figures = value.find("figures");
-  if (figures != value.end() && figures->is_object()) {
-    for (const auto& [key, number] : figures->items()) {
-      if (number.is_number()) record.figures[key] = number.get<double>();
+  in_file(name, [&] {
+    record.wall_seconds = number_in(value, "wall_seconds").value_or(0.0);
+    if (const auto collisions = number_in(value, "collisions")) {
+      record.collisions = collisions_of(*collisions);
     }
-  }
+    for (const SummaryFigure& figure : kSummaryFigures) {
+      record.*figure.value = number_in(value, figure.name);
+    }
+    record.real_time_factor = number_in(value, "real_time_factor");
+    const auto figures = value.find("figures");
+    if (figures == value.end() || !figures->is_object()) return;
+    for (const auto& [key, number] : figures->items()) {
+      if (number.is_number()) record.figures[key] = figure_of(key, number);
+    }
+  });
   return record;
 }
 
 void read_results(const std::string& folder, const std::string& figures, RunRecord& record) {
-  if (const auto summary = read_json(fs::path(folder) / "summary.json")) {
-    read_summary(*summary, record);
+  const fs::path summary_path = fs::path(folder) / "summary.json";
+  if (const auto summary = read_json(summary_path)) {
+    in_file(summary_path.string(), [&] { read_summary(*summary, record); });
   }
-  if (const auto timing = read_json(fs::path(folder) / "timing.json")) {
-    record.real_time_factor = number_in(*timing, "real_time_factor");
+  const fs::path timing_path = fs::path(folder) / "timing.json";
+  if (const auto timing = read_json(timing_path)) {
+    in_file(timing_path.string(),
+            [&] { record.real_time_factor = number_in(*timing, "real_time_factor"); });
   }
   if (figures.empty()) return;
   const fs::path path = fs::path(folder) / figures;
@@ -168,11 +200,8 @@ void read_results(const std::string& folder, const std::string& figures, RunReco
     if (!value.is_number()) {
       throw InputError(fmt::format("{}: {}: figures are numbers", path.string(), key));
     }
-    try {
-      take_figure(key, value.get<double>(), record);
-    } catch (const InputError& problem) {
-      throw InputError(fmt::format("{}: {}", path.string(), problem.what()));
-    }
+    in_file(path.string(),
+            [&, &key = key, &value = value] { take_figure(key, figure_of(key, value), record); });
   }
 }
 

@@ -230,7 +230,9 @@ Condition::Condition(std::string text) : text_(std::move(text)) {
   comparison_ = text_.substr(at, end - at);
   const bool is_known = comparison_ == "<" || comparison_ == "<=" || comparison_ == ">" ||
                         comparison_ == ">=" || comparison_ == "==";
-  if (!is_known || !parse_number(trimmed(text_.substr(end)), limit_)) refuse(text_);
+  if (!is_known || !parse_number(trimmed(text_.substr(end)), limit_) || !std::isfinite(limit_)) {
+    refuse(text_);
+  }
   const std::string left = trimmed(text_.substr(0, at));
   for (const Named<Counted>& row : kCounted) {
     if (left == row.name) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <thread>
 
+#include "pointflight/core/argument.hpp"
 #include "pointflight/core/mapped_file.hpp"
 
 #ifdef POINTFLIGHT_HAS_TBB
@@ -13,6 +14,7 @@
 #else
 #include <atomic>
 #include <exception>
+#include <system_error>
 #include <vector>
 #endif
 
@@ -36,6 +38,7 @@ Executor::Executor(int threads)
 void Executor::parallel_for(std::size_t count,
                             std::size_t chunk,
                             const std::function<void(std::size_t, std::size_t)>& body) const {
+  require_argument(chunk > 0, "parallel_for: a chunk has at least one");
   const std::size_t chunks = (count + chunk - 1) / chunk;
   const auto run_chunk = [&](std::size_t i) { body(i * chunk, std::min(count, (i + 1) * chunk)); };
   if (threads_ == 1 || chunks <= 1) {
@@ -57,6 +60,7 @@ Executor::Executor(int threads)
 void Executor::parallel_for(std::size_t count,
                             std::size_t chunk,
                             const std::function<void(std::size_t, std::size_t)>& body) const {
+  require_argument(chunk > 0, "parallel_for: a chunk has at least one");
   const std::size_t chunks = (count + chunk - 1) / chunk;
   std::atomic<std::size_t> next{0};
   std::atomic<bool> failed{false};
@@ -72,8 +76,11 @@ void Executor::parallel_for(std::size_t count,
   };
   {
     std::vector<std::jthread> workers;
-    for (int i = 1; i < threads_ && static_cast<std::size_t>(i) < chunks; ++i) {
-      workers.emplace_back(work);
+    try {
+      for (int i = 1; i < threads_ && static_cast<std::size_t>(i) < chunks; ++i) {
+        workers.emplace_back(work);
+      }
+    } catch (const std::system_error&) {  // NOLINT(bugprone-empty-catch): fewer do it as well
     }
     work();
   }

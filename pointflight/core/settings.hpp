@@ -117,6 +117,10 @@ class SettingsVisitor {
     value = name == none ? std::nullopt : std::optional<Choice<Row>>(name);
   }
 
+  /// What makes sense only beside keys that were described before: readers and checkers throw
+  /// InputError at the key unless it is `fine`. `what` goes on after its name: "is not above min".
+  virtual void require(std::string_view /*name*/, bool /*fine*/, std::string_view /*what*/) {}
+
   /// A key that belongs to another program: any content is accepted and kept as YAML.
   virtual void leave_as_is(std::string_view /*name*/, std::string& /*yaml*/) {}
 
@@ -223,6 +227,7 @@ class SettingsReader : public SettingsVisitor {
   /// "lidars[0].model"; for messages about values that only make sense together.
   [[nodiscard]] const std::map<std::string, int>& lines() const { return lines_; }
 
+  void require(std::string_view name, bool fine, std::string_view what) override;
   void leave_as_is(std::string_view name, std::string& yaml) override;
   void value(const Key& key, double& value) override;
   void value(const Key& key, std::int64_t& value) override;
@@ -261,6 +266,7 @@ class SettingsChecker : public SettingsVisitor {
   /// `name` stands for the path in messages.
   explicit SettingsChecker(std::string name) : name_(std::move(name)) {}
 
+  void require(std::string_view name, bool fine, std::string_view what) override;
   void value(const Key& key, double& value) override;
   void value(const Key& key, std::int64_t& value) override;
   void value(const Key& key, bool& value) override;

@@ -9,6 +9,10 @@
 
 namespace pointflight {
 
+void SettingsChecker::require(std::string_view name, bool fine, std::string_view what) {
+  if (!fine) fail(Key{name, {}, {}}, std::string(what));
+}
+
 void SettingsChecker::fail(const Key& key, const std::string& what) const {
   std::string path;
   for (const std::string& part : path_) {

@@ -142,12 +142,17 @@ struct SettingsReader::Document {
   void parse(std::string_view text) {
     YAML::Node root;
     try {
-      root = YAML::Load(std::string(text));
+      const std::vector<YAML::Node> documents = YAML::LoadAll(std::string(text));
+      if (documents.size() > 1) {
+        throw InputError(fmt::format("{}: a second document (---) begins; a file has one",
+                                     location(documents[1])));
+      }
+      if (!documents.empty()) root = documents[0];
     } catch (const YAML::Exception& error) {
       throw InputError(fmt::format(
           "{}:{}: not valid YAML: {}", name, std::max(0, error.mark.line) + 1, error.msg));
     }
-    if (!root.IsMap()) {
+    if (!root.IsDefined() || !root.IsMap()) {
       throw InputError(fmt::format("{}: expected `key: value` lines at the top level", name));
     }
     push(root, "");
@@ -241,6 +246,14 @@ SettingsReader::~SettingsReader() = default;
 bool SettingsReader::has(std::string_view name) const {
   const YAML::Node& parent = document_->levels.back().node;
   return parent[std::string(name)].IsDefined();
+}
+
+void SettingsReader::require(std::string_view name, bool fine, std::string_view what) {
+  if (fine) return;
+  const Document::Level& level = document_->levels.back();
+  const YAML::Node given = level.node[std::string(name)];
+  document_->fail(
+      given.IsDefined() ? given : level.node, level.path + std::string(name), std::string(what));
 }
 
 void SettingsReader::leave_as_is(std::string_view name, std::string& yaml) {

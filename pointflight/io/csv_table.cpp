@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <limits>
 
 #include "pointflight/core/input_error.hpp"
@@ -45,7 +46,12 @@ void CsvTable::parse(std::string_view text) {
     if (unquoted(line).empty() || unquoted(line).front() == '#') continue;
     const auto cells = cells_of(line);
     if (names_.empty()) {
-      for (const std::string_view cell : cells) names_.push_back(lower_case(cell));
+      for (const std::string_view cell : cells) {
+        names_.push_back(lower_case(cell));
+        if (std::count(names_.begin(), names_.end(), names_.back()) == 1) continue;
+        throw InputError(fmt::format(
+            "{}:{}: two columns are called '{}'", name_, lines.number(), excerpt(names_.back())));
+      }
       continue;
     }
     if (cells.size() != names_.size()) {

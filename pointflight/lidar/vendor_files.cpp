@@ -101,8 +101,9 @@ std::pair<std::int64_t, double> mode_of(const Metadata& metadata) {
     const char* begin = mode.data();
     const auto first = std::from_chars(begin, begin + cross, columns);
     const auto second = std::from_chars(begin + cross + 1, begin + mode.size(), turns);
-    if (first.ec == std::errc() && second.ec == std::errc() && columns > 0 && turns > 0 &&
-        columns <= 65536 && turns <= 1000) {
+    const bool is_read = first.ec == std::errc() && first.ptr == begin + cross &&
+                         second.ec == std::errc() && second.ptr == begin + mode.size();
+    if (is_read && columns > 0 && turns > 0 && columns <= 65536 && turns <= 1000) {
       return {columns, static_cast<double>(turns)};
     }
   }

@@ -17,6 +17,9 @@ namespace {
 
 constexpr std::size_t kChecksumAt = kMapHeaderSize - 8;
 
+/// Of any coordinate, m.
+constexpr double kFarthest = 1e9;
+
 std::size_t aligned(std::size_t offset) {
   return (offset + kMapAlignment - 1) / kMapAlignment * kMapAlignment;
 }
@@ -34,10 +37,6 @@ bool is_known(std::string_view name) {
          std::end(kMapSectionNames);
 }
 
-std::string_view name_of(const MapSection& section) {
-  return {section.name, strnlen(section.name, sizeof section.name)};
-}
-
 MapSection section_named(std::string_view name) {
   MapSection section{};
   require_argument(!name.empty() && name.size() <= sizeof section.name,
@@ -51,8 +50,11 @@ bool is_sane(const MapProperties& p) {
   const auto within = [](double value, double min, double max) {
     return value >= min && value <= max;
   };
-  const bool is_finite = p.origin_world.allFinite() && std::isfinite(p.intensity_offset) &&
-                         std::isfinite(p.intensity_step);
+  const auto is_position = [](const Vector3d& v) { return (v.array().abs() <= kFarthest).all(); };
+  const Aabb& box = p.bounds_world;
+  const bool is_box = is_position(box.min) && is_position(box.max) && !box.empty();
+  const bool is_finite = is_position(p.origin_world) && (is_box || p.surfel_count == 0) &&
+                         std::isfinite(p.intensity_offset) && std::isfinite(p.intensity_step);
   return is_finite && within(p.resolution, kMinResolution, kMaxResolution) &&
          within(static_cast<double>(p.model.support), 1.0, 10.0) &&
          within(static_cast<double>(p.model.tau), 0.01, 1.0) &&
@@ -200,12 +202,12 @@ void check_sections(std::span<const MapSection> sections,
                     const Fail& fail) {
   for (std::size_t i = 0; i < sections.size(); ++i) {
     const MapSection& s = sections[i];
-    const std::string_view section = name_of(s);
+    const std::string_view section = section_name(s);
     const std::size_t element = section == "nodes"   ? sizeof(Bvh8Node)
                                 : section == "words" ? sizeof(SurfelWord)
                                                      : 1;
     for (std::size_t k = 0; k < i; ++k) {
-      if (name_of(sections[k]) == section) {
+      if (section_name(sections[k]) == section) {
         fail(sizeof(MapHeader), fmt::format("two sections are called '{}'", excerpt(section)));
       }
     }
@@ -350,7 +352,7 @@ void SurfelMap::attach(std::span<const std::byte> bytes, const std::string& name
 
 std::span<const std::byte> SurfelMap::section(std::string_view name) const {
   for (const MapSection& s : sections_) {
-    if (name_of(s) == name) return bytes_.subspan(s.offset, s.size);
+    if (section_name(s) == name) return bytes_.subspan(s.offset, s.size);
   }
   return {};
 }
@@ -372,53 +374,16 @@ std::string SurfelMap::hash() const {
     if (name == "metadata") continue;  // names of files and options
     as_v1 = {offset, 0, hash64(std::span<const std::byte>{})};
     for (const MapSection& s : sections_) {
-      if (name_of(s) == name) as_v1 = {offset, s.size, s.checksum};
+      if (section_name(s) == name) as_v1 = {offset, s.size, s.checksum};
     }
     offset = aligned(offset + as_v1.size);
   }
   for (const MapSection& s : sections_) {
-    if (is_known(name_of(s))) continue;
+    if (is_known(section_name(s))) continue;
     others += hash64(std::as_bytes(std::span(s.name))) ^ s.checksum;
   }
   const std::uint64_t hash = hash64(std::as_bytes(std::span(&known, 1)));
   return fmt::format("{:016x}", others == 0 ? hash : hash ^ others);
-}
-
-void SurfelMap::verify() const {
-  const auto fail = [&](std::string_view section, const std::string& what) {
-    throw InputError(
-        fmt::format("{}: section '{}': {}; import the cloud again", name_, excerpt(section), what));
-  };
-  for (const MapSection& s : sections_) {
-    if (hash64(bytes_.subspan(s.offset, s.size)) != s.checksum) {
-      fail(name_of(s),
-           fmt::format("the checksum of its {} bytes at {} does not match", s.size, s.offset));
-    }
-  }
-  const std::size_t usable_words = words_.size() - kLeafPadding;
-  for (std::size_t n = 0; n < nodes_.size(); ++n) {
-    const Bvh8Node& node = nodes_[n];
-    std::size_t inner = node.first_inner;
-    std::size_t word = node.first_leaf_word;
-    for (const std::uint8_t meta : node.meta) {
-      if (meta == Bvh8Node::kInner) {
-        if (inner <= n || inner >= nodes_.size()) {
-          fail("nodes", fmt::format("node {} points to node {}", n, inner));
-        }
-        ++inner;
-      } else if (meta > 8) {
-        fail("nodes", fmt::format("node {} has a child of kind {}", n, meta));
-      } else if (meta > 0) {
-        if (word + meta >= usable_words || decode_leaf(words_[word]).count != meta) {
-          fail("words", fmt::format("node {} points to a leaf at word {}", n, word));
-        }
-        word += meta + 1u;
-      }
-    }
-    if (!std::isfinite(node.scale) || !(node.scale > 0.0f)) {
-      fail("nodes", fmt::format("node {} has no size", n));
-    }
-  }
 }
 
 }  // namespace pointflight

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <memory>
 #include <optional>
 #include <span>
@@ -42,6 +43,10 @@ struct MapSection {
   std::uint64_t size;      ///< Bytes.
   std::uint64_t checksum;  ///< XXH3-64 of the bytes.
 };
+/// Its name without the zeros behind it.
+inline std::string_view section_name(const MapSection& section) {
+  return {section.name, strnlen(section.name, sizeof section.name)};
+}
 
 /// Name of the section that says what reflectivity an intensity stands for.
 inline constexpr char kReflectivitySection[] = "reflectivity";

@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <cstring>
 #include <exception>
+#include <new>
 #include <span>
 
 #include "pointflight/core/constants.hpp"
@@ -73,6 +74,12 @@ Canvas::Canvas(int width, int height, Color background, bool keeps_strokes)
       surface_(keeps_strokes ? recording_surface(width, height)
                              : cairo_image_surface_create(CAIRO_FORMAT_RGB24, width, height)),
       cr_(cairo_create(surface_)) {
+  // cairo goes on with surfaces that have no pixels where it gets no memory
+  if (cairo_status(cr_) != CAIRO_STATUS_SUCCESS) {
+    cairo_destroy(cr_);
+    cairo_surface_destroy(surface_);
+    throw std::bad_alloc();
+  }
   color(background);
   cairo_paint(cr_);
   cairo_select_font_face(cr_, "sans", CAIRO_FONT_SLANT_NORMAL, CAIRO_FONT_WEIGHT_NORMAL);
@@ -213,6 +220,7 @@ std::string Canvas::svg() const {
 
 void Canvas::begin_pixels() {
   cairo_surface_flush(surface_);
+  if (cairo_image_surface_get_data(surface_) == nullptr) throw std::bad_alloc();
 }
 void Canvas::end_pixels() {
   cairo_surface_mark_dirty(surface_);

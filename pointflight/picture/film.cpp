@@ -116,15 +116,24 @@ class Camera {
   std::optional<Vector3d> place_;
 };
 
+/// Throws InputError if the folder has no such vehicle.
+std::size_t vehicle_to_follow(const RunDescription& run, std::optional<std::size_t> wanted) {
+  std::vector<std::string> there;
+  for (std::size_t v = 0; v < run.vehicles.size(); ++v) {
+    if (!run.vehicles[v].own) continue;
+    if (!wanted || *wanted == v) return v;
+    there.push_back(fmt::format("{}", v));
+  }
+  if (there.empty()) throw InputError("the folder has no flight of a vehicle; nothing to film");
+  throw InputError(
+      fmt::format("--follow {}: the folder has vehicle {}", *wanted, fmt::join(there, ", ")));
+}
+
 }  // namespace
 
 std::size_t film_run(RecordedRun& run, const FilmOptions& options, const Progress& progress) {
   const RunDescription& description = run.description();
-  if (options.vehicle >= description.vehicles.size()) {
-    throw InputError(fmt::format("--follow {}: the run has {} vehicles, counted from 0",
-                                 options.vehicle,
-                                 description.vehicles.size()));
-  }
+  const std::size_t followed = vehicle_to_follow(description, options.vehicle);
   const SurfelMap& map = *description.map;
   const MapLayers layers(map);
   const double low = layers.box().min.z();
@@ -139,11 +148,11 @@ std::size_t film_run(RecordedRun& run, const FilmOptions& options, const Progres
   const double end = to_seconds(run.end());
   for (SimTime time; time <= run.end(); time += run.step()) {
     run.play_step(time, filmed);
-    const auto& pose = filmed.pose(options.vehicle);
+    const auto& pose = filmed.pose(followed);
     if (!pose || to_seconds(time) * options.rate < static_cast<double>(pictures)) continue;
     way.push_back(pose->translation);
     const std::vector<Body> bodies = filmed.bodies();
-    const Eye eye = camera.follow(*pose, filmed.speed(options.vehicle), 1.0 / options.rate);
+    const Eye eye = camera.follow(*pose, filmed.speed(followed), 1.0 / options.rate);
     // under a ceiling the eye is, too
     const Perspective view(
         map, eye, std::numeric_limits<double>::infinity(), frame, {bodies, time});
@@ -157,13 +166,13 @@ std::size_t film_run(RecordedRun& run, const FilmOptions& options, const Progres
     for (const Vector3d& p : filmed.measured()) {
       if (const auto at = view.visible(p)) canvas.dot(at->first, at->second, 1.3, kMeasured, 0.7);
     }
-    view.draw_path(canvas, way, vehicle_color(options.vehicle));
+    view.draw_path(canvas, way, vehicle_color(followed));
     canvas.text(16.0,
                 options.height - 16.0,
                 fmt::format("{}   {:.1f} s   {:.1f} m/s",
-                            description.vehicles[options.vehicle].setup.name,
+                            description.vehicles[followed].setup.name,
                             to_seconds(time),
-                            filmed.speed(options.vehicle).norm()),
+                            filmed.speed(followed).norm()),
                 kTitleText,
                 kPaper);
     canvas.save((fs::path(options.frames) / fmt::format("{:06}.png", pictures)).string());

@@ -57,6 +57,7 @@ MapLayers::MapLayers(const SurfelMap& map) {
   const Vector3d size = bounds.empty() ? Vector3d(1, 1, 1) : bounds.size();
   if (!bounds.empty()) low_ = bounds.min;
   cell_ = std::max({0.5, 4.0 * map.resolution(), std::sqrt(size.x() * size.y() / kCellsMost)});
+  while ((size.x() / cell_ + 1.0) * (size.y() / cell_ + 1.0) > 2.0 * kCellsMost) cell_ *= 1.25;
   columns_ = static_cast<std::size_t>(size.x() / cell_) + 1;
   rows_ = static_cast<std::size_t>(size.y() / cell_) + 1;
   find_box(map);

@@ -35,12 +35,12 @@ M decoded(Wire wire, const Recorded& message, const std::string& recording, bool
 }
 
 /// Without its package: "PointCloud2".
-std::string_view short_type(const std::string& type) {
+std::string_view short_type(std::string_view type) {
   const std::size_t slash = type.rfind('/');
-  return std::string_view(type).substr(slash == std::string::npos ? 0 : slash + 1);
+  return type.substr(slash == std::string::npos ? 0 : slash + 1);
 }
 
-bool is_cloud(const std::string& type) {
+bool is_cloud(std::string_view type) {
   return short_type(type) == "PointCloud2" || short_type(type) == "CustomMsg";
 }
 
@@ -148,9 +148,11 @@ void RecordingContents::add_pose(const std::string& topic,
 
 void RecordingContents::add(Wire wire, const Recorded& message, const std::string& recording) {
   const std::string_view type = short_type(message.type);
-  if (excerpt(message.topic, kLongest) != message.topic) return;  // no name that a topic can have
+  // no name that a topic can have
+  if (message.topic.size() > kLongest || excerpt(message.topic, kLongest) != message.topic) return;
+  const std::string topic(message.topic);
   if (is_cloud(message.type)) {
-    Clouds& all = clouds[message.topic];
+    Clouds& all = clouds[topic];
     if (all.times.empty()) {
       const StampedCloud first = cloud_in(wire, message, recording);
       all.frame = first.frame;
@@ -160,10 +162,10 @@ void RecordingContents::add(Wire wire, const Recorded& message, const std::strin
   } else if (type == "Odometry") {
     const auto m = decoded<msg::Odometry>(wire, message, recording);
     const msg::Pose& pose = m.pose.pose;
-    add_pose(message.topic, m.header, m.child_frame_id, pose_in(pose.position, pose.orientation));
+    add_pose(topic, m.header, m.child_frame_id, pose_in(pose.position, pose.orientation));
   } else if (type == "PoseStamped") {
     const auto m = decoded<msg::PoseStamped>(wire, message, recording);
-    add_pose(message.topic, m.header, "", pose_in(m.pose.position, m.pose.orientation));
+    add_pose(topic, m.header, "", pose_in(m.pose.position, m.pose.orientation));
   } else if (type == "TFMessage" && message.topic.ends_with("tf_static")) {
     for (const auto& t : decoded<msg::TFMessage>(wire, message, recording).transforms) {
       const std::string child = frame_of(t.child_frame_id);

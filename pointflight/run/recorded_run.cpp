@@ -16,7 +16,7 @@
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/geometry/rotation.hpp"
 #include "pointflight/io/csv_table.hpp"
-#include "pointflight/run/internal/run_files.hpp"
+#include "pointflight/run/run_files.hpp"
 #include "pointflight/sim/flight_recorder.hpp"
 
 namespace pointflight {
@@ -50,8 +50,11 @@ struct RecordedRun::Files {
         end(ended_at(fs::path(folder) / "summary.json")) {
     const auto flown_elsewhere = vehicles_of_others(fs::path(folder) / "summary.json");
     for (std::size_t v = 0; v < simulation.vehicle_count(); ++v) {
-      const fs::path own = fs::path(folder) / description.vehicles[v].setup.name;
-      description.vehicles[v].own = !flown_elsewhere.contains(description.vehicles[v].setup.name);
+      const std::string& name = description.vehicles[v].setup.name;
+      const fs::path own = fs::path(folder) / name;
+      // users put folders of a shared run's processes together
+      description.vehicles[v].own =
+          !flown_elsewhere.contains(name) || fs::is_regular_file(own / "trajectory.csv");
       if (!description.vehicles[v].own) continue;
       add_vehicle(v, simulation.vehicle_count() == 1 ? fs::path(folder) : own);
     }
@@ -133,7 +136,7 @@ struct RecordedRun::Files {
       }
       poses.push_back({time, body_at(*t, row, 1).T_world_body()});
     }
-    tracks.emplace_back(std::move(poses));
+    tracks.emplace(v, std::move(poses));
     add_rows(t, 0, kStateRank, v, [v, rotors](const CsvTable& table, std::size_t row) {
       StateSample sample;
       sample.vehicle = static_cast<std::uint32_t>(v);
@@ -204,44 +207,39 @@ struct RecordedRun::Files {
 
   /// As it was written, where a state was.
   [[nodiscard]] Quaterniond rotation_of(std::size_t v, SimTime time) const {
-    const auto records = tracks[v].records();
+    const PoseTrack& track = tracks.at(v);
+    const auto records = track.records();
     const auto at =
         std::lower_bound(records.begin(), records.end(), time, [](const TimedPose& r, SimTime t) {
           return r.time < t;
         });
     const bool written = at != records.end() && at->time == time;
-    return written ? at->pose.rotation : tracks[v].at(time).rotation;
+    return written ? at->pose.rotation : track.at(time).rotation;
   }
 
   void add_scans(std::size_t v, const fs::path& folder) {
     const VehicleAgent& agent = simulation.vehicle(v);
     const std::size_t before = agent.sensors().size() - agent.lidars().size();
-    const std::string table = (folder / "scans.csv").string();
-    const auto rows = words_of(table);
-    if (rows.empty()) return;
+    const std::string path = (folder / "scans.csv").string();
     const Folder own(folder.string());
-    for (const auto& words : rows) {
-      if (words.size() < 6) throw InputError(fmt::format("{}: a row is cut off", table));
+    for (WordTable rows(path, 6); rows.next();) {
       Scan scan;
       scan.vehicle = static_cast<std::uint32_t>(v);
-      scan.sensor = static_cast<std::uint32_t>(count_in(words[1], table));
-      scan.index = count_in(words[2], table);
-      scan.start = time_in(words[3], table);
-      scan.end = time_in(words[4], table);
-      scan.beams = count_in(words[5], table);
-      if (scan.sensor >= agent.lidars().size()) {
-        throw InputError(fmt::format("{}: the scenario has no lidar {}", table, scan.sensor));
-      }
-      const std::string path = file_of_run(own, words[0], table);
-      add(Phase::kArrears, scan.end, before + scan.sensor, v, true, [this, scan, path] {
-        return with_points(scan, path);
+      scan.sensor = rows.index(rows.word(1), agent.lidars().size(), "lidar");
+      scan.index = rows.count(2);
+      scan.start = rows.time(3);
+      scan.end = rows.time(4);
+      scan.beams = rows.count(5);
+      const std::string points = file_of_run(own, std::string(rows.word(0)), path);
+      add(Phase::kArrears, scan.end, before + scan.sensor, v, true, [this, scan, points] {
+        return with_points(scan, points);
       });
     }
   }
 
   [[nodiscard]] Sample with_points(Scan scan, const std::string& path) const {
     const MountedLidar& mounted = *simulation.vehicle(scan.vehicle).lidars()[scan.sensor];
-    const PoseTrack track = tracks[scan.vehicle].with_mount(mounted.T_body_sensor());
+    const PoseTrack track = tracks.at(scan.vehicle).with_mount(mounted.T_body_sensor());
     const std::vector<Beam> beams = mounted.beams_of(scan.index, executor);
     scan.snapshot = mounted.takes_snapshots();
     scan.marks = mounted.marks();
@@ -251,41 +249,48 @@ struct RecordedRun::Files {
   }
 
   void add_events(const std::string& path) {
-    std::map<std::string, std::uint32_t> numbers;
+    std::map<std::string, std::uint32_t, std::less<>> numbers;
     for (std::size_t v = 0; v < simulation.vehicle_count(); ++v) {
       numbers[description.vehicles[v].setup.name] = static_cast<std::uint32_t>(v);
     }
-    for (const auto& words : words_of(path)) {
-      if (words.size() < 11 || !numbers.contains(words[2])) {
-        throw InputError(fmt::format("{}: a row is cut off, or of an unknown vehicle", path));
+    for (WordTable rows(path, 11); rows.next();) {
+      const auto vehicle = numbers.find(rows.word(2));
+      if (vehicle == numbers.end()) {
+        throw InputError(
+            fmt::format("{}: the scenario has no vehicle '{}'", rows.at(), excerpt(rows.word(2))));
       }
-      const auto value = [&](std::size_t i) { return number_in(words[i], path); };
-      const SimTime time = time_in(words[0], path);
-      const std::uint32_t v = numbers[words[2]];
-      const Vector3d here(value(4), value(5), value(6));
-      if (!words[1].starts_with("collision")) {
+      const std::string_view kind = rows.word(1);
+      const std::string_view partner = rows.word(3);
+      std::optional<Label> other;
+      if (const auto found = numbers.find(partner); found != numbers.end()) {
+        other = kFirstVehicle + found->second;
+      }
+      const SimTime time = rows.time(0);
+      const std::uint32_t v = vehicle->second;
+      if (!kind.starts_with("collision")) {
         VehicleEvent event;
         event.vehicle = v;
         event.time = time;
-        event.kind = words[1];
-        event.vehicle_world = here;
-        if (numbers.contains(words[3])) event.partner = kFirstVehicle + numbers[words[3]];
-        if (event.partner) event.penetration = value(10);
+        event.kind = kind;
+        event.vehicle_world = rows.position(4);
+        event.partner = other;
+        if (event.partner) event.penetration = rows.number(10);
         add(Phase::kSamples, time, kEventRank, v, true, [event] { return Sample(event); });
         continue;
       }
       CollisionEvent event;
       event.vehicle = v;
-      if (words[3].starts_with("obstacle ")) {
-        event.partner = kFirstObstacle + static_cast<Label>(count_in(words[3].substr(9), path));
-      } else if (numbers.contains(words[3])) {
-        event.partner = kFirstVehicle + numbers[words[3]];
+      if (partner.starts_with("obstacle ")) {
+        event.partner =
+            kFirstObstacle + rows.index(partner.substr(9), simulation.obstacle_count(), "obstacle");
+      } else if (other) {
+        event.partner = *other;
       }
       event.time = time;
-      event.entered = words[1] == "collision";
-      event.vehicle_world = here;
-      event.position_world = {value(7), value(8), value(9)};
-      event.penetration = value(10);
+      event.entered = kind == "collision";
+      event.vehicle_world = rows.position(4);
+      event.position_world = rows.position(7);
+      event.penetration = rows.number(10);
       add(Phase::kSamples, time, kCollisionRank, v, true, [event] { return Sample(event); });
     }
   }
@@ -303,7 +308,7 @@ struct RecordedRun::Files {
         sample.time = time;
         for (std::size_t i = row; i < last; ++i) {
           const Label label = label_at(*t, i, 1);
-          const Pose pose{rotation_at(*t, i, 5), vector_at(*t, i, 2)};
+          const Pose pose{rotation_at(*t, i, 5), position_at(*t, i, 2)};
           sample.obstacles.push_back({label, pose, shapes[label]});
         }
         return Sample(sample);
@@ -318,8 +323,8 @@ struct RecordedRun::Files {
   RunDescription description;
   Duration step;
   SimTime end;
-  std::deque<CsvTable> tables;    ///< Stay where they are.
-  std::vector<PoseTrack> tracks;  ///< Of each vehicle, by the states that the run wrote.
+  std::deque<CsvTable> tables;              ///< Stay where they are.
+  std::map<std::size_t, PoseTrack> tracks;  ///< By the states that the run wrote of a vehicle.
   std::vector<Entry> entries;
   std::size_t next = 0;
 };

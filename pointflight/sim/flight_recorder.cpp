@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "pointflight/core/argument.hpp"
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/sim/interrupted_run.hpp"
 #include "pointflight/sim/run_summary.hpp"
@@ -168,12 +169,19 @@ std::string FlightRecorder::path_for(const std::string& name) {
   return folder_.file(name);
 }
 
+FlightRecorder::VehicleFiles& FlightRecorder::files_of(std::uint32_t vehicle) const {
+  require_argument(vehicle < vehicles_.size() && vehicles_[vehicle],
+                   "FlightRecorder: a sample of a vehicle that does not fly in its run");
+  return *vehicles_[vehicle];
+}
+
 void FlightRecorder::on_sample(const Sample& sample) {
+  if (is_finished_) throw std::logic_error("FlightRecorder: a sample after finish()");
   std::visit([this](const auto& s) { write(s); }, sample);
 }
 
 void FlightRecorder::write(const StateSample& sample) {
-  VehicleFiles& files = *vehicles_[sample.vehicle];
+  VehicleFiles& files = files_of(sample.vehicle);
   const RigidBodyState& b = sample.state.body;
   const Quaterniond& q = b.q_world_body;
   const std::string time = seconds(sample.time);
@@ -208,7 +216,7 @@ void FlightRecorder::keep_up(VehicleFiles& files, const StateSample& sample) {
 }
 
 void FlightRecorder::write(const OdometrySample& sample) {
-  VehicleFiles& files = *vehicles_[sample.vehicle];
+  VehicleFiles& files = files_of(sample.vehicle);
   if (!files.odometry) return;
   files.odometry->write(fmt::format(
       "{},{},{}", seconds(sample.time), seconds(sample.delivered), row_of(sample.state)));
@@ -216,18 +224,18 @@ void FlightRecorder::write(const OdometrySample& sample) {
 }
 
 void FlightRecorder::write(const ImuSample& sample) {
-  auto& imu = vehicles_[sample.vehicle]->imu;
+  VehicleFiles& files = files_of(sample.vehicle);
+  auto& imu = files.imu;
   if (!imu) return;
   imu->write(fmt::format("{},{},{}", seconds(sample.time), csv(sample.gyro), csv(sample.accel)));
-  imu->write(vehicles_[sample.vehicle]->stamps_imu ? fmt::format(",{}\n", seconds(sample.stamp))
-                                                   : std::string("\n"));
+  imu->write(files.stamps_imu ? fmt::format(",{}\n", seconds(sample.stamp)) : std::string("\n"));
 }
 
 /// One row; its file begins with the kind's columns.
 void FlightRecorder::write(const Measurement& sample) {
   std::string row = fmt::format("{},{}", seconds(sample.time), seconds(sample.delivered));
   for (const double value : sample.values) row += fmt::format(",{}", value);
-  auto& files = vehicles_[sample.vehicle]->sensors;
+  auto& files = files_of(sample.vehicle).sensors;
   const auto file = files.find(sample.sensor);
   if (file == files.end()) {
     throw std::invalid_argument(fmt::format(
@@ -239,7 +247,7 @@ void FlightRecorder::write(const Measurement& sample) {
 void FlightRecorder::write(const ScanSample& sample) {
   if (!write_scans_) return;
   const Scan& scan = *sample.scan;
-  VehicleFiles& files = *vehicles_[scan.vehicle];
+  VehicleFiles& files = files_of(scan.vehicle);
   const std::string name = fmt::format("scans/{}_{:06}.pcd", scan.sensor, scan.index);
   write_scan_pcd(folder_.file(files.folder + name), scan);
   // T_world_sensor in the middle of the scan
@@ -268,7 +276,7 @@ void FlightRecorder::write(const CollisionEvent& event) {
   events_.write(fmt::format("{},{},{},{},{},{},{}\n",
                             seconds(event.time),
                             event.entered ? "collision" : "collision_end",
-                            names_[event.vehicle],
+                            names_.at(event.vehicle),
                             partner_name(event.partner),
                             csv(event.vehicle_world),
                             csv(event.position_world),
@@ -280,7 +288,7 @@ void FlightRecorder::write(const VehicleEvent& event) {
   events_.write(fmt::format("{},{},{},{},{},,,,{}\n",
                             seconds(event.time),
                             event.kind,
-                            names_[event.vehicle],
+                            names_.at(event.vehicle),
                             event.partner ? partner_name(*event.partner) : "",
                             csv(event.vehicle_world),
                             event.partner ? fmt::format("{}", event.penetration) : ""));
@@ -303,6 +311,13 @@ void FlightRecorder::write(const ObstacleSample& sample) {
 }
 
 void FlightRecorder::finish(const Simulation& simulation) {
+  if (is_finished_) throw std::logic_error("FlightRecorder: finish() was called before");
+  bool is_same = simulation.vehicle_count() == names_.size();
+  for (std::size_t v = 0; is_same && v < names_.size(); ++v) {
+    is_same = simulation.vehicle(v).setup().name == names_[v];
+  }
+  require_argument(is_same, "FlightRecorder: finish() with another simulation than its own");
+  is_finished_ = true;
   for (const auto& files : vehicles_) {
     if (files) files->commit();
   }

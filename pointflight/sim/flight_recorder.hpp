@@ -17,7 +17,8 @@ namespace pointflight {
 /// own sensors, scans.csv and `scans/<lidar>_<number>.pcd`. For all: scenario.yaml with what it
 /// needs (scenario_copy.hpp), events.csv, obstacles.csv and at last summary.json. Files appear when
 /// `finish` is called, all together; without it none do, and an earlier run stays (run_folder.hpp).
-/// Throws InputError (disk full, not writable).
+/// Throws InputError (disk full, not writable), std::logic_error once it is finished, and
+/// std::invalid_argument for samples of a vehicle that the run does not have.
 class FlightRecorder : public SampleSink {
  public:
   /// Makes the folders; they must be writable.
@@ -32,7 +33,8 @@ class FlightRecorder : public SampleSink {
   /// folder has a file of that name that no run wrote.
   [[nodiscard]] std::string path_for(const std::string& name);
 
-  /// Closes the files and writes summary.json.
+  /// Closes the files and writes summary.json. Throws std::invalid_argument if it is not the run
+  /// that the recorder was made for.
   void finish(const Simulation& simulation);
 
  private:
@@ -49,8 +51,10 @@ class FlightRecorder : public SampleSink {
   void write(const StatusSample& /*sample*/) {}
   [[nodiscard]] std::string partner_name(Label label) const;
   void keep_up(VehicleFiles& files, const StateSample& sample);
+  [[nodiscard]] VehicleFiles& files_of(std::uint32_t vehicle) const;
 
   RunFolder folder_;
+  bool is_finished_ = false;
   bool write_scans_;
   /// Of a run that other processes share: a process that is killed goes on where its trajectories
   /// end.

@@ -221,6 +221,7 @@ void describe(SettingsVisitor& v, GnssSettings& s) {
   v.list({"outages", "", "no fixes then"}, s.outages, [](SettingsVisitor& w, Outage& outage) {
     w.value({"from", "s", "when it starts", 0, 1e6}, outage.from);
     w.value({"until", "s", "when it ends", 0, 1e6}, outage.until);
+    w.require("until", outage.until > outage.from, "is not after from");
   });
 }
 
@@ -228,6 +229,7 @@ void describe(SettingsVisitor& v, RangeFinderSettings& s) {
   v.value({"rate", "Hz", "of measurements", 0.1, 1000}, s.rate);
   v.value({"range_min", "m", "nothing nearer is seen", 0, 1000}, s.range_min);
   v.value({"range_max", "m", "nothing farther is seen", 0.01, 1e4}, s.range_max);
+  v.require("range_max", s.range_max > s.range_min, "is not above range_min");
   v.value({"noise", "m", "deviation", 0, 10}, s.noise);
   v.value({"noise_share", "", "or this share of the range, if that is more", 0, 1}, s.noise_share);
   v.value({"position", "m", "in the body frame", -100, 100}, s.position);

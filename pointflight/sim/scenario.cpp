@@ -171,7 +171,7 @@ void describe(SettingsVisitor& v, Scenario& s) {
   v.value(required({"map", "", ".pfmap to fly in"}), s.map);
   v.value({"map_hash", "", "of the map; another one is refused; empty: any will do"}, s.map_hash);
   v.value({"seed", "", "of everything random", 0, 9e15}, s.seed);
-  v.value({"duration", "s", "0: as long as the mission takes", 0, 1e6}, s.duration);
+  v.value({"duration", "s", "0: as long as the mission takes", 0, kLongestRun}, s.duration);
   v.value({"physics_step", "s", "of the integrator", 0.0001, 0.005}, s.physics_step);
   if (s.is_short) {
     VehicleSetup& vehicle = s.vehicles.front();

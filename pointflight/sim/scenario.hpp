@@ -23,6 +23,9 @@
 
 namespace pointflight {
 
+/// What a scenario may ask for, s; and how far a program can jump ahead.
+inline constexpr double kLongestRun = 1e6;
+
 /// A LiDAR on a vehicle: one entry of `lidars`.
 struct LidarMount {
   std::string model = "mid360";                  ///< Name or path of a sensor file.

@@ -7,6 +7,7 @@
 #include <map>
 #include <stdexcept>
 
+#include "pointflight/core/argument.hpp"
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/sim/neighbourhood.hpp"
@@ -104,6 +105,9 @@ std::size_t Simulation::obstacle_count() const {
 }
 
 std::vector<Body> Simulation::obstacles(SimTime from, SimTime until) const {
+  // what replaces what has left is drawn one after the other, up to there
+  require_argument(from <= until && until - state_.time <= from_seconds(kLongestRun),
+                   "obstacles: from an instant to a later one, at most 1e6 s ahead");
   return setup_->obstacles.bodies(from, until);
 }
 
@@ -302,10 +306,12 @@ bool Simulation::has_arrived(std::size_t number) const {
 }
 
 void Simulation::move_schedules_to(SimTime time) {
-  if (time < state_.time || time.time_since_epoch() % setup_->step != Duration{0}) {
-    throw std::invalid_argument(fmt::format("from {} s to {} s: not a whole number of steps ahead",
-                                            to_seconds(state_.time),
-                                            to_seconds(time)));
+  if (time < state_.time || time - state_.time > from_seconds(kLongestRun) ||
+      time.time_since_epoch() % setup_->step != Duration{0}) {
+    throw std::invalid_argument(
+        fmt::format("from {} s to {} s: not a whole number of steps ahead, at most 1e6 s",
+                    to_seconds(state_.time),
+                    to_seconds(time)));
   }
   state_.time = time;
   state_.step_number = static_cast<std::uint64_t>(time.time_since_epoch() / setup_->step);

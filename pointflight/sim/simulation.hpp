@@ -80,7 +80,8 @@ class Simulation {
 
   /// Jumps ahead in time without moving the vehicles: their commands last as long as they would
   /// have, and their sensors start with the next measurement. Obstacles are where they are at that
-  /// time. Throws std::invalid_argument if `time` is not a whole number of steps or is earlier.
+  /// time. Throws std::invalid_argument if `time` is not a whole number of steps, is earlier, or
+  /// over `kLongestRun` ahead.
   void skip_to(SimTime time);
 
   /// Before the first step: as if the run had come to `time`, of which `skipped` was jumped over,
@@ -136,7 +137,7 @@ class Simulation {
 
   /// How many there are at any time: their labels follow `kFirstObstacle`.
   [[nodiscard]] std::size_t obstacle_count() const;
-  /// Obstacles between two instants.
+  /// Obstacles between two instants, at most `kLongestRun` ahead.
   [[nodiscard]] std::vector<Body> obstacles(SimTime from, SimTime until) const;
 
  private:

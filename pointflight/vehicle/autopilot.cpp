@@ -32,7 +32,7 @@ struct Finite {
   static bool all(double value) { return std::abs(value) <= kLargest; }
   bool operator()(const RotorSpeedCommand& c) const {
     for (const double speed : c.speeds) {
-      if (!all(speed)) return false;
+      if (!all(speed) || speed < 0.0) return false;  // they turn one way; a motor clips the rest
     }
     return true;
   }
@@ -72,7 +72,7 @@ struct Finite {
     return all(c.mission.hold) && c.mission.hold >= 0.0 && all(c.mission.final_yaw.value_or(0.0));
   }
   bool operator()(const TakeOffCommand& c) const {
-    return all(c.height) && c.speed > 0.0 && all(c.speed);
+    return all(c.height) && c.height > 0.0 && c.speed > 0.0 && all(c.speed);
   }
   bool operator()(const LandCommand& c) const { return c.speed > 0.0 && all(c.speed); }
   template <class Other>

@@ -73,7 +73,7 @@ struct WaypointCommand {
 /// Rise by `height` (m) from the present position; arms.
 struct TakeOffCommand {
   static constexpr std::string_view kName = "take_off";  ///< `name_of`
-  double height = 1.5;                                   ///< Above the present position, m.
+  double height = 1.5;                                   ///< Above the present position, m; over 0.
   double speed = 1.0;                                    ///< m/s
 
   /// Two that are equal are one order said twice.

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "pointflight/core/input_error.hpp"
+#include "pointflight/view/internal/small_json-inl.hpp"
 
 namespace pointflight::foxglove {
 namespace {
@@ -231,9 +232,9 @@ std::vector<std::byte> playback_state_frame(const PlaybackState& state) {
 }
 
 TextRequest parse_text(std::string_view frame) {
-  const json request = json::parse(frame.begin(), frame.end(), nullptr, false);
+  const json request = parse_small_json(frame);
   if (request.is_discarded() || !request.is_object()) {
-    throw InputError("a text frame is no JSON object");
+    throw InputError("a text frame is no JSON object, or too long or deep for a request");
   }
   const std::string op = text_in(request, "op");
   if (op == "subscribe") {

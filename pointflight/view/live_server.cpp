@@ -15,6 +15,7 @@ LiveServer::Impl::Impl(LiveServerOptions options) : options_(std::move(options))
   if (error) {
     throw InputError(fmt::format("--view {}: is no address of this machine", options_.address));
   }
+  if (options_.ports < 1) throw InputError("--view: one port or more is tried");
   const int first = options_.port;
   const int last = options_.port == 0 ? 0 : std::min(65535, first + options_.ports - 1);
   for (int port = first; port <= last; ++port) {
@@ -62,13 +63,25 @@ void LiveServer::Impl::close() {
 void LiveServer::Impl::accept() {
   acceptor_.async_accept([this](beast::error_code error, tcp::socket socket) {
     if (error == net::error::operation_aborted || !acceptor_.is_open()) return;
-    if (!error && connections_ < 4 * kMostClients) {
+    if (!error && (sessions_.size() < kMostSessions || close_most_idle())) {
       boost::system::error_code ignored;
       socket.set_option(tcp::no_delay(true), ignored);
       std::make_shared<HttpSession>(*this, std::move(socket))->read();
     }
     accept();
   });
+}
+
+/// Of connections that ask for nothing, the one that has done so for longest. False if all do.
+bool LiveServer::Impl::close_most_idle() {
+  HttpSession* idlest = nullptr;
+  for (HttpSession* session : sessions_) {
+    if (!session->is_idle()) continue;
+    if (idlest == nullptr || session->since() < idlest->since()) idlest = session;
+  }
+  if (idlest == nullptr) return false;
+  idlest->drop();
+  return true;
 }
 
 Permission LiveServer::Impl::permission_of(const http::request<http::string_body>& request) const {
@@ -152,14 +165,14 @@ bool LiveServer::has_subscribers(std::uint32_t channel) const {
 
 int LiveServer::subscriber_count(std::uint32_t channel) const {
   const std::lock_guard lock(impl_->mutex_);
-  return impl_->channels_[channel - 1].subscribers;
+  return impl_->known(channel).subscribers;
 }
 
 void LiveServer::publish(std::uint32_t channel, const Bytes& bytes, std::int64_t time) {
   bool is_latched = false;
   {
     const std::lock_guard lock(impl_->mutex_);
-    auto& known = impl_->channels_[channel - 1];
+    auto& known = impl_->known(channel);
     is_latched = known.latched;
     if (is_latched) {
       known.last = bytes;

@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "pointflight/core/input_error.hpp"
+#include "pointflight/view/internal/small_json-inl.hpp"
 
 namespace pointflight {
 namespace {
@@ -61,7 +62,7 @@ std::optional<Order> run_order(const json& order) {
 }  // namespace
 
 Order page_order(std::string_view text, const std::vector<MotionLimits>& motions) {
-  const json order = json::parse(text.begin(), text.end(), nullptr, false);
+  const json order = parse_small_json(text);
   if (order.is_discarded() || !order.is_object()) throw InputError("an order is a JSON object");
   if (auto of_run = run_order(order)) return *of_run;
   VehicleOrder told;

@@ -1,12 +1,16 @@
 #include "pointflight/view/recording_playback.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <chrono>
+#include <map>
 #include <optional>
 #include <thread>
 #include <utility>
 #include <vector>
 
+#include "pointflight/core/input_error.hpp"
 #include "pointflight/run/playback.hpp"
 #include "pointflight/view/order_inbox.hpp"
 
@@ -90,6 +94,7 @@ class PlayableRecording : public Playable {
   void send(const TimedMessage& message) {
     const std::uint32_t channel = channels_[message.channel];
     const bool is_latched = recording_.channels()[message.channel].latched;
+    if (is_latched) count_latched(message);
     if (!is_latched && !server_.has_subscribers(channel)) return;
     server_.publish(
         channel,
@@ -97,14 +102,27 @@ class PlayableRecording : public Playable {
         message.time);
   }
 
+  /// The server keeps the last of each latched topic for clients that come later.
+  void count_latched(const TimedMessage& message) {
+    constexpr std::size_t kMost = std::size_t{512} << 20;  // bytes
+    std::size_t& size = latched_[message.channel];
+    latched_bytes_ += message.data.size() - std::exchange(size, message.data.size());
+    if (latched_bytes_ <= kMost) return;
+    throw InputError(fmt::format(
+        "the recording's latched topics hold more than {} MiB together, which is not shown",
+        kMost >> 20));
+  }
+
   TimedRecording& recording_;
   LiveServer& server_;
   Duration epoch_;                       ///< Of its first message.
   std::vector<std::uint32_t> channels_;  ///< The server's, by the recording's.
   OrderInbox inbox_;
-  std::optional<TimedMessage> waiting_;  ///< The next one.
-  int subscriptions_ = 0;                ///< When it last looked.
-  int welcomed_ = 0;                     ///< Of them.
+  std::optional<TimedMessage> waiting_;         ///< The next one.
+  std::map<std::size_t, std::size_t> latched_;  ///< Bytes of the last message, by channel.
+  std::size_t latched_bytes_ = 0;               ///< Of them together.
+  int subscriptions_ = 0;                       ///< When it last looked.
+  int welcomed_ = 0;                            ///< Of them.
 };
 
 }  // namespace

@@ -39,6 +39,9 @@ class FreeSpaceGrid {
     }
     const Vector3d extent = bounds.size().cwiseMax(kCellMin);
     cell_ = std::max(kCellMin, std::cbrt(extent.prod() / kCellsMax));
+    // of a long and thin map whole cells are many more than its volume says
+    const auto cells = [&] { return (extent / cell_).array().ceil().prod(); };
+    while (cells() > 2.0 * kCellsMax) cell_ *= 1.25;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       size_[axis] =
           std::max(1, static_cast<int>(std::ceil(extent[static_cast<int>(axis)] / cell_)));

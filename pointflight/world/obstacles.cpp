@@ -81,6 +81,8 @@ void check(const ObstacleSettings& s, const std::function<std::string(const char
   if (s.motion != ObstacleMotion::kRandom && s.count != 1) {
     fail("count", "only obstacles that move at random come in numbers; write one entry each");
   }
+  if (s.radius_max != 0.0 && s.radius_max < s.size.radius) fail("radius_max", "is below radius");
+  if (s.speed_max != 0.0 && s.speed_max < s.speed) fail("speed_max", "is below speed");
   if ((s.bounds_max - s.bounds_min).minCoeff() < 0.0) fail("bounds_max", "is below bounds_min");
 }
 

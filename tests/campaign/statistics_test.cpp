@@ -1,6 +1,7 @@
 // Intervals against published values, tables, conditions.
 #include "pointflight/campaign/statistics.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -13,6 +14,7 @@ namespace {
 
 using testing::error_of;
 using testing::expect_contains;
+using testing::TemporaryFolder;
 
 RunRecord record(RunStatus status, std::int64_t collisions, double closest) {
   RunRecord r;
@@ -108,6 +110,30 @@ TEST(Condition, ComparesRatesAndStatistics) {
       error_of([&] { static_cast<void>(Condition("collision_rate > 0.02").holds(silent)); }),
       "no run tells of it");
   EXPECT_TRUE(Condition("failed_rate > 0.5").holds(silent));
+}
+
+TEST(Condition, ALimitIsANumber) {
+  for (const char* text : {"collision_rate > nan", "collision_rate < inf", "collision_rate > "}) {
+    EXPECT_NE(error_of([&] { Condition condition(text); }), "") << text;
+  }
+}
+
+TEST(RunRecord, NumbersThatNoFlightComesToAreRefused) {
+  const auto error = [](const std::string& json) {
+    return error_of([&] { parse_record(json, "result.json"); });
+  };
+  EXPECT_NO_THROW(parse_record(R"({"status": "completed", "collisions": 3})", "result.json"));
+  for (const char* wrong : {"1e300", "-1", "0.5", "1e308"}) {
+    expect_contains(error(fmt::format(R"({{"status": "completed", "collisions": {}}})", wrong)),
+                    "result.json: collisions");
+  }
+  expect_contains(error(R"({"status": "ended", "distance_flown": 1e300})"), "distance_flown");
+  expect_contains(error(R"({"status": "ended", "figures": {"a": 1e300}})"), "result.json: a");
+  const TemporaryFolder folder;
+  testing::write_file(folder / "summary.json", R"({"vehicles": [{"collisions": 1e300}]})");
+  RunRecord record;
+  expect_contains(error_of([&] { read_results(folder.path(), "", record); }),
+                  "summary.json: collisions");
 }
 
 TEST(Tables, HaveTheRunsInTheOrderOfThePlan) {

@@ -3,6 +3,7 @@
 #include <atomic>
 #include <cmath>
 #include <filesystem>
+#include <limits>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -16,6 +17,7 @@
 #include "pointflight/core/parallel.hpp"
 #include "pointflight/core/random.hpp"
 #include "pointflight/core/time.hpp"
+#include "pointflight/core/whole_number.hpp"
 #include "tests/support.hpp"
 
 namespace pointflight {
@@ -124,6 +126,11 @@ TEST(Executor, VisitsEveryIndexOnceWithAnyNumberOfThreads) {
   }
 }
 
+TEST(Executor, AChunkHasAtLeastOne) {
+  EXPECT_THROW(Executor(2).parallel_for(4, 0, [](std::size_t, std::size_t) {}),
+               std::invalid_argument);
+}
+
 TEST(Executor, PassesOnAnException) {
   const Executor executor(2);
   EXPECT_THROW(executor.parallel_for(1000,
@@ -211,6 +218,54 @@ TEST(OutputFile, AFullDiskIsAnErrorNotASilentLoss) {
   const FullDisk full(2);
   expect_contains(error_of([&] { file.commit(); }), "a.txt: cannot write: File too large");
   EXPECT_FALSE(std::filesystem::exists(folder / "a.txt"));
+}
+
+TEST(OutputFile, IsUsedNoMoreOnceItIsCommitted) {
+  const TemporaryFolder folder;
+  OutputFile file(folder / "a.txt");
+  file.write("text");
+  file.commit();
+  EXPECT_THROW(file.commit(), std::logic_error);
+  EXPECT_THROW(file.write("more"), std::logic_error);
+  EXPECT_THROW(file.flush(), std::logic_error);
+  EXPECT_EQ(read_file(folder / "a.txt"), "text");
+}
+
+TEST(OutputSet, ItsFilesAppearTogetherOrNotAtAll) {
+  const TemporaryFolder folder;
+  const auto write = [&](const char* name) {
+    OutputFile file(folder / name);
+    file.write(name);
+    file.commit();
+  };
+  {
+    const OutputSet none;
+    write("a");
+    EXPECT_FALSE(std::filesystem::exists(folder / "a"));
+  }
+  EXPECT_TRUE(std::filesystem::is_empty(folder.path())) << "nothing half-written either";
+  OutputSet both;
+  write("a");
+  {
+    OutputSet inner;
+    write("b");
+    inner.commit();
+  }
+  EXPECT_FALSE(std::filesystem::exists(folder / "b")) << "a set within another waits for that";
+  both.commit();
+  EXPECT_EQ(read_file(folder / "a"), "a");
+  EXPECT_EQ(read_file(folder / "b"), "b");
+}
+
+TEST(WholeNumber, IsOnlyWhatATypeHolds) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  for (const double none : {nan, 1e300, -1e300, 0.5, -1.0, 4294967296.0, 1.0 / 0.0}) {
+    EXPECT_FALSE(whole_number<std::uint32_t>(none)) << none;
+  }
+  EXPECT_EQ(whole_number<std::uint32_t>(4294967295.0), 4294967295u);
+  EXPECT_EQ(whole_number<int>(-3.0), -3);
+  EXPECT_FALSE(whole_number<int>(7.0, 0, 6));
+  EXPECT_FALSE(whole_number<std::int64_t>(9.3e18)) << "beyond what doubles hold exactly";
 }
 
 }  // namespace

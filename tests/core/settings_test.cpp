@@ -106,6 +106,7 @@ TEST(Settings, ErrorsNameFileLineKeyAndAWayOut) {
       {"stops: [[1, 2]]\n", "cart.yaml:1: stops", "[x, y, z]"},
       {"speed: [1\n", "cart.yaml:", "not valid YAML"},
       {"just text\n", "cart.yaml", "key: value"},
+      {"speed: 1\n---\nspeed: 2\n", "cart.yaml:3", "a second document (---) begins"},
       {"", "cart.yaml", "key: value"},
   };
   for (const Case& c : cases) {

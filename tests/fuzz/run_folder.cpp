@@ -1,5 +1,6 @@
-// Any bytes as one of the files of a run's folder: played, or an InputError of one line. The first
-// line of the input names the file.
+// Any bytes as one of the files of a run's folder: played, filmed and drawn, or an InputError of
+// one line. The first line of the input names the file; with a ! before it, the folder is of a
+// process that has flown one of two vehicles.
 #include <algorithm>
 #include <array>
 #include <cstdint>
@@ -15,6 +16,7 @@
 #include "pointflight/io/cloud_reader.hpp"
 #include "pointflight/map/import/map_builder.hpp"
 #include "pointflight/map/map_file.hpp"
+#include "pointflight/picture/run_folder_picture.hpp"
 #include "pointflight/run/playback.hpp"
 #include "pointflight/run/run_loop.hpp"
 #include "tests/run/recorder.hpp"
@@ -24,13 +26,18 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::array<const char*, 7> kFiles = {"trajectory.csv",
+/// Of a run with one vehicle; those of a vehicle lie in its folder if there are two.
+constexpr std::array<const char*, 9> kFiles = {"trajectory.csv",
                                                "odometry.csv",
                                                "imu.csv",
+                                               "range_finder.csv",
+                                               "scans.csv",
                                                "events.csv",
                                                "obstacles.csv",
                                                "summary.json",
                                                "scans/0_000000.pcd"};
+constexpr std::size_t kFirstOfAll = 5;  // up to the summary: of all vehicles
+constexpr std::size_t kLastOfAll = 7;
 
 void write(const fs::path& path, std::string_view bytes) {
   std::ofstream(path, std::ios::binary)
@@ -59,33 +66,66 @@ class FolderOnDisk {
     write(path_ / "nine.yaml",
           "title: nine beams\nrate: 20\nrange_max: 30\npattern: grid\n"
           "grid: {projection: pinhole, columns: 3, rows: 3, fx: 2, fy: 2, cx: 1, cy: 1}\n");
-    write(path_ / "s.yaml",
-          "map: m.pfmap\nduration: 0.08\nobstacles: [{count: 2, radius: 0.2}]\n"
-          "vehicles: [{name: v, start: [4, 4, 2], lidars: [{model: nine.yaml}],\n"
-          "            mission: {waypoints: [[6, 4, 2]]}}]\n"
-          "output: {odometry: true, trajectory_rate: 20}\n");
-    const Scenario scenario = load_scenario((path_ / "s.yaml").string());
-    Simulation simulation(scenario, scenario.open_map(), executor);
-    RunLoop loop(simulation, {});
-    testing::Recorder recorder((path_ / "run").string(), simulation);
-    loop.add(recorder);
-    loop.run();
-    for (const char* file : kFiles) {
-      std::ifstream in(run() / file, std::ios::binary);
-      originals_[file].assign(std::istreambuf_iterator<char>(in), {});
+    fly(run(false), "", executor);
+    fly(run(true), ", {name: w, start: [4, 6, 2], lidars: []}", executor);
+    // what the process leaves that has flown v alone
+    fs::remove_all(run(true) / "w");
+    const fs::path summary = run(true) / "summary.json";
+    std::string text = content(summary);
+    text.insert(text.rfind('}'), ", \"others\": [{\"name\": \"w\"}]");
+    write(summary, text);
+    for (const bool shared : {false, true}) {
+      for (std::size_t i = 0; i < kFiles.size(); ++i) {
+        const fs::path file = path_of(i, shared);
+        originals_[file.string()] = content(file);
+        if (originals_[file.string()].empty()) __builtin_trap();
+      }
     }
   }
   ~FolderOnDisk() { fs::remove_all(path_); }
 
-  [[nodiscard]] fs::path run() const { return path_ / "run"; }
-  [[nodiscard]] const std::string& original(const std::string& file) const {
-    return originals_.at(file);
+  [[nodiscard]] fs::path run(bool shared) const { return path_ / (shared ? "shared" : "run"); }
+  [[nodiscard]] fs::path path_of(std::size_t file, bool shared) const {
+    const bool is_of_all = file >= kFirstOfAll && file <= kLastOfAll;
+    return (shared && !is_of_all ? run(shared) / "v" : run(shared)) / kFiles[file];
+  }
+  [[nodiscard]] const std::string& original(const fs::path& file) const {
+    return originals_.at(file.string());
   }
 
  private:
+  static std::string content(const fs::path& file) {
+    std::ifstream in(file, std::ios::binary);
+    return {std::istreambuf_iterator<char>(in), {}};
+  }
+
+  void fly(const fs::path& folder, const std::string& more, const Executor& executor) const {
+    write(path_ / "s.yaml",
+          "map: m.pfmap\nduration: 0.08\nobstacles: [{count: 2, radius: 0.2}]\n"
+          "vehicles: [{name: v, start: [4, 4, 2], lidars: [{model: nine.yaml}],\n"
+          "            sensors: [{kind: range_finder, rate: 50}],\n"
+          "            mission: {waypoints: [[6, 4, 2]]}}" +
+              more + "]\noutput: {odometry: true, trajectory_rate: 20}\n");
+    const Scenario scenario = load_scenario((path_ / "s.yaml").string());
+    Simulation simulation(scenario, scenario.open_map(), executor);
+    RunLoop loop(simulation, {});
+    testing::Recorder recorder(folder.string(), simulation);
+    loop.add(recorder);
+    loop.run();
+  }
+
   fs::path path_;
   std::map<std::string, std::string> originals_;
 };
+
+template <class Action>
+void expect_no_more_than_an_input_error(const Action& action) {
+  try {
+    action();
+  } catch (const InputError& error) {
+    if (std::string(error.what()).find('\n') != std::string::npos) __builtin_trap();
+  }
+}
 
 }  // namespace
 }  // namespace pointflight
@@ -94,18 +134,24 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   using namespace pointflight;
   static const FolderOnDisk folder;
   static const Executor executor(1);
-  const std::string_view text(reinterpret_cast<const char*>(data), size);
+  std::string_view text(reinterpret_cast<const char*>(data), size);
+  const bool shared = text.starts_with('!');
+  if (shared) text.remove_prefix(1);
   const std::size_t line = std::min(text.find('\n'), text.size());
-  for (const char* file : kFiles) {
-    if (text.substr(0, line) != file) continue;
-    write(folder.run() / file, text.substr(std::min(line + 1, text.size())));
-    try {
-      RecordedRun run(folder.run().string(), executor);
+  for (std::size_t i = 0; i < kFiles.size(); ++i) {
+    if (text.substr(0, line) != kFiles[i]) continue;
+    const fs::path file = folder.path_of(i, shared);
+    write(file, text.substr(std::min(line + 1, text.size())));
+    const std::string run_folder = folder.run(shared).string();
+    expect_no_more_than_an_input_error([&] {
+      RecordedRun run(run_folder, executor);
       play(run, {}, {});
-    } catch (const InputError& error) {
-      if (std::string(error.what()).find('\n') != std::string::npos) __builtin_trap();
-    }
-    write(folder.run() / file, folder.original(file));
+    });
+    expect_no_more_than_an_input_error([&] {
+      const picture::RunPicture drawn = picture::read_run_picture(run_folder);
+      if (drawn.names.size() < drawn.paths.size()) __builtin_trap();
+    });
+    write(file, folder.original(file));
   }
   return 0;
 }

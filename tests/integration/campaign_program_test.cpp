@@ -184,6 +184,23 @@ TEST_F(Campaigns, AUsersProgramIsJudgedByItsCodeItsFiguresAndItsLimits) {
   expect_contains(table("c"), "2,0,3,completed,");
 }
 
+TEST_F(Campaigns, MoreJobsThanTheMemoryAllowsAreSaidAndLeaveNothing) {
+  if (testing::kSanitized) return;  // the sanitizer takes far more
+  write_file(here_ / "sleep.yaml",
+             fmt::format("scenario: {}\nseeds: 300\n"
+                         "command: [sh, -c, 'sleep 0.05; echo {{scenario}}']\n",
+                         "s.yaml"));
+  ASSERT_TRUE(fs::exists(here_ / "s.yaml"));
+  const Result result =
+      run(fmt::format("campaign {} -o {} --jobs 200", here_ / "sleep.yaml", here_ / "many"),
+          "ulimit -v 600000;");
+  // so many as there is memory for fly all the same, unless that is said
+  EXPECT_TRUE(result.code == 0 || result.code == 2) << result.err;
+  for (const auto& entry : fs::directory_iterator(here_ / "many/runs")) {
+    EXPECT_EQ(entry.path().filename().string().find("attempt"), std::string::npos) << entry.path();
+  }
+}
+
 TEST_F(Campaigns, VerdictsAreExitCodes) {
   const std::string file = study("seeds: 2\n");
   const std::string command = fmt::format("campaign {} -o {} --fail-if ", file, here_ / "c");
@@ -191,6 +208,7 @@ TEST_F(Campaigns, VerdictsAreExitCodes) {
   const Result failed = run(command + "'completed_rate < 0.5'");
   EXPECT_EQ(failed.code, 1);
   expect_contains(failed.err, "--fail-if completed_rate < 0.5: it is 0");
+  expect_user_error(run(command + "'collision_rate > nan'"), "write it like");
   expect_user_error(run(command + "'what'"), "--fail-if what: write it like");
   expect_user_error(run(command + "'mean(latency) > 1'"), "no run tells of latency");
 }

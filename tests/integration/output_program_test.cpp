@@ -255,6 +255,8 @@ TEST_F(Output, AClosedTerminalEndsAsAnInterrupt) {
 TEST_F(Output, SmallStacksAndFewOpenFilesAreEnough) {
   const std::string flight = scenario(0.2);
   EXPECT_EQ(run(fmt::format("fly {} -o {}", flight, in("run")), "ulimit -s 256;").code, 0);
+  EXPECT_EQ(run(fmt::format("map import {} -o {}", cloud(), in("c.pfmap")), "ulimit -s 256;").code,
+            0);
   EXPECT_EQ(
       run(fmt::format("scan {} --lidar os1_128 --pose 12,10,2,0,0,0", map()), "ulimit -s 256;")
           .code,
@@ -328,6 +330,67 @@ TEST_F(Output, ScenariosThatCannotBeAreRefusedOrWarnedOf) {
   const auto summary = nlohmann::json::parse(read_file(in("fallen/summary.json")));
   EXPECT_EQ(summary["end"], "left the map");
   EXPECT_LT(summary["simulated_time"], 10.0);
+}
+
+TEST_F(Output, OfSeveralFilesAllAppearOrNone) {
+  fs::create_directory(in("s.png.partial"));  // nothing can be drawn there
+  const Result scan = run(fmt::format("scan {} --lidar os1_32 --pose 12,10,2,0,0,0 -o {} --png {}",
+                                      map(),
+                                      in("s.pcd"),
+                                      in("s.png")));
+  EXPECT_EQ(scan.code, 2);
+  EXPECT_FALSE(fs::exists(in("s.pcd")));
+  EXPECT_FALSE(fs::exists(in("s.pcd.partial")));
+  fs::create_directory(in("c.png.partial"));
+  const Result crop = run(
+      fmt::format("map crop {} -o {} --max-height 3 --png {}", map(), in("c.pfmap"), in("c.png")));
+  EXPECT_EQ(crop.code, 2);
+  EXPECT_FALSE(fs::exists(in("c.pfmap")));
+}
+
+TEST_F(Output, OfASharedRunItsOwnVehiclesAreShown) {
+  write_file(
+      in("two.yaml"),
+      fmt::format("map: {}\nduration: 1\nvehicles:\n  - {{name: a, start: [12, 10, 4]}}\n"
+                  "  - {{name: b, start: [12, 13, 4]}}\nobstacles: [{{count: 1, radius: 0.1}}]\n",
+                  map()));
+  ASSERT_EQ(run(fmt::format("fly {} -o {}", in("two.yaml"), in("run"))).code, 0);
+  // as the process leaves it that flew b alone
+  fs::remove_all(in("run/a"));
+  auto summary = nlohmann::json::parse(read_file(in("run/summary.json")));
+  summary["others"] = {summary["vehicles"][0]};
+  summary["vehicles"].erase(0);
+  write_file(in("run/summary.json"), summary.dump());
+  const Result frames = run(fmt::format("picture {} --frames {} --fps 2", in("run"), in("frames")));
+  EXPECT_EQ(frames.code, 0) << frames.err;
+  EXPECT_TRUE(fs::exists(in("frames/000000.png")));
+  const Result overview = run(fmt::format("picture {} -o {}", in("run"), in("o.png")));
+  EXPECT_EQ(overview.code, 0) << overview.err;
+  const Result stranger =
+      run(fmt::format("picture {} --frames {} --follow 0", in("run"), in("new/none")));
+  expect_user_error(stranger, "--follow 0: the folder has vehicle 1");
+  EXPECT_FALSE(fs::exists(in("new"))) << "what is refused leaves nothing";
+  // numbers that nobody wrote
+  write_file(in("run/obstacles.csv"),
+             read_file(in("run/obstacles.csv")) + "0.9,10001,1e300,0,0,1,0,0,0,0.1,0.1,0.1\n");
+  expect_user_error(run(fmt::format("picture {} -o {}", in("run"), in("p.png"))),
+                    "'1e300' is no number of a run");
+  summary["vehicles"][0]["scans"] = 1e300;
+  write_file(in("run/summary.json"), summary.dump());
+  expect_user_error(run(fmt::format("picture {} -o {}", in("run"), in("p.png"))),
+                    "summary.json: scans: 1e+300 is no figure of a run");
+}
+
+TEST_F(Output, TooLittleOfTheMachineIsSaid) {
+  if (testing::kSanitized) return;  // the sanitizer takes far more
+  expect_user_error(run(fmt::format("map info {}", map()), "ulimit -s 128;"),
+                    "the stack is limited to 128 KB; allow 8 MB, as is usual: ulimit -s 8192");
+  for (const int kilobytes : {4000, 8000, 12000, 16000}) {
+    expect_user_error(run(fmt::format("map info {} --png {}", map(), in("m.png")),
+                          fmt::format("ulimit -d {};", kilobytes)),
+                      "out of memory");
+    EXPECT_FALSE(fs::exists(in("m.png")));
+  }
 }
 
 }  // namespace

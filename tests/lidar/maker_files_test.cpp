@@ -64,6 +64,8 @@ TEST(MakerFiles, WrongOnesSayWhat) {
     return error_of([&] { parse_ouster_metadata(text, "unit.json"); });
   };
   expect_contains(error("512x20", "fast"), "unit.json: lidar_mode: 'fast' is no mode");
+  expect_contains(error("512x20", "512abcx20"), "'512abcx20' is no mode");
+  expect_contains(error("512x20", "512x20Hz"), "'512x20Hz' is no mode");
   expect_contains(error("OS-1-4", "XT-32"), "unit.json: prod_line: 'XT-32' is none of");
   expect_contains(error("[3.1, 1", "[1"), "4 of these and 3 beam_azimuth_angles");
   expect_contains(error("15.8", "\"near\""), "lidar_origin_to_beam_origin_mm: a number is wanted");
@@ -78,6 +80,15 @@ TEST(MakerFiles, ALivoxTableIsASensor) {
   std::string text = "Time/s,Azimuth/deg,Zenith/deg\n";
   for (int i = 0; i < 400000; ++i) text += i % 2 == 0 ? "1,0,90\n" : "2,5,85\n";
   testing::write_file(folder / "mid70.csv", text);
+  std::string wrong = text;
+  wrong.replace(wrong.find("2,5,85"), 6, "2,1e300,85");
+  testing::write_file(folder / "wrong.csv", wrong);
+  expect_contains(error_of([&] { static_cast<void>(scan_of(folder / "wrong.csv")); }),
+                  "wrong.csv:3: (1e+300, 5) is no azimuth and elevation");
+  wrong.replace(wrong.find("2,1e300,85"), 10, "2,5,200");
+  testing::write_file(folder / "wrong.csv", wrong);
+  expect_contains(error_of([&] { static_cast<void>(scan_of(folder / "wrong.csv")); }),
+                  "(5, -110) is no azimuth and elevation");
   const LidarSettings s = load_lidar(folder / "mid70.csv");
   EXPECT_EQ(s.csv.points_per_second, 100000.0);
   EXPECT_EQ(s.range_max, load_lidar("mid40").range_max);

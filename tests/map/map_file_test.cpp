@@ -1,10 +1,15 @@
 // The file of a map: nearest surfels, damage.
+#include "pointflight/map/map_file.hpp"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstring>
+#include <functional>
+#include <limits>
+#include <utility>
 
 #include "pointflight/core/hash.hpp"
 #include "pointflight/core/random.hpp"
@@ -133,6 +138,48 @@ TEST(MapFile, DamageIsFoundAndNeverCrashes) {
     map->for_each_surfel([&](const Vector3d&, const Vector3d&, double, std::uint32_t) { ++count; });
     EXPECT_LE(count, good.size());
   }
+}
+
+/// A map with another header, whose checksum is right.
+std::vector<std::byte> with_header(std::vector<std::byte> bytes,
+                                   const std::function<void(MapHeader&)>& change) {
+  MapHeader header{};
+  std::memcpy(&header, bytes.data(), sizeof header);
+  change(header);
+  std::memcpy(bytes.data(), &header, sizeof header);
+  constexpr std::size_t kChecksumAt = kMapHeaderSize - 8;
+  const std::uint64_t checksum = hash64(std::span(bytes).first(kChecksumAt));
+  std::memcpy(bytes.data() + kChecksumAt, &checksum, sizeof checksum);
+  return bytes;
+}
+
+TEST(MapFile, AHeaderThatIsNotTheMapsIsFound) {
+  ImportOptions options;
+  options.resolution = 0.2;
+  const ImportedMap imported = import_points(cloud_of(small_room(), 800.0), options);
+  const auto good = map_bytes(imported.tree, imported.description);
+  const auto error = [&](const std::function<void(MapHeader&)>& change) {
+    return error_of([&] { SurfelMap::from_bytes(with_header(good, change), "a.pfmap")->verify(); });
+  };
+  EXPECT_NO_THROW(SurfelMap::from_bytes(with_header(good, [](MapHeader&) {}), "a.pfmap")->verify());
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const double many = 1e300;
+  for (const double wrong : {nan, many}) {
+    expect_contains(error([&](MapHeader& h) { h.origin[1] = wrong; }), "out of range");
+    expect_contains(error([&](MapHeader& h) { h.bounds_min[0] = wrong; }), "out of range");
+    expect_contains(error([&](MapHeader& h) { h.bounds_max[2] = wrong; }), "out of range");
+  }
+  expect_contains(error([](MapHeader& h) { std::swap(h.bounds_min[0], h.bounds_max[0]); }),
+                  "out of range");
+  expect_contains(error([](MapHeader& h) { ++h.surfel_count; }), "surfels where the header says");
+  // a tree without nodes
+  ImportedMap bare = import_points(cloud_of(small_room(), 800.0), options);
+  bare.tree.nodes = {};
+  expect_contains(
+      error_of([&] {
+        SurfelMap::from_bytes(map_bytes(bare.tree, bare.description), "a.pfmap")->verify();
+      }),
+      "0 surfels where the header says");
 }
 
 }  // namespace

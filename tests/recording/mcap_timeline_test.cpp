@@ -279,5 +279,44 @@ TEST(McapTimeline, LeavesOutTimesThatNoClockShows) {
   EXPECT_TRUE(read_mcap_bytes(whole.bytes(), "raw").complete);
 }
 
+/// A chunk that claims to unpack to so much, of so many packed bytes.
+RecordWriter chunk_that_claims(std::uint64_t size, std::size_t packed) {
+  RecordWriter content;
+  content.number<std::uint64_t>(1).number<std::uint64_t>(2);
+  content.number(size).number<std::uint32_t>(0).text("zstd");
+  content.number<std::uint64_t>(packed).raw(std::vector<std::byte>(packed));
+  return content;
+}
+
+TEST(McapTimeline, ASmallFileTakesNoMuchMemory) {
+  // what unpacks to more than a thousand times of itself is left out before memory is taken for it
+  RawFile file;
+  file.describe(1, "/a");
+  file.add(Opcode::kChunk, chunk_that_claims(std::uint64_t{200} << 20, 1000));
+  file.add(Opcode::kDataEnd, RecordWriter().number<std::uint32_t>(0));
+  file.add(Opcode::kFooter, RecordWriter().number<std::uint64_t>(0));
+  const RecordingInfo info = read_mcap_bytes(file.bytes(), "raw");
+  EXPECT_FALSE(info.complete);
+  EXPECT_EQ(info.messages, 0u);
+  // topics count as their types do
+  RawFile topics;
+  const std::string name(std::size_t{20} << 20, 't');
+  for (std::uint16_t id = 1; id < 5; ++id) topics.describe(id, name + std::to_string(id));
+  expect_contains(error_of([&] { timed_mcap(topics.bytes(), "raw"); }), "longer than 64 MiB");
+}
+
+TEST(McapTimeline, GivesTheLatchedOfManyChunksEachOnce) {
+  RawFile file;
+  for (std::uint16_t id = 1; id <= 40; ++id) file.describe(id, "/l" + std::to_string(id), true);
+  for (std::uint16_t id = 1; id <= 40; ++id) {
+    file.chunk(id, {std::uint64_t{2} * id, std::uint64_t{2} * id + 1});
+  }
+  const auto recording = timed_mcap(file.bytes(), "raw");
+  auto times = held_before(*recording, 1000);
+  std::sort(times.begin(), times.end());
+  ASSERT_EQ(times.size(), 40u);
+  for (int i = 0; i < 40; ++i) EXPECT_EQ(times[static_cast<std::size_t>(i)], 2 * i + 3);
+}
+
 }  // namespace
 }  // namespace pointflight

@@ -5,6 +5,7 @@
 #include <cstring>
 
 #include "pointflight/core/input_error.hpp"
+#include "pointflight/ros/common/cloud_points.hpp"
 #include "pointflight/ros/common/point_layout.hpp"
 #include "pointflight/ros/common/profile.hpp"
 #include "tests/support.hpp"
@@ -190,6 +191,21 @@ TEST(Profiles, ShippedOnesAreReadAndMistakesSayWhere) {
   expect_contains(error("outputs:\n  - {kind: cloud, topic: /c, layout: liwox}\n"), "p.yaml:2");
   expect_contains(error("inputs:\n  - {kind: goal, topci: /c}\n"), "topic");
   EXPECT_EQ(with_names("/{vehicle}/{lidar}_{id}{x}", {"a", 3, "b"}), "/a/b_3{x}");
+}
+
+TEST(CloudPoints, MoreThanAnyScanHasAreRefused) {
+  msg::PointCloud2 cloud;
+  // all fields lie on each other: bytes alone do not bound the points
+  for (const char* name : {"x", "y", "z"}) {
+    cloud.point_fields.push_back({name, 0, msg::PointField::FLOAT32, 1});
+  }
+  cloud.width = 25'000'000;
+  cloud.height = 1;
+  cloud.point_step = 4;
+  cloud.row_step = cloud.width * cloud.point_step;
+  cloud.data.resize(cloud.row_step);
+  expect_contains(error_of([&] { static_cast<void>(points_of(cloud)); }),
+                  "more than any scan has (20 million)");
 }
 
 }  // namespace

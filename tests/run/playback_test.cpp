@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <filesystem>
 #include <map>
@@ -123,17 +124,20 @@ TEST(Playback, Slow_ARunsFolderGivesTheMessagesOfTheRun) {
   EXPECT_EQ(again["/two/mid360/points"], flown["/two/mid360/points"]);
 }
 
+/// What is said of a folder whose run cannot be played.
+std::string error_of_run(const TemporaryFolder& folder) {
+  const Executor executor(1);
+  return error_of([&] {
+    RecordedRun run(folder / "run", executor);
+    play(run, {}, {});
+  });
+}
+
 TEST(Playback, FoldersThatAreNoRunsSayWhatIsMissing) {
   const TemporaryFolder folder;
   Messages messages;
   fly(folder, messages, 0.4);
-  const Executor executor(1);
-  const auto error = [&] {
-    return error_of([&] {
-      RecordedRun run(folder / "run", executor);
-      play(run, {}, {});
-    });
-  };
+  const auto error = [&] { return error_of_run(folder); };
   const std::string states = read_file(folder / "run/one/trajectory.csv");
   write_file(folder / "run/one/trajectory.csv", states.substr(0, states.find('\n') + 1));
   expect_contains(error(), "trajectory.csv: has no states");
@@ -153,10 +157,10 @@ TEST(Playback, FoldersThatAreNoRunsSayWhatIsMissing) {
   write_file(folder / "run/one/imu.csv", "time,gyro_x\n0,0\n");
   expect_contains(error(), "2 columns where a run writes 7");
   write_file(folder / "run/one/imu.csv", "time,gyro_x\n");  // nothing came
-  EXPECT_NO_THROW(RecordedRun(folder / "run", executor));
+  EXPECT_NO_THROW(RecordedRun(folder / "run", Executor(1)));
   const std::string events = read_file(folder / "run/events.csv");
   write_file(folder / "run/events.csv", events + "1.2,collision,map,,,,,,,,\n");
-  expect_contains(error(), "of an unknown vehicle");
+  expect_contains(error(), "the scenario has no vehicle 'map'");
   write_file(folder / "run/events.csv", events);
   const std::string summary = read_file(folder / "run/summary.json");
   std::string endless = summary;
@@ -164,7 +168,92 @@ TEST(Playback, FoldersThatAreNoRunsSayWhatIsMissing) {
   write_file(folder / "run/summary.json", endless);
   expect_contains(error(), "the run ended at 1000000.0 s, its files at 0.4 s");
   std::filesystem::remove(folder / "run/summary.json");
-  expect_contains(error(), "summary.json: is missing");
+  expect_contains(error(), "summary.json: cannot open");
+}
+
+/// The folder as a process leaves it that has flown the second vehicle of a shared run alone.
+void leave_to_the_other(const TemporaryFolder& folder) {
+  std::filesystem::rename(folder / "run/one", folder / "one");
+  std::string summary = read_file(folder / "run/summary.json");
+  summary.insert(summary.rfind('}'), ", \"others\": [{\"name\": \"one\"}]");
+  write_file(folder / "run/summary.json", summary);
+}
+
+TEST(Playback, OfASharedRunHasTheVehiclesOfItsFolder) {
+  const TemporaryFolder folder;
+  Messages flown;
+  fly(folder, flown, 0.4);
+  leave_to_the_other(folder);
+  const Executor executor(2);
+  const auto play_all = [&] {
+    RecordedRun run(folder / "run", executor);
+    Messages played;
+    const auto ros = keeping(run.description(), played);
+    Link* const links[] = {ros.get()};
+    play(run, links, {});
+    return played;
+  };
+  Messages played = play_all();
+  std::size_t of_two = 0;
+  for (const auto& [topic, messages] : flown) {
+    if (topic.find("two") == std::string::npos || topic.ends_with("points_world")) continue;
+    EXPECT_EQ(played[topic].size(), messages.size()) << topic;
+    of_two += messages.size();
+  }
+  EXPECT_GT(of_two, 20u);
+  EXPECT_TRUE(played["/one/odom"].empty());
+  // the folders of both put together
+  std::filesystem::rename(folder / "one", folder / "run/one");
+  EXPECT_EQ(play_all()["/one/odom"].size(), flown["/one/odom"].size());
+}
+
+TEST(Playback, NumbersThatNoRunWritesAreSaidWithTheirLine) {
+  const TemporaryFolder folder;
+  Messages messages;
+  fly(folder, messages, 0.4);
+  const auto error = [&] { return error_of_run(folder); };
+  const auto with_row = [&](const std::string& file, const std::string& row) {
+    const std::string path = folder / ("run/" + file);
+    const std::string before = read_file(path);
+    write_file(path, before + row + "\n");
+    const std::string found = error();
+    write_file(path, before);
+    return found;
+  };
+  expect_contains(with_row("obstacles.csv", "0.3,10001,1e300,0,0,1,0,0,0,1,1,1"),
+                  "is no position of a run");
+  expect_contains(with_row("obstacles.csv", "0.3,1e300,0,0,0,1,0,0,0,1,1,1"), "is no label");
+  expect_contains(with_row("obstacles.csv", "0.3,10001,0,0,0,0,0,0,0,1,1,1"), "no unit quaternion");
+  expect_contains(with_row("events.csv", "0.3,collision,one,obstacle 1e300,0,0,0,0,0,0,0"),
+                  "events.csv:");
+  expect_contains(with_row("events.csv", "0.3,collision,one,map,1e300,0,0,0,0,0,0"),
+                  "no number of a run");
+  expect_contains(with_row("one/scans.csv", "a.pcd,4294967296,0,0,0.1,9,9"),
+                  "the scenario has no lidar 4294967296");
+  expect_contains(with_row("one/scans.csv", "a.pcd,0,0.5,0,0.1,9,9"), "is no count");
+  expect_contains(with_row("one/odometry.csv", "0.3,0.3,nan,0,0,1,0,0,0,0,0,0,0,0,0"),
+                  "odometry.csv:");
+  expect_contains(with_row("events.csv", "0.3,collision"), "2 columns where a run writes 11");
+}
+
+TEST(Playback, PipesInARunsFolderAreRefusedAtOnce) {
+  const TemporaryFolder folder;
+  Messages messages;
+  fly(folder, messages, 0.4);
+  for (const char* file : {"events.csv",
+                           "obstacles.csv",
+                           "summary.json",
+                           "scenario.yaml",
+                           "one/trajectory.csv",
+                           "one/scans.csv",
+                           "one/imu.csv"}) {
+    const std::string path = folder / (std::string("run/") + file);
+    std::filesystem::rename(path, path + ".aside");
+    ASSERT_EQ(::mkfifo(path.c_str(), 0600), 0);
+    expect_contains(error_of_run(folder), "a pipe or socket, not a regular file");
+    std::filesystem::remove(path);
+    std::filesystem::rename(path + ".aside", path);
+  }
 }
 
 }  // namespace

@@ -367,5 +367,55 @@ TEST(SimulationCalls, ScenariosThatAProgramFilledInAreHeldToWhatFilesMaySay) {
                   "mass");
 }
 
+TEST(SimulationCalls, InstantsBeyondAnyRunAreRefusedAtOnce) {
+  const Executor executor(1);
+  Scenario scenario = hovering();
+  scenario.obstacles.resize(1);
+  scenario.obstacles[0].count = 3;
+  scenario.obstacles[0].size.radius = 0.1;
+  Simulation simulation(scenario, hall(), executor);
+  EXPECT_THROW(simulation.skip_to(SimTime(from_seconds(1e7))), std::invalid_argument);
+  const SimTime far(from_seconds(1e8));
+  EXPECT_THROW(static_cast<void>(simulation.obstacles(far, far)), std::invalid_argument);
+  EXPECT_THROW(static_cast<void>(simulation.obstacles(simulation.time(), SimTime{} - Duration{1})),
+               std::invalid_argument);
+}
+
+TEST(SimulationCalls, RotorsTurnOneWayAndATakeOffGoesUp) {
+  const Executor executor(1);
+  Scenario scenario = hovering();
+  Simulation simulation(scenario, hall(), executor);
+  const std::size_t rotors = simulation.status(0).state.rotors.size();
+  RotorSpeedCommand turning{std::vector<double>(rotors, 500.0)};
+  EXPECT_FALSE(simulation.command(0, turning));
+  turning.speeds[0] = -1e9;
+  EXPECT_TRUE(simulation.command(0, turning));
+  TakeOffCommand down;
+  down.height = -5.0;
+  EXPECT_TRUE(simulation.command(0, down));
+}
+
+TEST(FlightRecorderCalls, AreOfOneRunAndEndOnce) {
+  const testing::TemporaryFolder folder;
+  const Executor executor(1);
+  Scenario scenario = hovering();
+  scenario.duration = 0.01;
+  scenario.vehicles[0].lidars.clear();
+  Simulation simulation(scenario, hall(), executor);
+  FlightRecorder recorder(folder / "run", simulation);
+  StateSample stranger;
+  stranger.vehicle = 1;
+  EXPECT_THROW(recorder.on_sample(stranger), std::invalid_argument);
+  Scenario named = scenario;
+  named.vehicles[0].name = "another";
+  const Simulation other(named, hall(), executor);
+  EXPECT_THROW(recorder.finish(other), std::invalid_argument);
+  while (simulation.step(recorder)) {
+  }
+  recorder.finish(simulation);
+  EXPECT_THROW(recorder.finish(simulation), std::logic_error);
+  EXPECT_THROW(recorder.on_sample(StateSample{}), std::logic_error);
+}
+
 }  // namespace
 }  // namespace pointflight

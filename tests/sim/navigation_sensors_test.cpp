@@ -158,5 +158,17 @@ TEST(NavigationSensors, ScenariosNameThemWithTheirKeys) {
                   "s.yaml:3");
 }
 
+TEST(NavigationSensors, WhatMakesNoSenseTogetherIsSaidWithItsLine) {
+  const auto error = [](const std::string& sensor) {
+    return error_of([&] {
+      static_cast<void>(parse_scenario("map: m.pfmap\nsensors:\n  - " + sensor + "\n", "s.yaml"));
+    });
+  };
+  expect_contains(error("{kind: gnss, outages: [{from: 20, until: 10}]}"),
+                  "s.yaml:3: sensors[0].outages[0].until: is not after from");
+  expect_contains(error("{kind: range_finder, range_min: 5, range_max: 4}"),
+                  "s.yaml:3: sensors[0].range_max: is not above range_min");
+}
+
 }  // namespace
 }  // namespace pointflight

@@ -217,6 +217,15 @@ def main():
     note("a hundred half requests", status(reply), "200")
     for s in held:
         s.close()
+    held = [server.connect() for _ in range(400)]
+    note("400 idle connections", status(ask(server, get(server, "/map/index"))), "200")
+    for s in held:
+        s.close()
+
+    flood, head = upgrade(server)
+    for _ in range(4):
+        flood.sendall(frame(b"[" * ((4 << 20) - 100)))
+    note("16 MB of brackets", status(ask(server, get(server, "/map/index"))), "200")
 
     assert server.run.poll() is None, "the flight has ended"
     s, head = upgrade(server)

@@ -99,6 +99,13 @@ TEST(Foxglove, RequestsOfClientsAreReadOrSaidWhatIsWrongWithThem) {
   // deep nesting takes no stack
   const std::string deep = std::string(200000, '[') + std::string(200000, ']');
   expect_contains(error_of([&] { static_cast<void>(parse_text(deep)); }), "no JSON object");
+  const std::string nested =
+      R"({"op": "x", "a": )" + std::string(20, '[') + std::string(20, ']') + "}";
+  expect_contains(error_of([&] { static_cast<void>(parse_text(nested)); }), "too long or deep");
+  const std::string fine = R"({"op": "x", "a": )" + std::string(9, '[') + std::string(9, ']') + "}";
+  EXPECT_NO_THROW(static_cast<void>(parse_text(fine)));
+  const std::string long_one = R"({"op": ")" + std::string(2 << 20, 'x') + "\"}";
+  expect_contains(error_of([&] { static_cast<void>(parse_text(long_one)); }), "too long or deep");
 }
 
 }  // namespace

@@ -63,7 +63,11 @@ Attempt::Attempt(const Folder& home, std::size_t number)
       lock_(folder_.path()) {}
 
 Attempt::~Attempt() {
-  if (!kept_) remove_flight(home_, name_);
+  if (kept_) return;
+  try {
+    remove_flight(home_, name_);
+  } catch (...) {  // NOLINT(bugprone-empty-catch): without memory, say; `remove_leftovers` does it
+  }
 }
 
 void Attempt::remove_bulk(const std::string& figures) const {

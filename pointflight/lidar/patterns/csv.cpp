@@ -27,10 +27,15 @@ class CsvPattern : public BeamPattern {
     const int elevation = zenith < 0 ? table.require("elevation") : -1;
     for (std::size_t row = 0; row < table.rows(); ++row) {
       const double up = zenith < 0 ? table.at(row, elevation) : 90.0 - table.at(row, zenith);
-      const Vector3d d = direction_of(table.at(row, azimuth) * kDegree, up * kDegree);
-      if (!d.allFinite()) {
-        throw InputError(fmt::format("{}: row {}: an angle is missing", path, row + 1));
+      const double around = table.at(row, azimuth);
+      constexpr double kRounded = 1e-3;  // deg
+      if (!(std::abs(around) <= 720.0) || !(std::abs(up) <= 90.0 + kRounded)) {
+        throw InputError(fmt::format("{}: ({}, {}) is no azimuth and elevation in degrees",
+                                     table.location(row),
+                                     around,
+                                     up));
       }
+      const Vector3d d = direction_of(around * kDegree, up * kDegree);
       directions_.push_back(d.cast<float>());
     }
   }

@@ -4,10 +4,16 @@
 #include <zlib.h>
 #include <zstd.h>
 
+#include <algorithm>
+
 namespace pointflight::mcap {
 namespace {
 
 constexpr std::uint64_t kLargestChunk = std::uint64_t{1} << 28;  // bytes, unpacked
+/// Whatever its packed size; more only if that is no less than a thousandth of it, so that a file
+/// of a few KB takes memory of a few MB.
+constexpr std::uint64_t kAlwaysTaken = std::uint64_t{1} << 25;
+constexpr std::uint64_t kMostGained = 1000;
 
 /// Bytes of a packed chunk; empty if they do not unpack to `size`.
 std::vector<std::byte> unpacked(std::span<const std::byte> packed,
@@ -54,7 +60,8 @@ std::optional<PackedChunk> chunk_of(RecordReader& record) {
   chunk.crc = record.number<std::uint32_t>();
   chunk.compression = record.text();
   chunk.data = record.take(record.number<std::uint64_t>());
-  if (!record.ok() || chunk.size > kLargestChunk) return std::nullopt;
+  const std::uint64_t most = std::max(kAlwaysTaken, kMostGained * chunk.data.size());
+  if (!record.ok() || chunk.size > std::min(kLargestChunk, most)) return std::nullopt;
   return chunk;
 }
 

@@ -13,7 +13,7 @@ namespace {
 /// Messages of a file without chunks are loaded so many bytes at a time.
 constexpr std::size_t kLoosePiece = std::size_t{4} << 20;
 
-/// Texts of types, each channel's counted: a few KiB in truth.
+/// Texts of types and topics, each channel's counted: a few KiB in truth.
 constexpr std::size_t kMostSchemas = std::size_t{64} << 20;
 
 /// Times count from here on as ns of an int64 that differences fit into.
@@ -129,7 +129,7 @@ void Outline::describe(Opcode opcode, RecordReader& reader) {
     if (!reader.ok()) return;
     has_summary_ = has_summary_ || data_ended_;
     if (!numbers_.emplace(id, channels_.size()).second) return;
-    count_schema(channel.schema.size());
+    count_schema(channel.schema.size() + channel.topic.size() + channel.schema_name.size());
     channels_.push_back(std::move(channel));
   }
 }
@@ -138,7 +138,7 @@ void Outline::count_schema(std::size_t bytes) {
   schema_bytes_ += bytes;
   if (schema_bytes_ > kMostSchemas) {
     throw InputError(fmt::format(
-        "{}: the types of its topics are longer than {} MiB", name_, kMostSchemas >> 20));
+        "{}: its topics and their types are longer than {} MiB", name_, kMostSchemas >> 20));
   }
 }
 

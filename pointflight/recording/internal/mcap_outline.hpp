@@ -16,17 +16,29 @@ namespace pointflight::mcap {
 
 using ChannelId = std::uint16_t;
 
+struct Record {
+  Opcode opcode{};
+  std::span<const std::byte> content;
+};
+
+/// The record at an offset, which goes to the next one. Nothing if none is whole there.
+inline std::optional<Record> record_at(std::span<const std::byte> bytes, std::size_t& at) {
+  if (bytes.size() - at < mcap::kRecordHead) return std::nullopt;
+  std::uint64_t length = 0;
+  std::memcpy(&length, bytes.data() + at + 1, sizeof(length));
+  if (length > bytes.size() - at - mcap::kRecordHead) return std::nullopt;
+  const Record record{static_cast<Opcode>(bytes[at]),
+                      bytes.subspan(at + mcap::kRecordHead, length)};
+  at += mcap::kRecordHead + length;
+  return record;
+}
+
 /// Calls `take(opcode, content)` for each whole record, until it returns false.
 template <class Take>
 void each_record(std::span<const std::byte> bytes, const Take& take) {
   std::size_t at = 0;
-  while (bytes.size() - at >= mcap::kRecordHead) {
-    const auto opcode = static_cast<Opcode>(bytes[at]);
-    std::uint64_t length = 0;
-    std::memcpy(&length, bytes.data() + at + 1, sizeof(length));
-    if (length > bytes.size() - at - mcap::kRecordHead) return;
-    if (!take(opcode, bytes.subspan(at + mcap::kRecordHead, length))) return;
-    at += mcap::kRecordHead + length;
+  while (const auto record = record_at(bytes, at)) {
+    if (!take(record->opcode, record->content)) return;
   }
 }
 

@@ -8,19 +8,37 @@ namespace pointflight::mcap {
 namespace {
 
 /// Of unpacked chunks that are merged by time; a recorder's overlap by one or two.
-constexpr std::size_t kMostUnpacked = std::size_t{512} << 20;
+constexpr std::size_t kMostUnpacked = std::size_t{256} << 20;
 
-template <class Take>
-void each_message(const Piece& piece, const std::vector<std::byte>* unpacked, const Take& take) {
-  const auto bytes = unpacked != nullptr ? std::span(*unpacked) : piece.records;
-  each_record(bytes, [&](Opcode opcode, std::span<const std::byte> content) {
-    if (opcode != Opcode::kMessage) return true;
-    if (const auto message = message_of(content)) take(*message);
-    return true;
-  });
+/// The next message from an offset on, which goes behind it.
+std::optional<Message> next_message(std::span<const std::byte> records, std::size_t& at) {
+  while (const auto record = record_at(records, at)) {
+    if (record->opcode != Opcode::kMessage) continue;
+    if (const auto message = message_of(record->content)) return message;
+  }
+  return std::nullopt;
 }
 
 }  // namespace
+
+struct Timeline::Open {
+  /// Where a message is, of a piece whose messages are not in the order of time.
+  struct Entry {
+    std::int64_t time;
+    std::uint32_t offset;
+  };
+  std::size_t piece = 0;
+  Unpacked bytes;
+  std::span<const std::byte> records;
+  std::vector<Entry> entries;  ///< By time; none: they lie in order, and nothing is kept of them.
+  std::size_t at = 0;          ///< In the entries, else in the records: of the one after `now`.
+  Message now;                 ///< Given next.
+};
+
+bool Timeline::IsLater::operator()(const std::shared_ptr<Open>& a,
+                                   const std::shared_ptr<Open>& b) const {
+  return std::pair(a->now.time, a->piece) > std::pair(b->now.time, b->piece);
+}
 
 Timeline::Timeline(std::span<const std::byte> bytes,
                    const std::string& name,
@@ -43,7 +61,7 @@ Timeline::Timeline(std::unique_ptr<MappedFile> file,
 void Timeline::seek(std::int64_t time) {
   from_ = time;
   next_piece_ = 0;
-  waiting_ = {};
+  open_ = {};
   held_.reset();
 }
 
@@ -52,15 +70,16 @@ bool Timeline::next(TimedMessage& message) {
   for (; next_piece_ < pieces.size(); ++next_piece_) {
     const Piece& piece = pieces[next_piece_];
     if (piece.end < from_) continue;
-    const bool is_due = waiting_.empty() || piece.start <= waiting_.top().message.time;
-    if (!is_due || (unpacked_bytes_ > kMostUnpacked && !waiting_.empty())) break;
-    load(piece);
+    const bool is_due = open_.empty() || piece.start <= open_.top()->now.time;
+    if (!is_due || (unpacked_bytes_ > kMostUnpacked && !open_.empty())) break;
+    open(next_piece_);
   }
-  if (waiting_.empty()) return false;
-  held_ = waiting_.top().bytes;
-  const Message& first = waiting_.top().message;
-  message = {*outline_.number_of(first.channel), first.time, first.data};
-  waiting_.pop();
+  if (open_.empty()) return false;
+  const auto first = open_.top();
+  open_.pop();
+  held_ = first->bytes;
+  message = {*outline_.number_of(first->now.channel), first->now.time, first->now.data};
+  if (advance(*first)) open_.push(first);
   return true;
 }
 
@@ -76,30 +95,44 @@ void Timeline::latched_before(std::int64_t time,
   for (const Piece& piece : pieces) {
     reach.push_back(reach.empty() ? piece.end : std::max(reach.back(), piece.end));
   }
+  // where the last message of each is: its piece, and the offset there
   struct Last {
-    Message message;
-    Unpacked bytes;
+    std::size_t piece = 0;
+    std::size_t offset = 0;
+    std::int64_t time = 0;
   };
   std::map<std::size_t, Last> last;
   for (std::size_t i = pieces.size(); i-- > 0 && !wanted.empty();) {
     // pieces overlap: one is the last if none that is left comes up to it
     std::erase_if(wanted, [&](std::size_t channel) {
       const auto found = last.find(channel);
-      return found != last.end() && found->second.message.time > reach[i];
+      return found != last.end() && found->second.time > reach[i];
     });
     if (pieces[i].start > time || !has_one_of(pieces[i], wanted)) continue;
     const Unpacked bytes = unpack(pieces[i]);
-    each_message(pieces[i], bytes.get(), [&](const Message& message) {
-      const auto channel = outline_.number_of(message.channel);
-      if (!channel || !wanted.contains(*channel) || message.time >= time) return;
+    const auto records = bytes ? std::span(*bytes) : pieces[i].records;
+    std::size_t at = 0;
+    for (std::size_t offset = 0; const auto message = next_message(records, at); offset = at) {
+      const auto channel = outline_.number_of(message->channel);
+      if (!channel || !wanted.contains(*channel) || message->time >= time) continue;
       const auto known = last.find(*channel);
-      if (known == last.end() || message.time >= known->second.message.time) {
-        last[*channel] = {message, bytes};
+      if (known == last.end() || message->time >= known->second.time) {
+        last[*channel] = {i, offset, message->time};
       }
-    });
+    }
   }
+  // one chunk at a time, however many channels have theirs in another
+  std::map<std::size_t, std::vector<std::pair<std::size_t, std::size_t>>> by_piece;
   for (const auto& [channel, found] : last) {
-    take({channel, found.message.time, found.message.data});
+    by_piece[found.piece].emplace_back(channel, found.offset);
+  }
+  for (const auto& [piece, found] : by_piece) {
+    const Unpacked bytes = unpack(pieces[piece]);
+    const auto records = bytes ? std::span(*bytes) : pieces[piece].records;
+    for (auto [channel, offset] : found) {
+      const auto message = next_message(records, offset);
+      take({channel, message->time, message->data});
+    }
   }
 }
 
@@ -136,16 +169,54 @@ Timeline::Unpacked Timeline::unpack(const Piece& piece) {
           }};
 }
 
-void Timeline::load(const Piece& piece) {
-  const auto bytes = unpack(piece);
-  if (bytes) {
+/// Makes a piece's messages wait for their times.
+void Timeline::open(std::size_t number) {
+  const Piece& piece = outline_.pieces()[number];
+  const auto opened = std::make_shared<Open>();
+  opened->piece = number;
+  opened->bytes = unpack(piece);
+  if (opened->bytes) {
     ++chunks_;
     compressions_.insert(piece.chunk->compression);
   }
-  each_message(piece, bytes.get(), [&](const Message& message) {
-    if (message.time < from_ || !outline_.number_of(message.channel)) return;
-    waiting_.push({message, order_++, bytes});
-  });
+  opened->records = opened->bytes ? std::span(*opened->bytes) : piece.records;
+  // recorders write in the order of time, nearly always: then there is nothing to sort
+  std::int64_t latest = std::numeric_limits<std::int64_t>::min();
+  bool is_sorted = true;
+  std::size_t at = 0;
+  while (const auto message = next_message(opened->records, at)) {
+    is_sorted = is_sorted && message->time >= latest;
+    latest = message->time;
+  }
+  if (!is_sorted) {
+    at = 0;
+    for (std::size_t offset = 0; const auto message = next_message(opened->records, at);
+         offset = at) {
+      if (!is_wanted(*message)) continue;
+      opened->entries.push_back({message->time, static_cast<std::uint32_t>(offset)});
+    }
+    std::stable_sort(opened->entries.begin(),
+                     opened->entries.end(),
+                     [](const auto& a, const auto& b) { return a.time < b.time; });
+    if (opened->entries.empty()) return;
+  }
+  if (advance(*opened)) open_.push(opened);
+}
+
+/// Goes to the piece's next message. False if there are none left.
+bool Timeline::advance(Open& open) const {
+  if (!open.entries.empty()) {
+    if (open.at == open.entries.size()) return false;
+    std::size_t offset = open.entries[open.at++].offset;
+    open.now = *next_message(open.records, offset);
+    return true;
+  }
+  while (const auto message = next_message(open.records, open.at)) {
+    if (!is_wanted(*message)) continue;
+    open.now = *message;
+    return true;
+  }
+  return false;
 }
 
 }  // namespace pointflight::mcap

@@ -4,6 +4,7 @@
 #include <memory>
 #include <queue>
 #include <set>
+#include <vector>
 
 #include "pointflight/core/mapped_file.hpp"
 #include "pointflight/recording/internal/mcap_outline.hpp"
@@ -36,18 +37,20 @@ class Timeline : public TimedRecording {
 
  private:
   using Unpacked = std::shared_ptr<const std::vector<std::byte>>;
-  struct Waiting {
-    Message message;
-    std::uint64_t order = 0;  ///< Of equal times the first in the file comes first.
-    Unpacked bytes;           ///< What it lies in.
-    bool operator<(const Waiting& other) const {
-      return std::pair(message.time, order) > std::pair(other.message.time, other.order);
-    }
+  /// A piece whose messages are being given.
+  struct Open;
+  /// Of equal times the first in the file comes first.
+  struct IsLater {
+    bool operator()(const std::shared_ptr<Open>& a, const std::shared_ptr<Open>& b) const;
   };
 
   [[nodiscard]] bool has_one_of(const Piece& piece, const std::set<std::size_t>& wanted) const;
   Unpacked unpack(const Piece& piece);
-  void load(const Piece& piece);
+  void open(std::size_t piece);
+  bool advance(Open& open) const;
+  [[nodiscard]] bool is_wanted(const Message& message) const {
+    return message.time >= from_ && outline_.number_of(message.channel).has_value();
+  }
 
   std::unique_ptr<MappedFile> file_;  ///< None if the bytes are somebody else's.
   Outline outline_;
@@ -55,8 +58,9 @@ class Timeline : public TimedRecording {
   std::int64_t from_ = std::numeric_limits<std::int64_t>::min();
   std::size_t next_piece_ = 0;
   std::size_t unpacked_bytes_ = 0;  ///< Of all chunks that are held; outlives them.
-  std::priority_queue<Waiting> waiting_;
-  std::uint64_t order_ = 0;
+  using Queue =
+      std::priority_queue<std::shared_ptr<Open>, std::vector<std::shared_ptr<Open>>, IsLater>;
+  Queue open_;     ///< By the message that each gives next.
   Unpacked held_;  ///< Of the message that was given last.
   std::uint64_t chunks_ = 0;
   bool has_broken_chunks_ = false;

@@ -101,6 +101,14 @@ CloudMessagePoints points_of(const msg::PointCloud2& cloud) {
                                  cloud.point_step,
                                  cloud.data.size()));
   }
+  // fields may lie on each other, so that bytes alone do not bound what a point takes here
+  constexpr std::uint64_t kMostPoints = 20'000'000;
+  if (std::uint64_t{cloud.width} * cloud.height > kMostPoints) {
+    throw InputError(fmt::format("{} x {} points, more than any scan has ({} million)",
+                                 cloud.width,
+                                 cloud.height,
+                                 kMostPoints / 1'000'000));
+  }
   const msg::PointField* const xyz[] = {
       field_of(cloud, {"x"}), field_of(cloud, {"y"}), field_of(cloud, {"z"})};
   if (std::find(std::begin(xyz), std::end(xyz), nullptr) != std::end(xyz)) {

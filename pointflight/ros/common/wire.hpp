@@ -7,6 +7,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace pointflight {
@@ -178,14 +179,15 @@ struct RecordingInfo {
   bool complete = true;                 ///< False: cut short, what is counted is what can be read.
 };
 
-/// A message of a recording, as it lies there.
+/// A message of a recording, as it lies there. Its names and bytes are valid until the next one is
+/// read.
 struct Recorded {
   /// "/quad_0/imu" and "sensor_msgs/msg/Imu" (ROS 1: "sensor_msgs/Imu").
   ///@{
-  std::string topic, type;
+  std::string_view topic, type;
   ///@}
   std::int64_t time = 0;            ///< ns since the Unix epoch, when it was recorded.
-  const std::byte* data = nullptr;  ///< Valid until the next one is read.
+  const std::byte* data = nullptr;  ///< Of the message.
   std::size_t size = 0;             ///< Bytes.
 };
 

@@ -160,8 +160,10 @@ class BagMessages : public MessageReader {
       ros::serialization::OStream stream(reinterpret_cast<std::uint8_t*>(bytes_.data()),
                                          static_cast<std::uint32_t>(bytes_.size()));
       found.write(stream);
-      message.topic = found.getTopic();
-      message.type = found.getDataType();
+      topic_ = found.getTopic();
+      type_ = found.getDataType();
+      message.topic = topic_;
+      message.type = type_;
       message.time = static_cast<std::int64_t>(found.getTime().toNSec());
       message.data = bytes_.data();
       message.size = bytes_.size();
@@ -176,6 +178,7 @@ class BagMessages : public MessageReader {
   rosbag::View::iterator at_;
   std::size_t count_ = 0;
   std::size_t read_ = 0;
+  std::string topic_, type_;
   std::vector<std::byte> bytes_;
 };
 

@@ -11,11 +11,24 @@ inline constexpr std::size_t kLargestHeader = 16 << 10;
 class LiveServer::Impl::HttpSession : public std::enable_shared_from_this<HttpSession> {
  public:
   HttpSession(Impl& server, tcp::socket&& socket) : server_(server), stream_(std::move(socket)) {
-    ++server_.connections_;
+    server_.sessions_.insert(this);
   }
-  ~HttpSession() { --server_.connections_; }
+  ~HttpSession() { server_.sessions_.erase(this); }
+  HttpSession(const HttpSession&) = delete;
+  HttpSession& operator=(const HttpSession&) = delete;
+
+  /// True while it has asked for nothing, since a time.
+  [[nodiscard]] bool is_idle() const { return is_idle_; }
+  [[nodiscard]] Clock::time_point since() const { return since_; }
+  /// For one that asks: it ends.
+  void drop() {
+    is_idle_ = false;
+    stream_.close();
+  }
 
   void read() {
+    is_idle_ = true;
+    since_ = Clock::now();
     parser_.emplace();
     parser_->header_limit(kLargestHeader);
     parser_->body_limit(0);
@@ -31,6 +44,7 @@ class LiveServer::Impl::HttpSession : public std::enable_shared_from_this<HttpSe
   using Request = http::request<http::string_body>;
 
   void answer(beast::error_code error) {
+    is_idle_ = false;
     if (error == http::error::end_of_stream) return close();
     if (error == http::error::header_limit || error == http::error::body_limit) {
       return refuse(http::status::payload_too_large, "too large");
@@ -188,6 +202,8 @@ class LiveServer::Impl::HttpSession : public std::enable_shared_from_this<HttpSe
 
   Impl& server_;
   beast::tcp_stream stream_;
+  bool is_idle_ = false;
+  Clock::time_point since_{};
   beast::flat_buffer buffer_;
   std::optional<http::request_parser<http::string_body>> parser_;
   std::shared_ptr<const std::vector<std::byte>> content_;

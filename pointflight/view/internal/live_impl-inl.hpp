@@ -17,6 +17,7 @@
 #include <thread>
 #include <utility>  // before Asio: its 1.74 uses std::exchange without it
 
+#include "pointflight/core/argument.hpp"
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/view/live_server.hpp"
 #include "pointflight/view/web_rules.hpp"
@@ -31,6 +32,7 @@ using tcp = net::ip::tcp;
 using Clock = std::chrono::steady_clock;
 
 inline constexpr std::size_t kMostClients = 64;
+inline constexpr std::size_t kMostSessions = 256;            // connections that are no viewers' yet
 inline constexpr auto kPatience = std::chrono::seconds(30);  // with a client that does not go on
 
 inline std::string_view as_view(beast::string_view text) {
@@ -87,6 +89,7 @@ class LiveServer::Impl {
   class HttpSession;
 
   void accept();
+  bool close_most_idle();
   [[nodiscard]] Permission permission_of(const http::request<http::string_body>& request) const;
   void greet(Client& client);
   void to_all(const Frame& frame);
@@ -95,6 +98,12 @@ class LiveServer::Impl {
   [[nodiscard]] KnownChannel* channel(std::uint32_t id) {
     const std::lock_guard lock(mutex_);
     return id >= 1 && id <= channels_.size() ? &channels_[id - 1] : nullptr;
+  }
+
+  /// The same under the mutex, of a caller's own. Throws std::invalid_argument if there is none.
+  [[nodiscard]] KnownChannel& known(std::uint32_t id) {
+    require_argument(id >= 1 && id <= channels_.size(), "LiveServer: no such channel");
+    return channels_[id - 1];
   }
 
   LiveServerOptions options_;
@@ -106,7 +115,7 @@ class LiveServer::Impl {
   net::thread_pool makers_{1};  ///< Of what HTTP serves.
   tcp::acceptor acceptor_{io_};
   std::set<std::shared_ptr<Client>> clients_;
-  std::size_t connections_ = 0;
+  std::set<HttpSession*> sessions_;  ///< All that live.
   Clock::time_point last_time_{};
   std::function<void(const foxglove::PlaybackControl&)> on_playback_;
 
