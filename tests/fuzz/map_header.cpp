@@ -42,6 +42,7 @@ void ask(const SurfelMap& map, bool draws) {
     const picture::MapLayers layers(map);
     static_cast<void>(layers.floor_at(map.bounds_world().min));
   }
+  if (map.bounds_world().size().maxCoeff() > 20.0) return;  // a grid over all of it takes seconds
   TourOptions options;
   options.length_min = 2.0;
   const Vector3d corner = map.bounds_world().min;
