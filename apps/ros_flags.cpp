@@ -133,6 +133,7 @@ bool RosPart::is_live(const Scenario& /*scenario*/) const {
 
 void RosPart::prepare(Scenario& scenario, double rate) {
   if (!flags_.any()) return;
+  rate_ = rate;
   const RosProfile profile = profile_for(scenario, flags_.profile);
   scenario.output.odometry_rate = std::max(scenario.output.odometry_rate, odometry_rate(profile));
   const bool planned = std::any_of(
@@ -173,6 +174,7 @@ std::unique_ptr<Outlet> open_recording(const RosFlags& flags,
 
 /// ROS, recordings and the viewers of `view`, if any, with everything open. Throws InputError.
 std::unique_ptr<RosLink> make_ros_link(const RosFlags& flags,
+                                       double rate,
                                        const Simulation& simulation,
                                        const std::shared_ptr<LiveServer>& view) {
   if (!flags.any()) return nullptr;
@@ -195,6 +197,8 @@ std::unique_ptr<RosLink> make_ros_link(const RosFlags& flags,
   transport.log = [](const std::string& text) { log(text); };
   transport.localhost_only = flags.localhost;
   if (flags.ros2) transport.large_rate = large_rate(run, profile);
+  // in lockstep nobody waits for a clock
+  if (flags.lockstep <= 0.0) transport.run_rate = rate;
   if (flags.ros1) link->add_transport(ros1_module().transport(transport));
   if (flags.ros2) link->add_transport(ros2_module().transport(transport));
   if (view) link->add_transport(std::make_unique<FoxgloveTransport>(view));
@@ -206,7 +210,7 @@ std::unique_ptr<RosLink> make_ros_link(const RosFlags& flags,
 void RosPart::connect(Simulation& simulation, RunLoop& loop) {
   if (!flags_.any()) return;
   server_ = start_viewing(flags_.view, simulation.shared_map());
-  ros_ = make_ros_link(flags_, simulation, server_);
+  ros_ = make_ros_link(flags_, rate_, simulation, server_);
   ThreadedLink::Options options;
   if (!flags_.is_live()) options.hold = kFilesWait;
   loop.add(thread_.emplace(*ros_, options));

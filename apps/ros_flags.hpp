@@ -65,6 +65,7 @@ class RosPart : public FlightPart {
   void say_recordings() const;
 
   RosFlags flags_;
+  double rate_ = 0.0;  ///< Of the run; 0: as fast as it goes.
   std::shared_ptr<LiveServer> server_;
   std::unique_ptr<RosLink> ros_;
   std::unique_ptr<ViewLink> view_;

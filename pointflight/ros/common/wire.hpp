@@ -142,6 +142,9 @@ struct TransportOptions {
   std::string node = "pointflight";  ///< Name of the node, without a slash.
   bool localhost_only = false;       ///< ROS 2.
   double large_rate = 0.0;  ///< Bytes per second of clouds and pictures, all read: for ROS 2.
+  /// ROS 2: seconds of the run per second at which small messages leave though they come in bursts;
+  /// 0: as they come.
+  double run_rate = 0.0;
   std::function<void(const std::string&)> log;  ///< Lines for the user, from any thread.
 };
 

@@ -143,8 +143,8 @@ class Ros2Transport : public Transport {
       const RawWriter& writer = outputs_[output]->writer;
       if (!write_raw(writer.entity, writer.type, bytes)) ++dropped_;
     };
-    small_.start(write, 0.0);
-    large_.start(write, options_.large_rate > kSlowRate ? kFastPace : kPace);
+    small_.start(write, 0.0, options_.run_rate);
+    large_.start(write, options_.large_rate > kSlowRate ? kFastPace : kPace, 0.0);
   }
 
   bool is_connected() const override { return true; }
@@ -161,11 +161,11 @@ class Ros2Transport : public Transport {
     return outputs_[static_cast<std::size_t>(topic)]->readers;
   }
 
-  void send(int topic, const Bytes& bytes, std::int64_t /*time*/) override {
+  void send(int topic, const Bytes& bytes, std::int64_t time) override {
     const auto output = static_cast<std::size_t>(topic);
     const Topic& t = outputs_[output]->topic;
     dropped_ += t.large ? large_.push(output, bytes, t.latched, t.depth)
-                        : small_.push(output, bytes, t.latched, WriteQueue::kQueueMax);
+                        : small_.push(output, bytes, t.latched, WriteQueue::kQueueMax, time);
   }
 
   void flush() override {
