@@ -83,6 +83,10 @@ void add_ros_flags(CLI::App& app, RosFlags& flags) {
       "Topics, frames and message types: default, marsim, ego, livox, ... or a path (docs/ros.md)");
   app.add_option(
       "--epoch", flags.epoch, "Time stamp of the start of the run: 'now', or seconds since 1970");
+  app.add_flag("--sim-time",
+               flags.sim_time,
+               "Send /clock whatever the profile: nodes with use_sim_time live on it, and the run "
+               "may be slower than real time (--rate)");
   app.add_option("--node", flags.node, "Name of the ROS node")->capture_default_str();
   app.add_flag("--no-wait", flags.no_wait, "Fly even while there is no ROS 1 master yet");
   auto* stay = app.add_flag("--stay",
@@ -110,6 +114,7 @@ void add_ros_flags(CLI::App& app, RosFlags& flags) {
 void RosPart::check() const {
   for (const auto& [flag, given] : {std::pair{"--lockstep", flags_.lockstep > 0.0},
                                     std::pair{"--stay", flags_.stay},
+                                    std::pair{"--sim-time", flags_.sim_time},
                                     std::pair{"--no-wait", flags_.no_wait}}) {
     if (given && !flags_.is_live()) {
       throw InputError(fmt::format("{}: has no effect without --ros1, --ros2 or --view", flag));
@@ -179,8 +184,10 @@ std::unique_ptr<RosLink> make_ros_link(const RosFlags& flags,
                                        const std::shared_ptr<LiveServer>& view) {
   if (!flags.any()) return nullptr;
   const Scenario& scenario = simulation.scenario();
-  const RosProfile profile = profile_for(scenario, flags.profile);
+  RosProfile profile = profile_for(scenario, flags.profile);
+  if (flags.sim_time) add_clock(profile);
   RosLinkOptions options;
+  options.needs_clock = flags.has_ros() && !has_clock(profile);
   options.epoch = epoch_of(flags, scenario, profile);
   options.waits = !flags.no_wait;
   options.lockstep = flags.lockstep > 0.0;

@@ -25,6 +25,7 @@ struct RosFlags {
   bool no_wait = false;              ///< Fly on without a master.
   std::string profile;               ///< Empty: the scenario's.
   std::string epoch;                 ///< Empty: the scenario's or profile's.
+  bool sim_time = false;             ///< Send the clock, whatever the profile.
   bool stay = false;                 ///< Hover when the mission is flown.
   bool no_stay = false;              ///< End with the mission.
   double lockstep = 0.0;             ///< Wait so long for an answer to each scan, s; 0: not at all.

@@ -65,9 +65,9 @@ class Link : public SampleSink {
   /// False once nothing of the run reaches anybody through it: a recording that failed. A run ends
   /// where no link is in use any more.
   [[nodiscard]] virtual bool is_in_use() const { return true; }
-  /// What users can do, besides making it cheaper, about a run that falls behind the wall clock;
-  /// empty: go at a lower rate.
-  [[nodiscard]] virtual std::string remedy_when_behind() const { return {}; }
+  /// What users can do, besides making it cheaper, about a run that falls behind the wall clock,
+  /// where the machine manages `rate`; empty: go at that.
+  [[nodiscard]] virtual std::string remedy_when_behind(double /*rate*/) const { return {}; }
   /// How many samples or messages were dropped because a consumer was too slow.
   [[nodiscard]] virtual std::uint64_t dropped() const { return 0; }
 };

@@ -282,14 +282,12 @@ void RunLoop::reset() {
 void RunLoop::say_behind() {
   const auto behind = pace_.fallen_behind(simulation_.time());
   if (!behind) return;
+  const double rate = std::max(0.1, std::floor(9.0 * behind->rate) / 10.0);
   std::string instead;
   for (const Link* link : links_) {
-    if (instead.empty()) instead = link->remedy_when_behind();
+    if (instead.empty()) instead = link->remedy_when_behind(rate);
   }
-  if (instead.empty()) {
-    instead = fmt::format("--rate {:.1f}, or --lockstep",
-                          std::max(0.1, std::floor(9.0 * behind->rate) / 10.0));
-  }
+  if (instead.empty()) instead = fmt::format("--rate {:.1f}, or --lockstep", rate);
   say(
       fmt::format("warning: {:.1f} s behind: this machine manages a rate of {:.2f}, not {}; "
                   "use fewer LiDARs, a coarser map or {}",

@@ -63,8 +63,8 @@ class ThreadedLink : public Link {
   void close() override;
   [[nodiscard]] bool is_over() const override { return link_.is_over(); }
   [[nodiscard]] bool is_in_use() const override { return link_.is_in_use(); }
-  [[nodiscard]] std::string remedy_when_behind() const override {
-    return link_.remedy_when_behind();
+  [[nodiscard]] std::string remedy_when_behind(double rate) const override {
+    return link_.remedy_when_behind(rate);
   }
   [[nodiscard]] std::uint64_t dropped() const override;
 

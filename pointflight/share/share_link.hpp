@@ -20,7 +20,7 @@ class ShareLink : public Link {
   void close() override;
   [[nodiscard]] bool is_over() const override { return !share_.fault().empty(); }
   // others' rates are the same, and would have to be changed with this one's
-  [[nodiscard]] std::string remedy_when_behind() const override {
+  [[nodiscard]] std::string remedy_when_behind(double /*rate*/) const override {
     return "share: {time: lockstep}";
   }
   /// Nobody flies for its sake alone.

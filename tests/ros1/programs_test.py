@@ -130,7 +130,8 @@ class Launch:
         environment = dict(
             os.environ, ROS_MASTER_URI=f"http://127.0.0.1:{port}", ROS_IP="127.0.0.1",
             ROS_HOME=f"{folder}/home", ROS_PACKAGE_PATH=f"{SOURCE}/ros_packages/catkin:{folder}/packages",
-            STUB_RESULTS=self.results, STUB_HELPERS=HERE, PATH="/usr/bin:/bin")
+            STUB_RESULTS=self.results, STUB_HELPERS=HERE, PATH="/usr/bin:/bin",
+            STUB_SIM_TIME=str("sim_time:=true" in words))
         self.process = subprocess.Popen(
             ["/usr/bin/roslaunch", "-p", str(port), "pointflight_ros", *words,
              f"program:={PROGRAM}", "rviz:=false"],
@@ -208,6 +209,9 @@ def main():
         run("scenario", "new", f"{folder}/f.pfmap", "-o", free, "--start-in=-10,-10,0.8,10,10,1.6")
         start = yaml.safe_load(open(free))["vehicles"][0]["start"]
         where = [f"init_{a}:={v}" for a, v in zip("xyz", start)]
+        with_camera = f"{folder}/camera.yaml"
+        run("scenario", "new", f"{folder}/f.pfmap", "-o", with_camera, "--start-in=-10,-10,0.8,10,10,1.6",
+            "--lidar", f"{SOURCE}/ros_packages/catkin/pointflight_ros/config/fuel_camera.yaml")
         lio = lambda lidar, sensor: (
             ["fast_lio.launch", map_file, f"lidar:={lidar}", f"flags:=--lidar {sensor}"],
             ["fastlio_mapping"])
@@ -218,8 +222,14 @@ def main():
             "fast_lio_ouster": lio("ouster", "os1_128"),
             "point_lio": (["point_lio.launch", map_file], ["pointlio_mapping"]),
             "ego_planner": (["ego_planner.launch", map_file], ["ego_planner_node", "traj_server"]),
+            "ego_planner at half the speed": (
+                ["ego_planner.launch", map_file, "sim_time:=true", "flags:=--rate 0.5"],
+                ["ego_planner_node", "traj_server"]),
             "fuel": (["fuel.launch", map_file, *where],
                      ["exploration_node", "traj_server", "waypoint_generator"]),
+            "fuel with the scenario's camera": (
+                ["fuel.launch", f"map:={with_camera}", "lidar:=scenario", *where],
+                ["exploration_node", "traj_server", "waypoint_generator"]),
         }
         failed = []
         for name, (words, stubs) in cases.items():

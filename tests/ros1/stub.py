@@ -301,6 +301,9 @@ def main():
     rospy.init_node(NAME, disable_signals=True)
     need(rosgraph.is_master_online(), "no master")
     try:
+        if rospy.get_param("/use_sim_time", False):
+            collect("/clock", rospy.AnyMsg, 3)
+        need(os.environ["STUB_SIM_TIME"] == str(rospy.get_param("/use_sim_time", False)), "/use_sim_time")
         globals()[NAME]()
     except Exception as error:  # noqa: BLE001: whatever it is, it is what is wrong
         FAULTS.append(f"{type(error).__name__}: {error}")

@@ -344,6 +344,22 @@ TEST(RosBridge, Slow_SeveralVehiclesShareNoFrame) {
                                    "drone1/livox_frame_d455_optical"}));
 }
 
+TEST(RosProfiles, AnyCanSendTheClock) {
+  EXPECT_TRUE(has_clock(load_ros_profile("default")));
+  RosProfile ego = load_ros_profile("ego");
+  EXPECT_FALSE(has_clock(ego));
+  const std::size_t outputs = ego.outputs.size();
+  add_clock(ego);
+  add_clock(ego);
+  EXPECT_TRUE(has_clock(ego));
+  EXPECT_EQ(ego.outputs.size(), outputs + 1);
+  ego.outputs.front().topic = "-";  // switched off
+  EXPECT_FALSE(has_clock(ego));
+  add_clock(ego);
+  EXPECT_TRUE(has_clock(ego));
+  EXPECT_EQ(ego.outputs.size(), outputs + 1);
+}
+
 TEST(RosBridge, TheClockOfAPausedRunSaysWhereItStands) {
   const Executor executor(1);
   Simulation simulation(flight(), hall(), executor);

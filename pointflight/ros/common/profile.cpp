@@ -17,6 +17,8 @@
 namespace pointflight {
 namespace {
 
+constexpr const char* kClockOutput = "clock";
+
 constexpr Named<StampEpoch> kEpochs[] = {{StampEpoch::kFixed, "fixed"}, {StampEpoch::kNow, "now"}};
 constexpr Named<TwistFrame> kTwists[] = {{TwistFrame::kBody, "body"},
                                          {TwistFrame::kWorld, "world"}};
@@ -169,6 +171,22 @@ RosProfile load_ros_profile(const std::string& name_or_path, const std::string& 
 RosProfile parse_ros_profile(std::string_view text, const std::string& path) {
   SettingsReader reader(text, path);
   return read(reader, path);
+}
+
+bool has_clock(const RosProfile& profile) {
+  return std::any_of(profile.outputs.begin(), profile.outputs.end(), [](const RosOutput& output) {
+    return output.kind == kClockOutput && is_used(output.topic);
+  });
+}
+
+void add_clock(RosProfile& profile) {
+  if (has_clock(profile)) return;
+  std::erase_if(profile.outputs, [](const RosOutput& o) { return o.kind == kClockOutput; });
+  RosOutput clock;
+  clock.kind = kClockOutput;
+  clock.topic = "/clock";
+  clock.rate = 100.0;
+  profile.outputs.insert(profile.outputs.begin(), std::move(clock));
 }
 
 RosProfile profile_for(const Scenario& scenario, const std::string& name) {

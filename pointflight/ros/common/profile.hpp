@@ -65,6 +65,11 @@ RosProfile parse_ros_profile(std::string_view text, const std::string& path);
 /// take.
 RosProfile profile_for(const Scenario& scenario, const std::string& name = {});
 
+/// True if it sends the run's clock, which nodes with use_sim_time live on.
+bool has_clock(const RosProfile& profile);
+/// Lets it send the clock.
+void add_clock(RosProfile& profile);
+
 /// What `{vehicle}`, `{id}` and `{lidar}` stand for.
 struct RosNames {
   std::string vehicle;  ///< The vehicle's name in the scenario.

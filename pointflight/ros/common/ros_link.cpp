@@ -87,6 +87,14 @@ std::vector<Order> RosLink::take_orders() {
   return inbox_.take();
 }
 
+std::string RosLink::remedy_when_behind(double rate) const {
+  if (!options_.needs_clock) return {};
+  return fmt::format(
+      "--rate {:.1f} with --sim-time and use_sim_time in all nodes (of our launch files: "
+      "sim_time:=true), or --lockstep",
+      rate);
+}
+
 /// The first of each kind at once, their number in the end.
 void RosLink::say_refused() {
   for (const std::string& reason : inbox_.take_new_reasons()) {

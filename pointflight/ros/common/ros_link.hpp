@@ -22,6 +22,7 @@ struct RosLinkOptions {
   Duration epoch = kFixedEpoch;  ///< Since the Unix epoch: what stamps count from.
   bool waits = true;             ///< The run starts when all transports have found their ROS...
   bool lockstep = false;         ///< ...and somebody reads scans and sends commands.
+  bool needs_clock = false;  ///< Nodes live on the wall clock: it could not be slower than that.
   std::function<void(const std::string& line)> log;  ///< Lines for users.
   /// A transport could not be ended (`Transport::has_ended`).
   std::function<void()> on_left_behind;
@@ -53,6 +54,7 @@ class RosLink : public Link {
   void on_seek(SimTime to) override;
   void close() override;
   [[nodiscard]] bool is_over() const override;
+  [[nodiscard]] std::string remedy_when_behind(double rate) const override;
   [[nodiscard]] bool is_in_use() const override { return in_use_; }
   [[nodiscard]] std::uint64_t dropped() const override;
 

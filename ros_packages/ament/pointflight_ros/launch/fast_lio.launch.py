@@ -20,6 +20,7 @@ PROFILES = {"mid360": "livox", "avia": "livox", "velodyne": "velodyne", "ouster"
 def start(context):
     share = get_package_share_directory("pointflight_ros")
     lidar = LaunchConfiguration("lidar").perform(context)
+    simulated = LaunchConfiguration("sim_time").perform(context).lower() == "true"
     return [
         IncludeLaunchDescription(
             PythonLaunchDescriptionSource(os.path.join(share, "launch", "fly.launch.py")),
@@ -27,6 +28,7 @@ def start(context):
                 "map": LaunchConfiguration("map"),
                 "flags": LaunchConfiguration("flags"),
                 "program": LaunchConfiguration("program"),
+                "sim_time": LaunchConfiguration("sim_time"),
                 "profile": PROFILES[lidar],
                 "rviz": "false",
             }.items(),
@@ -34,7 +36,10 @@ def start(context):
         Node(
             package="fast_lio",
             executable="fastlio_mapping",
-            parameters=[os.path.join(share, "config", f"fast_lio_{lidar}.yaml")],
+            parameters=[
+                os.path.join(share, "config", f"fast_lio_{lidar}.yaml"),
+                {"use_sim_time": simulated},
+            ],
             output="screen",
         ),
     ]
@@ -46,6 +51,7 @@ def generate_launch_description():
             DeclareLaunchArgument("map", description="a scenario .yaml with a mission"),
             DeclareLaunchArgument("lidar", default_value="mid360", choices=list(PROFILES)),
             DeclareLaunchArgument("flags", default_value=""),
+            DeclareLaunchArgument("sim_time", default_value="false", description="live on the run's clock"),
             DeclareLaunchArgument("program", default_value="pointflight"),
             OpaqueFunction(function=start),
         ]

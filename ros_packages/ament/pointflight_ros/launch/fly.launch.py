@@ -1,4 +1,5 @@
-"""pointflight beside RViz. map: a .pfmap or a scenario .yaml; flags: more of `pointflight fly`."""
+"""pointflight beside RViz. map: a .pfmap or a scenario .yaml; flags: more of `pointflight fly`;
+sim_time: nodes live on the run's clock, which may be slower than real time (flags:="--rate 0.3")."""
 
 import os
 import shlex
@@ -17,8 +18,10 @@ def start(context):
         return LaunchConfiguration(name).perform(context)
 
     command = [value("program"), "fly", value("map"), "--ros2", "--profile", value("profile")]
-    # the default profile has its own clock; others live on the wall clock
-    simulated = value("profile") == "default"
+    # the default profile has its own clock; the programs of others live on the wall clock unless told
+    simulated = (value("sim_time") or str(value("profile") == "default")).lower() == "true"
+    if simulated:
+        command.append("--sim-time")
     rviz = os.path.join(get_package_share_directory("pointflight_ros"), "rviz", "pointflight.rviz")
     return [
         ExecuteProcess(
@@ -42,6 +45,7 @@ def generate_launch_description():
             DeclareLaunchArgument("map", description="a .pfmap or a scenario .yaml"),
             DeclareLaunchArgument("profile", default_value="default"),
             DeclareLaunchArgument("flags", default_value=""),
+            DeclareLaunchArgument("sim_time", default_value="", description="true, false; empty: by the profile"),
             DeclareLaunchArgument("rviz", default_value="true"),
             DeclareLaunchArgument("program", default_value="pointflight"),
             OpaqueFunction(function=start),

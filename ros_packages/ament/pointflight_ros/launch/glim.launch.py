@@ -21,6 +21,7 @@ def generate_launch_description():
             DeclareLaunchArgument("map", description="a scenario .yaml with a mission"),
             DeclareLaunchArgument("config", description="folder of GLIM's configurations"),
             DeclareLaunchArgument("flags", default_value=""),
+            DeclareLaunchArgument("sim_time", default_value="false", description="live on the run's clock"),
             DeclareLaunchArgument("program", default_value="pointflight"),
             IncludeLaunchDescription(
                 PythonLaunchDescriptionSource(os.path.join(share, "launch", "fly.launch.py")),
@@ -28,6 +29,7 @@ def generate_launch_description():
                     "map": LaunchConfiguration("map"),
                     "flags": LaunchConfiguration("flags"),
                     "program": LaunchConfiguration("program"),
+                    "sim_time": LaunchConfiguration("sim_time"),
                     "profile": "ouster",
                     "rviz": "false",
                 }.items(),
@@ -35,7 +37,12 @@ def generate_launch_description():
             Node(
                 package="glim_ros",
                 executable="glim_rosnode",
-                parameters=[{"config_path": LaunchConfiguration("config")}],
+                parameters=[
+                    {
+                        "config_path": LaunchConfiguration("config"),
+                        "use_sim_time": LaunchConfiguration("sim_time"),
+                    }
+                ],
                 output="screen",
             ),
         ]

@@ -18,6 +18,7 @@ def generate_launch_description():
         [
             DeclareLaunchArgument("map", description="a scenario .yaml with a mission"),
             DeclareLaunchArgument("flags", default_value=""),
+            DeclareLaunchArgument("sim_time", default_value="false", description="live on the run's clock"),
             DeclareLaunchArgument("program", default_value="pointflight"),
             IncludeLaunchDescription(
                 PythonLaunchDescriptionSource(os.path.join(share, "launch", "fly.launch.py")),
@@ -25,6 +26,7 @@ def generate_launch_description():
                     "map": LaunchConfiguration("map"),
                     "flags": LaunchConfiguration("flags"),
                     "program": LaunchConfiguration("program"),
+                    "sim_time": LaunchConfiguration("sim_time"),
                     "profile": "ouster",
                     "rviz": "false",
                 }.items(),
@@ -35,10 +37,9 @@ def generate_launch_description():
                         get_package_share_directory("kiss_icp"), "launch", "odometry.launch.py"
                     )
                 ),
-                # stamps are the wall clock's
                 launch_arguments={
                     "topic": "/os_cloud_node/points",
-                    "use_sim_time": "false",
+                    "use_sim_time": LaunchConfiguration("sim_time"),
                     "visualize": "true",
                 }.items(),
             ),
