@@ -154,6 +154,12 @@ void describe(SettingsVisitor& v, RosProfile& s) {
            s.imu_gravity,
            kGravities);
   v.choice({"livox_package", "", "of CustomMsg on ROS 1"}, s.livox_package, kLivoxPackages);
+  v.value({"inflation",
+           "m",
+           "that its planner keeps from obstacles with the vehicle's middle; 0: not known",
+           0,
+           10},
+          s.inflation);
   v.list({"outputs", "", "what is sent"}, s.outputs, [](SettingsVisitor& w, RosOutput& output) {
     describe(w, output);
   });

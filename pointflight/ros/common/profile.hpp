@@ -46,6 +46,9 @@ struct RosProfile {
   ImuUnit imu_unit = ImuUnit::kMps2;                ///< Of accelerations.
   ImuGravity imu_gravity = ImuGravity::kUp;         ///< Its sign in them.
   std::string livox_package = "livox_ros_driver2";  ///< ROS 1: of CustomMsg.
+  /// How far its planner keeps from obstacles with the middle of the vehicle, m, by the program's
+  /// own files; 0: not known, or no planner.
+  double inflation = 0.0;
   std::vector<RosOutput> outputs;  ///< Each is one kind of message; several may be of one kind.
   /// Topics that are read; a shipped profile names what its programs send.
   std::vector<RosInput> inputs;
