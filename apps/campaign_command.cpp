@@ -234,6 +234,7 @@ int fly_by_mpi(const CampaignFlags& flags, const std::vector<Condition>& conditi
 
 /// Flags that would do nothing are mistakes.
 void check_flags(const CampaignFlags& flags) {
+  if (flags.folder.empty()) throw InputError("-o: the folder of the results has no name");
   const bool is_worker = !flags.share.empty();
   if (flags.engine != "slurm" && (flags.tasks > 0 || !flags.slurm.empty())) {
     throw InputError("--tasks and --slurm go with --engine slurm");

@@ -128,7 +128,10 @@ Scenario load_input(const FlyFlags& flags, const Executor& executor) {
     scenario.vehicles.front().commands.clear();
   }
   if (flags.seed >= 0) scenario.seed = flags.seed;
-  if (flags.duration >= 0.0) scenario.duration = flags.duration;
+  if (flags.duration >= 0.0) {
+    scenario.duration = flags.duration;
+    scenario.unfinished = Unfinished::kTimeUp;  // so long was asked for
+  }
   if (flags.no_scans) scenario.output.scans = false;
   for (VehicleSetup& vehicle : scenario.vehicles) {
     for (LidarMount& mount : vehicle.lidars) mount.snapshot = mount.snapshot || flags.snapshot;
@@ -217,6 +220,7 @@ void print_result(const FlyFlags& flags, const Simulation& simulation, double wa
 int exit_code_of(RunEnd end) {
   switch (end) {
     case RunEnd::kCompleted:
+    case RunEnd::kTimeUp:
     case RunEnd::kIdle:
       return kDone;
     case RunEnd::kInterrupted:
@@ -315,7 +319,9 @@ void add_fly_command(CLI::App& parent, int& exit_code) {
   app->add_option("--mission", flags->mission, "Waypoints x,y,z x,y,z ... of the first vehicle, m")
       ->type_name("X,Y,Z ...");
   app->add_option(
-         "--duration", flags->duration, "Length of the flight, s; 0: as long as the mission takes")
+         "--duration",
+         flags->duration,
+         "Length of the flight, s, whatever of its mission is left; 0: as long as that takes")
       ->check(within(0.0, 1e6));
   app->add_option("--start", flags->start, "x,y,z where the first vehicle starts, m")
       ->delimiter(',')

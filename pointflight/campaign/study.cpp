@@ -113,6 +113,10 @@ void describe(SettingsVisitor& v, StudyKeys& study) {
   v.section({"limits", "", "of each flight"}, [&](SettingsVisitor& w) {
     w.value({"time", "s", "by the wall clock; 0: none", 0, 1e8}, study.time_limit);
     w.value({"memory", "bytes", "beside mapped files; 0: none", 0, 1e15}, study.memory_limit);
+    constexpr double kLeast = 1e6;  // a program's own start takes more
+    w.require("memory",
+              study.memory_limit == 0.0 || study.memory_limit >= kLeast,
+              "is in bytes; no program gets along with less than 1e6");
   });
   v.value({"figures", "", "JSON file that the command leaves in {output}; its numbers are columns"},
           study.figures);

@@ -44,7 +44,10 @@ std::vector<std::size_t> vehicles_from(const std::vector<std::string>& list,
                       names.back()));
     }
     if (*first > *last) throw InputError(fmt::format("{}: from low to high", item));
-    for (std::size_t v = *first; v <= *last; ++v) vehicles.insert(v);
+    for (std::size_t v = *first; v <= *last; ++v) {
+      if (!vehicles.insert(v).second)
+        throw InputError(fmt::format("{}: {} is named twice", item, names[v]));
+    }
   }
   return {vehicles.begin(), vehicles.end()};
 }

@@ -12,6 +12,12 @@ bool have_arrived(const RunOutlook& outlook) {
   });
 }
 
+bool has_crashed(const RunOutlook& outlook) {
+  return std::any_of(outlook.vehicles.begin(), outlook.vehicles.end(), [](const auto& vehicle) {
+    return vehicle && vehicle->crashed;
+  });
+}
+
 /// True if nothing but the lack of commands ends the run: programs gave some, or nobody had a plan.
 bool is_idle(const RunOutlook& outlook) {
   if (outlook.has_duration) return false;
@@ -48,6 +54,8 @@ const char* to_string(RunEnd end) {
       return "completed";
     case RunEnd::kMissionUnfinished:
       return "mission unfinished";
+    case RunEnd::kTimeUp:
+      return "time up";
     case RunEnd::kCollision:
       return "collision";
     case RunEnd::kLeftMap:
@@ -64,6 +72,7 @@ const char* reason_of(RunEnd end) {
   if (end == RunEnd::kIdle) {
     return "nothing left to do, no command for 10 s, and the scenario has no duration";
   }
+  if (end == RunEnd::kTimeUp) return "the mission goes on; so long was asked for";
   if (end == RunEnd::kLeftMap) return "over 50 m beside or below it, or 500 m above";
   return "";
 }
@@ -71,7 +80,10 @@ const char* reason_of(RunEnd end) {
 Ending ending_of(const RunOutlook& outlook, SimTime now) {
   if (outlook.stops) return {RunEnd::kCollision, now};
   if (now >= outlook.end_time && !outlook.is_landing) {
-    if (!have_arrived(outlook)) return {RunEnd::kMissionUnfinished, now};
+    if (!have_arrived(outlook)) {
+      const bool is_time_up = outlook.may_end_early && !has_crashed(outlook);
+      return {is_time_up ? RunEnd::kTimeUp : RunEnd::kMissionUnfinished, now};
+    }
     return {is_idle(outlook) ? RunEnd::kIdle : RunEnd::kCompleted, now};
   }
   if (has_left_map(outlook)) return {RunEnd::kLeftMap, now};

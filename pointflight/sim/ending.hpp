@@ -16,6 +16,7 @@ enum class RunEnd {
   kCollision,          ///< A vehicle with on_collision: stop hit something.
   kLeftMap,            ///< `is_lost` (sim/start_check.hpp).
   kInterrupted,        ///< `Simulation::interrupt`.
+  kTimeUp,             ///< The same, where the scenario takes that for no failure.
   kIdle  ///< Nothing to do and no commands for `Simulation::kIdleTime`; the scenario has no
          ///< duration.
 };
@@ -43,10 +44,11 @@ struct VehicleOutlook {
 
 /// What matters of a run for its end, at the start of a step, after its collisions.
 struct RunOutlook {
-  SimTime end_time;           ///< When the run ends by itself, as is known now.
-  bool has_duration = false;  ///< The scenario says how long it takes.
-  bool is_landing = false;    ///< A landing under way is waited for.
-  bool stops = false;         ///< A vehicle with on_collision: stop hit something.
+  SimTime end_time;            ///< When the run ends by itself, as is known now.
+  bool has_duration = false;   ///< The scenario says how long it takes.
+  bool may_end_early = false;  ///< An end by duration is none of a failure, if nobody has crashed.
+  bool is_landing = false;     ///< A landing under way is waited for.
+  bool stops = false;          ///< A vehicle with on_collision: stop hit something.
   std::vector<std::optional<VehicleOutlook>> vehicles;  ///< By number; those that count.
 };
 

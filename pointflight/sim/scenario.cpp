@@ -11,6 +11,8 @@
 namespace pointflight {
 namespace {
 
+constexpr Named<Unfinished> kUnfinished[] = {{Unfinished::kFailure, "failure"},
+                                             {Unfinished::kTimeUp, "time_up"}};
 constexpr Named<CollisionReaction> kReactions[] = {{CollisionReaction::kReport, "report"},
                                                    {CollisionReaction::kStop, "stop"},
                                                    {CollisionReaction::kCrash, "crash"}};
@@ -172,6 +174,13 @@ void describe(SettingsVisitor& v, Scenario& s) {
   v.value({"map_hash", "", "of the map; another one is refused; empty: any will do"}, s.map_hash);
   v.value({"seed", "", "of everything random", 0, 9e15}, s.seed);
   v.value({"duration", "s", "0: as long as the mission takes", 0, kLongestRun}, s.duration);
+  v.choice(
+      {"unfinished",
+       "",
+       "what an end by duration is with a mission unfinished: a failure (exit code 1), or time is "
+       "up (0; what --duration asks for)"},
+      s.unfinished,
+      kUnfinished);
   v.value({"physics_step", "s", "of the integrator", 0.0001, 0.005}, s.physics_step);
   if (s.is_short) {
     VehicleSetup& vehicle = s.vehicles.front();

@@ -23,6 +23,12 @@
 
 namespace pointflight {
 
+/// What it is if the duration ends with a mission unfinished.
+enum class Unfinished {
+  kFailure,  ///< `RunEnd::kMissionUnfinished`
+  kTimeUp    ///< `RunEnd::kTimeUp`, unless a vehicle has crashed.
+};
+
 /// What a scenario may ask for, s; and how far a program can jump ahead.
 inline constexpr double kLongestRun = 1e6;
 
@@ -119,7 +125,8 @@ struct Scenario {
   std::string map_hash;   ///< Of the map it was flown in (SurfelMap::hash); empty: any will do.
   std::int64_t seed = 1;  ///< Of everything random.
   double duration = 0.0;  ///< s; 0: as long as the mission takes.
-  double physics_step = 0.001;  ///< s
+  Unfinished unfinished = Unfinished::kFailure;  ///< At the end of the duration.
+  double physics_step = 0.001;                   ///< s
   /// Before copies are written out: `fleet`.
   std::vector<VehicleSetup> vehicles = {VehicleSetup{}};
   bool is_short =

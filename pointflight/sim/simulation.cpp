@@ -267,6 +267,7 @@ SimTime Simulation::end_time() const {
 RunOutlook Simulation::outlook() const {
   RunOutlook outlook;
   outlook.has_duration = setup_->scenario.duration > 0.0;
+  outlook.may_end_early = setup_->scenario.unfinished == Unfinished::kTimeUp;
   outlook.end_time = outlook.has_duration
                          ? setup_->end_time
                          : std::max(setup_->end_time + state_.skipped, state_.busy_until);

@@ -59,6 +59,8 @@ TEST(Study, MistakesAreSaidWithTheirLine) {
                   "s.yaml:2: seed: unknown key; did you mean 'seeds'?");
   expect_contains(error("scenario: a\nseeds: [1, 1]\n"),
                   "s.yaml:2: seeds: one of them is given twice");
+  expect_contains(error("scenario: a\nlimits: {memory: 1}\n"),
+                  "s.yaml:2: limits.memory: is in bytes");
   expect_contains(error("scenario: a\nseeds: []\n"), "s.yaml:2: seeds: the list is empty");
   expect_contains(error("scenario: a\nseeds: {from: 3}\n"), "give `to` as well");
   expect_contains(error("scenario: a\nseeds: {values: [3], to: 5}\n"), "not both");

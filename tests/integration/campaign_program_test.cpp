@@ -230,6 +230,9 @@ TEST_F(Campaigns, MistakesAreSaidBeforeAnythingFlies) {
   expect_user_error(run(fmt::format("campaign {} -o {} --share 3/3", good, here_ / "c")),
                     "write it like 0/16");
   EXPECT_FALSE(fs::exists(here_ / "c"));
+  expect_user_error(
+      run(fmt::format("campaign {} -o ''", good), fmt::format("cd {} &&", here_.path())),
+      "-o: the folder of the results has no name");
   expect_user_error(run(fmt::format("campaign {} -o {}", good, here_.path())),
                     "is not empty, and no campaign");
   ASSERT_EQ(fly("seeds: 1\n").code, 0);

@@ -148,7 +148,7 @@ TEST_F(Program, FliesWhatTheCommandLineSays) {
       "0.3 --no-scans --json -o {}",
       map(),
       folder / "run"));
-  EXPECT_EQ(fly.code, 1) << fly.err;  // the mission takes longer
+  EXPECT_EQ(fly.code, 0) << fly.err;  // the mission takes longer, and so long was asked for
   const auto json = nlohmann::json::parse(fly.out);
   EXPECT_EQ(json["vehicles"][0]["model"], "hexa_550");
   EXPECT_EQ(json["vehicles"][0]["scans"], 3);
@@ -161,7 +161,7 @@ TEST_F(Program, FliesWhatTheCommandLineSays) {
   const Result again = run(fmt::format("fly {} --lidar mid360 --vehicle quad_330 -o {}",
                                        folder / "run/scenario.yaml",
                                        folder / "again"));
-  EXPECT_EQ(again.code, 1) << again.err;
+  EXPECT_EQ(again.code, 0) << again.err;
   expect_contains(read_file(folder / "again/scenario.yaml"), "model: mid360");
   expect_user_error(run(fmt::format("fly {} -o {} --mission 1,2", map(), folder / "no")),
                     "--mission (x,y,z x,y,z ...): expected 3 numbers, got 2");

@@ -303,6 +303,8 @@ TEST(Simulation, AMissionCutShortIsUnfinished) {
   scenario.duration = 1.0;
   HashSink sink;
   EXPECT_EQ(run(scenario, small_hall(), sink).end, RunEnd::kMissionUnfinished);
+  scenario.unfinished = Unfinished::kTimeUp;  // as --duration asks for
+  EXPECT_EQ(run(scenario, small_hall(), sink).end, RunEnd::kTimeUp);
   scenario.vehicles[0].mission.waypoints.clear();
   EXPECT_EQ(run(scenario, small_hall(), sink).end, RunEnd::kCompleted);
 }
