@@ -26,8 +26,19 @@ TEST(VehicleList, NamesMayHaveDashes) {
 }
 
 TEST(VehicleList, SaysWhatIsNone) {
-  for (const char* item :
-       {"5", "0-5", "", "-", "1-", "-1", "uav", "uav-3", "0x1", "99999999999999999999", "2-1", "0", "0-1"}) {
+  for (const char* item : {"5",
+                           "0-5",
+                           "",
+                           "-",
+                           "1-",
+                           "-1",
+                           "uav",
+                           "uav-3",
+                           "0x1",
+                           "99999999999999999999",
+                           "2-1",
+                           "0",
+                           "0-1"}) {
     try {
       (void)vehicles_from({"0", item}, kFleet);
       ADD_FAILURE() << item;
