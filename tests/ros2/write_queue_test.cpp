@@ -54,7 +54,7 @@ TEST(WriteQueue, ABurstLeavesAsItWouldHaveWithoutAWait) {
   for (std::size_t i = 0; i < 8; ++i) {
     EXPECT_EQ(written.outputs[i], i);
     // 20 ms of the run are 10 ms here, 8 while others wait; a busy machine may take longer
-    EXPECT_GE(written.times[i] - start, i * milliseconds(8) - milliseconds(1)) << i;
+    EXPECT_GE(written.times[i] - start, milliseconds(8 * static_cast<int>(i) - 1)) << i;
   }
 }
 
