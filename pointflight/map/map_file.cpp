@@ -52,7 +52,8 @@ bool is_sane(const MapProperties& p) {
   };
   const auto is_position = [](const Vector3d& v) { return (v.array().abs() <= kFarthest).all(); };
   const Aabb& box = p.bounds_world;
-  const bool is_box = is_position(box.min) && is_position(box.max) && !box.empty();
+  const bool is_box =
+      is_position(box.min) && is_position(box.max) && (box.max - box.min).minCoeff() >= 0.0;
   const bool is_finite = is_position(p.origin_world) && (is_box || p.surfel_count == 0) &&
                          std::isfinite(p.intensity_offset) && std::isfinite(p.intensity_step);
   return is_finite && within(p.resolution, kMinResolution, kMaxResolution) &&
@@ -92,6 +93,7 @@ MapProperties properties_of(const MapHeader& header) {
   p.intensity_offset = header.intensity_offset;
   p.intensity_step = header.intensity_step;
   p.surfel_count = header.surfel_count;
+  if (p.surfel_count == 0) p.bounds_world = Aabb{};  // whatever stands there
   return p;
 }
 
