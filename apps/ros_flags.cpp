@@ -177,6 +177,26 @@ std::unique_ptr<Outlet> open_recording(const RosFlags& flags,
   return std::make_unique<Recording>(path, ros1.bag_writer(path, compression), lock);
 }
 
+/// A planner that keeps less free than the hull takes grazes what it flies by.
+void warn_of_small_inflation(const Simulation& simulation, const RosProfile& profile) {
+  if (profile.inflation <= 0.0) return;
+  for (const std::size_t v : simulation.flying_here()) {
+    const VehicleAgent& vehicle = simulation.vehicle(v);
+    const double reach = half_extent(vehicle.hull()).head<2>().maxCoeff();
+    if (reach <= profile.inflation) continue;
+    log(fmt::format(
+        "warning: the planner of profile {} keeps {:.3g} m from obstacles, the hull of {} "
+        "reaches {:.2f} m: it will graze them; let it inflate by {:.2f} m or more, or "
+        "fly a smaller vehicle (said once)",
+        fs::path(profile.path).stem().string(),
+        profile.inflation,
+        vehicle.setup().name,
+        reach,
+        reach));
+    return;
+  }
+}
+
 /// ROS, recordings and the viewers of `view`, if any, with everything open. Throws InputError.
 std::unique_ptr<RosLink> make_ros_link(const RosFlags& flags,
                                        double rate,
@@ -185,6 +205,7 @@ std::unique_ptr<RosLink> make_ros_link(const RosFlags& flags,
   if (!flags.any()) return nullptr;
   const Scenario& scenario = simulation.scenario();
   RosProfile profile = profile_for(scenario, flags.profile);
+  if (flags.has_ros()) warn_of_small_inflation(simulation, profile);
   if (flags.sim_time) add_clock(profile);
   RosLinkOptions options;
   options.needs_clock = flags.has_ros() && !has_clock(profile);
@@ -214,35 +235,8 @@ std::unique_ptr<RosLink> make_ros_link(const RosFlags& flags,
 
 }  // namespace
 
-namespace {
-
-/// A planner that keeps less free than the hull takes grazes what it flies by.
-void warn_of_small_inflation(const Simulation& simulation, const RosProfile& profile) {
-  if (profile.inflation <= 0.0) return;
-  for (const std::size_t v : simulation.flying_here()) {
-    const VehicleAgent& vehicle = simulation.vehicle(v);
-    const double reach = half_extent(vehicle.hull()).head<2>().maxCoeff();
-    if (reach <= profile.inflation) continue;
-    log(fmt::format(
-        "warning: the planner of profile {} keeps {:.3g} m from obstacles, the hull of {} "
-        "reaches {:.2f} m: it will graze them; let it inflate by {:.2f} m or more, or "
-        "fly a smaller vehicle (said once)",
-        fs::path(profile.path).stem().string(),
-        profile.inflation,
-        vehicle.setup().name,
-        reach,
-        reach));
-    return;
-  }
-}
-
-}  // namespace
-
 void RosPart::connect(Simulation& simulation, RunLoop& loop) {
   if (!flags_.any()) return;
-  if (flags_.has_ros()) {
-    warn_of_small_inflation(simulation, profile_for(simulation.scenario(), flags_.profile));
-  }
   server_ = start_viewing(flags_.view, simulation.shared_map());
   ros_ = make_ros_link(flags_, rate_, simulation, server_);
   ThreadedLink::Options options;

@@ -3,7 +3,6 @@
 // line. The first line of the input names the file.
 #include <cmath>
 #include <cstdint>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -12,27 +11,11 @@
 #include "pointflight/campaign/run_record.hpp"
 #include "pointflight/campaign/statistics.hpp"
 #include "tests/fuzz/one_line.hpp"
+#include "tests/fuzz/temporary_folder.hpp"
 
 namespace {
 
 namespace fs = std::filesystem;
-
-/// A folder that goes with the process.
-class Results {
- public:
-  Results() {
-    std::string name = (fs::temp_directory_path() / "pointflight_fuzz_XXXXXX").string();
-    if (mkdtemp(name.data()) == nullptr) __builtin_trap();
-    path_ = name;
-  }
-  ~Results() { fs::remove_all(path_); }
-  Results(const Results&) = delete;
-  Results& operator=(const Results&) = delete;
-  [[nodiscard]] const fs::path& path() const { return path_; }
-
- private:
-  fs::path path_;
-};
 
 void judge(const pointflight::RunRecord& record) {
   const std::string text = pointflight::record_json(record);
@@ -51,7 +34,7 @@ void judge(const pointflight::RunRecord& record) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  static const Results folder;
+  static const pointflight::FuzzFolder folder;
   const std::string_view text(reinterpret_cast<const char*>(data), size);
   const std::size_t line = std::min(text.find('\n'), text.size());
   for (const char* name : {"summary.json", "timing.json", "figures.json"}) {

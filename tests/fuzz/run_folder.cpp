@@ -4,14 +4,12 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <map>
 #include <string>
 #include <string_view>
 
-#include "pointflight/core/input_error.hpp"
 #include "pointflight/geometry/shape_scene.hpp"
 #include "pointflight/io/cloud_reader.hpp"
 #include "pointflight/map/import/map_builder.hpp"
@@ -19,6 +17,8 @@
 #include "pointflight/picture/run_folder_picture.hpp"
 #include "pointflight/run/playback.hpp"
 #include "pointflight/run/run_loop.hpp"
+#include "tests/fuzz/one_line.hpp"
+#include "tests/fuzz/temporary_folder.hpp"
 #include "tests/run/recorder.hpp"
 
 namespace pointflight {
@@ -48,9 +48,6 @@ void write(const fs::path& path, std::string_view bytes) {
 class FolderOnDisk {
  public:
   FolderOnDisk() {
-    std::string name = (fs::temp_directory_path() / "pointflight_fuzz_XXXXXX").string();
-    if (mkdtemp(name.data()) == nullptr) __builtin_trap();
-    path_ = name;
     ShapeScene scene;
     scene.add_box({0, 0, 0}, {10, 8, 5});
     const std::string cloud = (path_ / "c.xyz").string();
@@ -82,7 +79,6 @@ class FolderOnDisk {
       }
     }
   }
-  ~FolderOnDisk() { fs::remove_all(path_); }
 
   [[nodiscard]] fs::path run(bool shared) const { return path_ / (shared ? "shared" : "run"); }
   [[nodiscard]] fs::path path_of(std::size_t file, bool shared) const {
@@ -114,18 +110,10 @@ class FolderOnDisk {
     loop.run();
   }
 
-  fs::path path_;
+  FuzzFolder folder_;
+  fs::path path_ = folder_.path();
   std::map<std::string, std::string> originals_;
 };
-
-template <class Action>
-void expect_no_more_than_an_input_error(const Action& action) {
-  try {
-    action();
-  } catch (const InputError& error) {
-    if (std::string(error.what()).find('\n') != std::string::npos) __builtin_trap();
-  }
-}
 
 }  // namespace
 }  // namespace pointflight
@@ -143,11 +131,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     const fs::path file = folder.path_of(i, shared);
     write(file, text.substr(std::min(line + 1, text.size())));
     const std::string run_folder = folder.run(shared).string();
-    expect_no_more_than_an_input_error([&] {
+    expect_one_line([&] {
       RecordedRun run(run_folder, executor);
       play(run, {}, {});
     });
-    expect_no_more_than_an_input_error([&] {
+    expect_one_line([&] {
       const picture::RunPicture drawn = picture::read_run_picture(run_folder);
       if (drawn.names.size() < drawn.paths.size()) __builtin_trap();
     });

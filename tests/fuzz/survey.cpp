@@ -1,7 +1,6 @@
 // Any bytes as the poses ("P") or a scan ("S") of a survey: rays, or an InputError of one line.
 #include <cmath>
 #include <cstdint>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -10,6 +9,7 @@
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/survey/posed_scans.hpp"
 #include "pointflight/survey/surveyed_cells.hpp"
+#include "tests/fuzz/temporary_folder.hpp"
 
 namespace pointflight {
 namespace {
@@ -28,15 +28,11 @@ constexpr std::string_view kScan =
 class FolderOnDisk {
  public:
   FolderOnDisk() {
-    std::string name = (fs::temp_directory_path() / "pointflight_fuzz_XXXXXX").string();
-    if (mkdtemp(name.data()) == nullptr) __builtin_trap();
-    path_ = name;
     fs::create_directories(path_ / "scans");
     put('S', kScan);
     put('P', "0 0 0 1 0 0 0 1\n1 1 0 1 0 0 0 1\n");
     write(path_ / "scans/1.5.pcd", kScan);
   }
-  ~FolderOnDisk() { fs::remove_all(path_); }
   void put(char what, std::string_view bytes) const {
     write(path_ / (what == 'P' ? "poses" : "scans/0.5.pcd"), bytes);
   }
@@ -45,7 +41,8 @@ class FolderOnDisk {
   }
 
  private:
-  fs::path path_;
+  FuzzFolder folder_;
+  fs::path path_ = folder_.path();
 };
 
 }  // namespace
