@@ -29,9 +29,7 @@ CLI::Validator within(double min, double max) {
   return {check, fmt::format("in [{} - {}]", min, max)};
 }
 
-std::vector<double> parse_numbers(const std::string& text,
-                                  std::size_t count,
-                                  const std::string& flag) {
+std::vector<double> parse_numbers(const std::string& text, const std::string& flag) {
   std::vector<double> numbers;
   std::string_view rest = text;
   for (auto word = take_word(rest); !word.empty(); word = take_word(rest)) {
@@ -41,15 +39,33 @@ std::vector<double> parse_numbers(const std::string& text,
     }
     numbers.push_back(value);
   }
-  if (count > 0 && numbers.size() != count) {
-    throw InputError(fmt::format("{}: expected {} numbers, got {}", flag, count, numbers.size()));
-  }
   return numbers;
 }
 
+std::vector<double> parse_numbers(const std::string& text,
+                                  std::size_t count,
+                                  const std::string& flag,
+                                  const std::string& form) {
+  std::vector<double> numbers = parse_numbers(text, flag);
+  if (numbers.size() == count) return numbers;
+  throw InputError(fmt::format("{}: {} number{} where {} are wanted: {}",
+                               flag,
+                               numbers.size(),
+                               numbers.size() == 1 ? "" : "s",
+                               count,
+                               form));
+}
+
 Pose parse_pose(const std::string& text, const std::string& flag) {
-  const std::vector<double> n =
-      parse_numbers(text, 6, flag + " (x,y,z,roll,pitch,yaw: metres, degrees)");
+  std::vector<double> n = parse_numbers(text, flag);
+  if (n.size() == 3) n.resize(6, 0.0);
+  if (n.size() != 6) {
+    throw InputError(fmt::format(
+        "{}: {} number{} where 6 are wanted: x,y,z,roll,pitch,yaw in metres and degrees (or x,y,z)",
+        flag,
+        n.size(),
+        n.size() == 1 ? "" : "s"));
+  }
   return {quaternion_from_rpy(n[3] * kDegree, n[4] * kDegree, n[5] * kDegree), {n[0], n[1], n[2]}};
 }
 

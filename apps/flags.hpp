@@ -17,13 +17,15 @@ CLI::Validator within(double min, double max);
 void add_start_in_flag(CLI::App& app, std::vector<double>& numbers);
 Aabb box_from(const std::vector<double>& numbers, const std::string& flag);
 
-/// Numbers of a flag, commas or blanks between. Throws InputError if there are not `count` of
-/// them (0: any number) or one is not finite.
+/// Numbers of a flag, commas or blanks between. Throws InputError if one is not finite.
+std::vector<double> parse_numbers(const std::string& text, const std::string& flag);
+/// The same of so many; another count is an error that shows `form`, "x,y,z in metres".
 std::vector<double> parse_numbers(const std::string& text,
                                   std::size_t count,
-                                  const std::string& flag);
+                                  const std::string& flag,
+                                  const std::string& form);
 
-/// "x,y,z,roll,pitch,yaw" in metres and degrees.
+/// "x,y,z,roll,pitch,yaw" in metres and degrees; without angles they are zero.
 Pose parse_pose(const std::string& text, const std::string& flag);
 
 /// What --renderer may be.

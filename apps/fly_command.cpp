@@ -68,7 +68,7 @@ std::vector<Vector3d> waypoints_from(const std::vector<std::string>& words) {
   std::vector<Vector3d> waypoints;
   waypoints.reserve(words.size());
   for (const std::string& word : words) {
-    waypoints.emplace_back(parse_numbers(word, 3, "--mission (x,y,z x,y,z ...)").data());
+    waypoints.emplace_back(parse_numbers(word, 3, "--mission", "x,y,z x,y,z ... in metres").data());
   }
   return waypoints;
 }

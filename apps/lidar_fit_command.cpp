@@ -30,6 +30,7 @@ struct SensorFitFlags {
   std::string like;
   std::string topic;
   std::int64_t scans = 100;
+  std::optional<TimeUnit> time_unit;  ///< Nothing: recognised.
   std::string output;
   std::string png;
   bool json = false;
@@ -176,9 +177,11 @@ void fit_lidar(const SensorFitFlags& flags) {
   if (!flags.like.empty()) static_cast<void>(load_lidar(flags.like));
   const Progress progress = interruptible_progress();
   const auto source = open_scans(flags.input, flags.topic, progress);
-  const std::vector<RecordedScan> scans =
+  std::vector<RecordedScan> scans =
       read_scans(*source, static_cast<std::size_t>(flags.scans), progress);
   end_progress();
+  const std::string said = settle_times(scans, flags.time_unit, flags.input);
+  if (!said.empty()) log(said);
   const SensorFit fit = [&] {
     try {
       return fit_sensor(scans, Executor(flags.threads), progress);
@@ -231,6 +234,7 @@ void add_lidar_fit_command(CLI::App& parent) {
   app->add_option("--scans", flags->scans, "Use at most this many scans, from the first")
       ->check(CLI::Range(1, 100000))
       ->capture_default_str();
+  add_time_unit_flag(*app, flags->time_unit);
   app->add_option("--like",
                   flags->like,
                   "Take what scans cannot tell (pattern, rated ranges, optics) from this sensor");

@@ -82,7 +82,7 @@ struct PlaceInfo {
 std::vector<PlaceInfo> places_at(const SurfelMap& map, const std::vector<std::string>& points) {
   std::vector<PlaceInfo> places;
   for (const std::string& text : points) {
-    const Vector3d point(parse_numbers(text, 3, "--at").data());
+    const Vector3d point(parse_numbers(text, 3, "--at", "x,y,z in metres").data());
     PlaceInfo place{point, map.nearest(point, kNearestReach), std::nullopt};
     if (map.known_space() != nullptr) place.known = map.known_space()->known(point);
     places.push_back(place);

@@ -28,9 +28,14 @@ CropRegion region_of(const CropFlags& flags) {
   region.outside = flags.outside;
   region.above_ground_min = flags.min_height;
   region.above_ground_max = flags.max_height;
-  if (!flags.box.empty()) region.box = box_from(parse_numbers(flags.box, 6, "--box"), "--box");
+  if (!flags.box.empty()) {
+    region.box = box_from(
+        parse_numbers(
+            flags.box, 6, "--box", "x,y,z of the lower corner, then of the upper, in metres"),
+        "--box");
+  }
   if (!flags.polygon.empty()) {
-    const std::vector<double> numbers = parse_numbers(flags.polygon, 0, "--polygon");
+    const std::vector<double> numbers = parse_numbers(flags.polygon, "--polygon");
     if (numbers.size() < 6 || numbers.size() % 2 != 0) {
       throw InputError("--polygon: three corners or more are wanted: x,y,x,y,x,y (metres)");
     }

@@ -54,7 +54,7 @@ std::string matrix_text(const std::string& flag) {
 /// A matrix of 4 x 4, row by row, that turns, shifts and scales alike along all axes.
 Similarity similarity_of(const std::string& flag) {
   const std::vector<double> n =
-      parse_numbers(matrix_text(flag), 16, "--matrix (4 x 4, row by row, or a file of it)");
+      parse_numbers(matrix_text(flag), 16, "--matrix", "4 x 4, row by row, or a file of it");
   Matrix3d linear;
   linear << n[0], n[1], n[2], n[4], n[5], n[6], n[8], n[9], n[10];
   const double determinant = linear.determinant();
@@ -115,7 +115,7 @@ void complete(const TransformFlags& flags,
     }
   }
   if (flags.origin.empty()) return;
-  const std::vector<double> n = parse_numbers(flags.origin, 3, "--origin");
+  const std::vector<double> n = parse_numbers(flags.origin, 3, "--origin", "x,y,z in metres");
   then(all, {Quaterniond::Identity(), {-n[0], -n[1], -n[2]}});
 }
 
@@ -302,7 +302,8 @@ void add_transform(CLI::App& parent) {
   app->add_option("--matrix",
                   flags->matrix,
                   "4 x 4, row by row: 16 numbers, or a file that holds them (CloudCompare's form)");
-  app->add_option("--pose", flags->pose, "x,y,z,roll,pitch,yaw of the old origin: metres, degrees");
+  app->add_option(
+      "--pose", flags->pose, "x,y,z[,roll,pitch,yaw] of the old origin: metres, degrees");
   app->add_flag("--level", flags->level, "Turn the largest floor level about its middle");
   app->add_flag("--ground-zero", flags->ground_zero, "Put that floor at z = 0");
   app->add_option("--origin", flags->origin, "x,y,z that becomes 0,0,0, m");
@@ -319,10 +320,11 @@ void add_merge(CLI::App& parent) {
   app->add_option("inputs", flags->inputs, "Two or more .pfmap, or clouds")->required();
   add_edit_flags(
       *app, *flags, "What to write: a .pfmap of .pfmap; .pcd, .ply, .las of clouds", true);
-  app->add_option("--pose",
-                  flags->poses,
-                  "x,y,z,roll,pitch,yaw of an input in the result: metres, degrees; once for each, "
-                  "in their order")
+  app->add_option(
+         "--pose",
+         flags->poses,
+         "x,y,z[,roll,pitch,yaw] of an input in the result: metres, degrees; once for each, "
+         "in their order")
       ->allow_extra_args(false);
   app->add_option("--poses", flags->poses_file, "The same as a TUM file: a line for each input");
   app->footer(

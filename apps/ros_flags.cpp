@@ -206,6 +206,11 @@ std::unique_ptr<RosLink> make_ros_link(const RosFlags& flags,
   const Scenario& scenario = simulation.scenario();
   RosProfile profile = profile_for(scenario, flags.profile);
   if (flags.has_ros()) warn_of_small_inflation(simulation, profile);
+  const SurfelMap& map = simulation.map();
+  if (const auto note =
+          note_of(map_frame_for(map.bounds_world(), profile), profile, simulation.scenario().map)) {
+    log(*note);
+  }
   if (flags.sim_time) add_clock(profile);
   RosLinkOptions options;
   options.needs_clock = flags.has_ros() && !has_clock(profile);

@@ -126,8 +126,9 @@ void add_scan_command(CLI::App& parent, int& /*exit_code*/) {
          flags->lidar,
          "A shipped sensor, a .yaml file, Ouster's metadata (.json) or a Livox table (.csv)")
       ->capture_default_str();
-  app->add_option(
-         "--pose", flags->pose, "x,y,z,roll,pitch,yaw of the sensor in the world: metres, degrees")
+  app->add_option("--pose",
+                  flags->pose,
+                  "x,y,z[,roll,pitch,yaw] of the sensor in the world: metres, degrees")
       ->required();
   app->add_option("--renderer", flags->renderer, "How points are made")
       ->check(CLI::IsMember(renderer_names()))

@@ -123,6 +123,7 @@ void SharePart::join(Simulation& simulation, const RunLoop& loop) {
   transport.lease = setup.lease;
   transport.localhost_only = flags_.localhost;
   transport.ahead = setup.ahead;
+  transport.log = [](const std::string& line) { log(line); };
   transport_ = dds_module().share(transport);
   share_ = std::make_unique<FleetShare>(simulation, *transport_, std::move(options));
   share_->take_part(simulation);

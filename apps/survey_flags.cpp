@@ -107,6 +107,20 @@ std::unique_ptr<SurveySource> open_survey(const ScansFlags& flags, const Progres
   return survey;
 }
 
+CLI::Option* add_time_unit_flag(CLI::App& app, std::optional<TimeUnit>& unit) {
+  return app
+      .add_option_function<std::string>(
+          "--time-unit",
+          [&unit](const std::string& name) {
+            for (const TimeUnit& known : kTimeUnits) {
+              if (name == known.name) unit = known;
+            }
+          },
+          "Unit of the points' times: s, ms, us, ns; without it the one in which a scan takes as "
+          "long as scans are apart")
+      ->check(CLI::IsMember({"s", "ms", "us", "ns"}));
+}
+
 CLI::Option* add_scans_flags(CLI::App& app, ScansFlags& flags, bool required) {
   auto* scans = app.add_option("--scans",
                                flags.files.scans,
@@ -142,18 +156,7 @@ CLI::Option* add_scans_flags(CLI::App& app, ScansFlags& flags, bool required) {
                    flags.files.is_deskewed,
                    "Ignore times of points: motion within the scans was compensated already");
   deskewed->needs(scans);
-  app.add_option_function<std::string>(
-         "--time-unit",
-         [&flags](const std::string& name) {
-           for (const TimeUnit& unit : kTimeUnits) {
-             if (name == unit.name) flags.files.time_unit = unit;
-           }
-         },
-         "Unit of the points' times: s, ms, us, ns; without it the one in which a scan takes as "
-         "long as scans are apart")
-      ->check(CLI::IsMember({"s", "ms", "us", "ns"}))
-      ->excludes(deskewed)
-      ->needs(scans);
+  add_time_unit_flag(app, flags.files.time_unit)->excludes(deskewed)->needs(scans);
   return scans;
 }
 

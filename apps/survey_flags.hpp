@@ -22,6 +22,9 @@ struct ScansFlags {
   std::string sensor_pose;
 };
 
+/// --time-unit.
+CLI::Option* add_time_unit_flag(CLI::App& app, std::optional<TimeUnit>& unit);
+
 /// --scans, --poses, --scan-topic, --pose-topic, --sensor-pose, --deskewed. Returns --scans.
 CLI::Option* add_scans_flags(CLI::App& app, ScansFlags& flags, bool required);
 

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "pointflight/core/input_error.hpp"
+#include "pointflight/core/internal/yaml_document-inl.hpp"
 #include "pointflight/core/math.hpp"
 #include "pointflight/core/random.hpp"
 #include "pointflight/io/byte_cursor.hpp"
@@ -138,7 +139,7 @@ std::string edited_scenario(std::string_view yaml,
                             const std::vector<std::string>& keys,
                             const std::vector<std::string>& values) {
   try {
-    YAML::Node root = YAML::Load(std::string(yaml));
+    const YAML::Node root = internal::one_yaml_document(std::string(yaml), "the scenario");
     for (std::size_t i = 0; i < keys.size(); ++i) set_value(root, keys[i], values[i]);
     YAML::Emitter emitter;
     emitter << root;

@@ -10,6 +10,7 @@
 #include <set>
 
 #include "pointflight/core/input_error.hpp"
+#include "pointflight/core/internal/yaml_document-inl.hpp"
 #include "pointflight/core/mapped_file.hpp"
 #include "pointflight/core/settings.hpp"
 
@@ -140,18 +141,7 @@ struct SettingsReader::Document {
   }
 
   void parse(std::string_view text) {
-    YAML::Node root;
-    try {
-      const std::vector<YAML::Node> documents = YAML::LoadAll(std::string(text));
-      if (documents.size() > 1) {
-        throw InputError(fmt::format("{}: a second document (---) begins; a file has one",
-                                     location(documents[1])));
-      }
-      if (!documents.empty()) root = documents[0];
-    } catch (const YAML::Exception& error) {
-      throw InputError(fmt::format(
-          "{}:{}: not valid YAML: {}", name, std::max(0, error.mark.line) + 1, error.msg));
-    }
+    const YAML::Node root = internal::one_yaml_document(std::string(text), name);
     if (!root.IsDefined() || !root.IsMap()) {
       throw InputError(fmt::format("{}: expected `key: value` lines at the top level", name));
     }

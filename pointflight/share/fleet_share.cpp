@@ -22,7 +22,8 @@ constexpr std::int64_t kIntroducePeriod = 500 * kMillisecond;  // while joining
 constexpr std::size_t kPeersMost = 1000;
 constexpr std::size_t kPartsMost = 32;
 constexpr std::size_t kWordMost = 100;  // characters of others' names
-constexpr int kForeignSaid = 5;
+constexpr std::size_t kForeignSaid = 5;
+constexpr std::uint64_t kForeignMost = 1000;  // messages of a writer
 
 /// Of another program's words, for a line of ours.
 std::string printable(std::string text) {
@@ -43,6 +44,7 @@ FleetShare::FleetShare(const Simulation& simulation,
       options_(std::move(options)),
       setup_(share_setup_of(simulation.scenario())),
       lease_(from_seconds(setup_.lease)),
+      patience_(3 * lease_.count()),
       step_(from_seconds(simulation.scenario().physics_step)),
       schedule_(setup_.time == ShareTime::kFree
                     ? std::min(setup_.rate, 1.0 / simulation.scenario().physics_step)
@@ -95,7 +97,10 @@ void FleetShare::keep_introducing() {
 FleetShare::Peer* FleetShare::peer_of(std::uint64_t process, std::uint64_t writer) {
   const auto found = peers_.find(process);
   if (found == peers_.end()) return nullptr;
-  if (found->second.writer == writer) return &found->second;
+  if (found->second.writer == writer) {
+    found->second.spoke = options_.steady();
+    return &found->second;
+  }
   note_foreign(writer, "messages in another process' name");
   return nullptr;
 }
@@ -124,17 +129,36 @@ void FleetShare::take(const ShareArrival& arrival) {
       return take_clock(arrival);
     case Kind::kPast:
       return take_past(arrival);
+    case Kind::kBeat:
+      return take_beat(arrival);
   }
   note_foreign(arrival.writer, "a message of an unknown kind");
 }
 
-/// Counted; said once for each writer, and for a few of them.
+/// Counted; said once for each writer, and for a few of them. Who sends nothing else is not read
+/// any more: a flood must not hold up the run.
 void FleetShare::note_foreign(std::uint64_t writer, const std::string& what) {
   ++foreign_;
-  if (said_foreign_.size() >= kPeersMost || !said_foreign_.emplace(writer, true).second) return;
-  if (said_foreign_.size() > kForeignSaid) return;
-  options_.log(fmt::format(
-      "warning: --share {}: somebody sends {}; left out (said once)", options_.run, what));
+  const auto known = foreign_of_.find(writer);
+  if (known == foreign_of_.end() && foreign_of_.size() >= kPeersMost) return;
+  const std::uint64_t count = ++foreign_of_[writer];
+  const bool is_said = foreign_of_.size() <= kForeignSaid;
+  if (count == 1 && is_said) {
+    options_.log(fmt::format(
+        "warning: --share {}: somebody sends {}; left out (said once)", options_.run, what));
+  }
+  const bool is_peer = std::any_of(peers_.begin(), peers_.end(), [writer](const auto& entry) {
+    return entry.second.fits && entry.second.writer == writer;
+  });
+  if (is_peer || count != kForeignMost) return;
+  transport_.ignore(writer);
+  if (is_said) {
+    options_.log(
+        fmt::format("warning: --share {}: {} messages of that kind came from one program; "
+                    "nothing of it is read any more",
+                    options_.run,
+                    count));
+  }
 }
 
 /// Of two that cannot both fly: the one that has flown for longer by the run's own time.
@@ -184,6 +208,7 @@ void FleetShare::take_introduction(const ShareArrival& arrival) {
   peer.intro.name = printable(peer.intro.name);
   peer.writer = arrival.writer;
   peer.gone = false;
+  peer.spoke = options_.steady();
   if (is_new) peer.heard = arrival.at;
   if (peer.intro.phase == Phase::kLeft) {
     // lockstep: not before its last step has been used
@@ -197,7 +222,8 @@ void FleetShare::take_introduction(const ShareArrival& arrival) {
   if (!peer.fits) return;
   if (!fitted) say_taken(peer);
   // lockstep: one that was lost comes back by joining again
-  if (decides_together() && peer.lost && peer.intro.phase == Phase::kJoining) recover(peer);
+  if (!decides_together() || !peer.lost || peer.intro.phase != Phase::kJoining) return;
+  if (options_.steady() >= peer.back_from) recover(peer);
 }
 
 void FleetShare::say_taken(const Peer& peer) const {
@@ -368,6 +394,7 @@ void FleetShare::leave() {
   if (phase_ == Phase::kLeft || !introduced_) return;
   introduce(Phase::kLeft);  // `now_` is that of the last step
   if (!decides_together()) return;
+  transport_.repeat({});
   for (int k = 0; k < 4; ++k) {  // nobody could ask for the last step again
     for (const Bytes& bytes : last_sent_) transport_.send(ShareChannel::kStates, bytes);
     transport_.wait(kMillisecond);

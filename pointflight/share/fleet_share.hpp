@@ -94,6 +94,14 @@ class FleetShare : public EndingAgreement {
     bool lost = false;         ///< Silent for the lease.
     bool warned = false;       ///< Of what is wrong with it.
     std::int64_t heard = 0;    ///< `steady` when states came last.
+    std::int64_t spoke = 0;    ///< The same of anything.
+    /// Lockstep: lost because its steps do not come, though it runs; not taken back before, by
+    /// `steady`, or before they come.
+    std::int64_t back_from = 0;
+    /// Lockstep: the last step that it has told by its beats, and whether as a verdict.
+    std::pair<std::int64_t, bool> told{-1, false};
+    bool waits = false;        ///< By its beats: for others.
+    std::int64_t told_at = 0;  ///< `steady` when it first said that it had told what is needed.
     std::uint32_t counter = 0;
     std::uint64_t received = 0, missing = 0;
     ClockEstimate clock{1.0};
@@ -145,6 +153,7 @@ class FleetShare : public EndingAgreement {
   void take_states(const ShareArrival& arrival);
   void take_clock(const ShareArrival& arrival);
   void take_past(const ShareArrival& arrival);
+  void take_beat(const ShareArrival& arrival);
   void note_foreign(std::uint64_t writer, const std::string& what);
   void check(Peer& peer);
   void say_taken(const Peer& peer) const;
@@ -169,6 +178,7 @@ class FleetShare : public EndingAgreement {
   OtherVehicles meet_free();
   void place(OtherVehicles& met, std::size_t number);
 
+  void repeat_beat(const SharedStep& own, bool waits);
   OtherVehicles meet_in_step(const SharedStep& own);
   [[nodiscard]] static const share_msg::States* step_of(const Peer& peer,
                                                         SimTime time,
@@ -176,8 +186,22 @@ class FleetShare : public EndingAgreement {
   [[nodiscard]] std::uint64_t joiner() const;
   [[nodiscard]] bool is_needed(Peer& peer, SimTime time);
   [[nodiscard]] bool is_hopeless(const Peer& peer, const SharedStep& own) const;
+  [[nodiscard]] bool is_silent(const Peer& peer, std::int64_t since) const;
+  [[nodiscard]] bool tells_in_vain(Peer& peer, SimTime needed, bool verdict);
+  void give_up(Peer& peer, const std::string& words);
+  bool lose_hopeless(Peer& peer, const SharedStep& own, SimTime needed, std::int64_t since);
+  /// Since when nobody works, in lockstep.
+  struct Standstill {
+    std::vector<std::pair<std::int64_t, bool>> told;  ///< By all that fly.
+    std::int64_t since = 0;                           ///< `steady`
+  };
+  [[nodiscard]] bool is_stuck(Standstill& standstill) const;
+  void lose_all_waited_for(const SharedStep& own, SimTime needed, std::uint64_t joins);
   void wait_for_steps(const SharedStep& own, SimTime needed);
   void say_slow(SimTime needed, bool verdict);
+  [[nodiscard]] bool is_back(const Peer& peer) const;
+  [[nodiscard]] bool is_left_out() const;
+  bool join_again();
   Adjustment rejoin();
 
   void send_clock();
@@ -194,6 +218,7 @@ class FleetShare : public EndingAgreement {
   FleetShareOptions options_;
   ShareSetup setup_;
   Duration lease_;
+  std::int64_t patience_;  ///< Lockstep, ns: with whom steps do not come from.
   Duration step_;
   Schedule schedule_;  ///< Of states that are sent, free.
   std::vector<share_msg::Part> parts_;
@@ -215,12 +240,13 @@ class FleetShare : public EndingAgreement {
   std::int64_t first_look_ = 0;
   std::int64_t said_waiting_ = 0;
   std::int64_t next_clock_ = 0;
+  std::int64_t rejoins_from_ = 0;     ///< Lockstep: not before, by `steady`.
   std::int64_t next_sent_ = 0;        ///< Index in the schedule.
   std::deque<Bytes> last_sent_;       ///< States; in lockstep those that others may still need.
   std::deque<SharedStep> own_steps_;  ///< Lockstep with steps ahead: what was told, without states.
   std::uint32_t counter_ = 0;
   std::uint64_t foreign_ = 0;
-  std::map<std::uint64_t, bool> said_foreign_;
+  std::map<std::uint64_t, std::uint64_t> foreign_of_;  ///< Messages, by writer.
   std::map<std::uint64_t, bool> said_offset_;
 };
 

@@ -123,6 +123,7 @@ void FleetShare::take_states(const ShareArrival& arrival) {
     return;
   }
   peer->heard = arrival.at;
+  peer->back_from = 0;
   if (peer->received > 0 && states->counter > peer->counter) {
     peer->missing += states->counter - peer->counter - 1;
   }
@@ -173,6 +174,7 @@ void FleetShare::send_states(const SharedStep& own) {
   last_sent_.push_back(bytes_of(states));
   while (last_sent_.size() > (decides_together() ? kResentMost : 1)) last_sent_.pop_front();
   transport_.send(ShareChannel::kStates, last_sent_.back());
+  if (decides_together()) repeat_beat(own, true);
 }
 
 /// For those who were apart: where own vehicles were; of many vehicles at fewer instants.

@@ -148,13 +148,6 @@ T median_by(std::vector<T> values, const Measure& measure) {
   return *middle;
 }
 
-const char* name_of_unit(double seconds) {
-  for (const TimeUnit& unit : kTimeUnits) {
-    if (unit.seconds == seconds) return unit.name;
-  }
-  return "";
-}
-
 }  // namespace
 
 void PosedScans::settle_times(const std::optional<TimeUnit>& given, const std::string& name) {
@@ -177,20 +170,10 @@ void PosedScans::settle_times(const std::optional<TimeUnit>& given, const std::s
     return;
   }
   const TimesOfScan usual = median_by(times, [](const TimesOfScan& scan) { return scan.span(); });
-  const double in_file = usual.span() / usual.unit;
-  const double unit = given ? given->seconds : usual.unit;
-  if (in_file == 0.0 || !(interval > 0.0) || fits_interval(in_file * unit, interval)) return;
-  const auto found = given ? std::nullopt : unit_by_span(in_file, interval);
-  if (found) time_unit_ = found->seconds;
-  const double settled = found ? found->seconds : unit;
-  about_times_ = fmt::format(
-      "{}: times of points are taken to be in {}: a scan takes {:.3g} s so, and scans come every "
-      "{:.3g} s{}; --time-unit says otherwise",
-      name,
-      name_of_unit(settled),
-      in_file * settled,
-      interval,
-      found ? "" : ", surfaces may smear");
+  const SettledUnit settled =
+      settled_unit(usual.span() / usual.unit, usual.unit, interval, given, name);
+  if (settled.seconds != usual.unit) time_unit_ = settled.seconds;
+  about_times_ = settled.said;
 }
 
 SurveyFolder::SurveyFolder(const SurveyFiles& files) {

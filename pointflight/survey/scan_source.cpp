@@ -170,6 +170,7 @@ std::vector<RecordedScan> read_scans(const ScanSource& source,
     report(progress,
            "reading scans",
            static_cast<double>(batch.scan) / static_cast<double>(scans.size()));
+    scans[batch.scan].time_unit = batch.time_unit;
     for (const RecordedPoint& point : batch.points) {
       if (!point.position.isZero(0.0)) scans[batch.scan].points.push_back(point);  // drivers: none
     }
@@ -183,6 +184,37 @@ std::vector<RecordedScan> read_scans(const ScanSource& source,
     for (RecordedPoint& point : scan.points) point.time -= first;
   }
   return scans;
+}
+
+std::string settle_times(std::vector<RecordedScan>& scans,
+                         const std::optional<TimeUnit>& given,
+                         const std::string& name) {
+  std::vector<double> intervals;
+  std::vector<double> spans;
+  for (std::size_t i = 0; i < scans.size(); ++i) {
+    if (i > 0) intervals.push_back(scans[i].time - scans[i - 1].time);
+    double span = 0.0;
+    for (const RecordedPoint& point : scans[i].points) {
+      if (std::isfinite(point.time)) span = std::max(span, point.time);
+    }
+    if (span > 0.0) spans.push_back(span);
+  }
+  std::erase_if(intervals, [](double seconds) { return !std::isfinite(seconds); });
+  if (spans.empty() || intervals.empty()) return {};
+  const auto median = [](std::vector<double>& values) {
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    return *middle;
+  };
+  const double assumed = scans.front().time_unit;
+  const SettledUnit settled =
+      settled_unit(median(spans) / assumed, assumed, median(intervals), given, name);
+  if (settled.seconds == assumed) return settled.said;
+  for (RecordedScan& scan : scans) {
+    for (RecordedPoint& point : scan.points) point.time *= settled.seconds / assumed;
+    scan.time_unit = settled.seconds;
+  }
+  return settled.said;
 }
 
 }  // namespace pointflight

@@ -12,6 +12,7 @@
 
 #include "pointflight/core/progress.hpp"
 #include "pointflight/io/recorded_point.hpp"
+#include "pointflight/survey/time_unit.hpp"
 
 namespace pointflight {
 
@@ -87,6 +88,7 @@ class ScanFolder : public ScanSource {
 /// A scan in memory.
 struct RecordedScan {
   double time = std::numeric_limits<double>::quiet_NaN();  ///< Its stamp, s; NaN: none.
+  double time_unit = 1.0;  ///< That times of its points were taken to be in, s.
   /// In the recording's order; times count from the first point on.
   std::vector<RecordedPoint> points;
 };
@@ -95,5 +97,11 @@ struct RecordedScan {
 std::vector<RecordedScan> read_scans(const ScanSource& source,
                                      std::size_t most,
                                      const Progress& progress = {});
+
+/// Brings the times of their points into seconds by the rate of the scans, if the unit that they
+/// were taken to be in does not fit it. Returns what users are told of it (`settled_unit`).
+std::string settle_times(std::vector<RecordedScan>& scans,
+                         const std::optional<TimeUnit>& given,
+                         const std::string& name);
 
 }  // namespace pointflight

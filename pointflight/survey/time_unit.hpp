@@ -3,6 +3,7 @@
 
 #include <array>
 #include <optional>
+#include <string>
 
 namespace pointflight {
 
@@ -25,5 +26,22 @@ bool fits_interval(double span, double interval);
 /// @param interval  From scan to scan, s.
 /// @return Nothing if they fit in none.
 std::optional<TimeUnit> unit_by_span(double span, double interval);
+
+/// The unit that times of points are read in, and what users are told of it.
+struct SettledUnit {
+  double seconds = 1.0;  ///< Of one.
+  std::string said;      ///< A line; empty if a scan takes as long as it should.
+};
+/// @param span      From the first to the last time of a usual scan, in the file's unit; 0: they
+///                  have none.
+/// @param assumed   Of the file's unit by its type, s.
+/// @param interval  From scan to scan, s; NaN: not known.
+/// @param given     By the user; nothing: it is recognised.
+/// @param name      Of the scans, for the line.
+SettledUnit settled_unit(double span,
+                         double assumed,
+                         double interval,
+                         const std::optional<TimeUnit>& given,
+                         const std::string& name);
 
 }  // namespace pointflight

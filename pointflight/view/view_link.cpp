@@ -139,10 +139,12 @@ void ViewLink::open(const RunDescription& run) {
     }
   }
   const Aabb& bounds = run.map->bounds_world();
+  map_frame_ = map_frame_for(bounds, {});
   const json description = {
       {"seed", run.seed},
       {"vehicles", vehicles},
       {"epoch", std::to_string(epoch_.count())},  // ns: more than a JSON number holds
+      {"cloud_origin", list_of(map_frame_.origin)},
       {"map",
        {{"surfels", run.map->surfel_count()},
         {"resolution", run.map->resolution()},
@@ -194,9 +196,10 @@ void ViewLink::publish_scan(const ScanSample& sample) {
   const Scan& scan = *sample.scan;
   const std::uint32_t channel = vehicles_[scan.vehicle].scans[scan.sensor];
   if (!server_->has_subscribers(channel)) return;
-  const auto points = world_points(scan, sample.T_world_sensor);
+  const auto points = world_points(scan, sample.T_world_sensor, map_frame_.origin);
+  const std::string frame = map_frame_.is_used() ? map_frame_.name : "world";
   const msg::PointCloud2 cloud =
-      cloud_of(scan, point_layout("xyzit"), "world", epoch_, points, kPlainIntensity);
+      cloud_of(scan, point_layout("xyzit"), frame, epoch_, points, kPlainIntensity);
   server_->publish(channel,
                    std::make_shared<const std::vector<std::byte>>(encode<Wire::kCdr>(cloud)),
                    stamp(scan.end));

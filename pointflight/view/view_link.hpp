@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "pointflight/ros/common/map_frame.hpp"
 #include "pointflight/run/link.hpp"
 #include "pointflight/run/playback.hpp"
 #include "pointflight/view/live_server.hpp"
@@ -61,6 +62,7 @@ class ViewLink : public Link {
   std::vector<std::string> names_;
   std::optional<ObstacleSample> obstacles_;
   std::vector<MotionLimits> motions_;
+  MapFrame map_frame_;  ///< Of scans.
   OrderInbox inbox_;
   std::uint32_t run_ = 0, state_ = 0, events_ = 0;  ///< Channels.
   Clock::time_point last_state_{};

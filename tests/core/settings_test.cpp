@@ -106,7 +106,11 @@ TEST(Settings, ErrorsNameFileLineKeyAndAWayOut) {
       {"stops: [[1, 2]]\n", "cart.yaml:1: stops", "[x, y, z]"},
       {"speed: [1\n", "cart.yaml:", "not valid YAML"},
       {"just text\n", "cart.yaml", "key: value"},
-      {"speed: 1\n---\nspeed: 2\n", "cart.yaml:3", "a second document (---) begins"},
+      {"speed: 1\n---\nspeed: 2\n", "cart.yaml:2", "a second document (---) begins"},
+      {"speed: 1\n---\n", "cart.yaml:2", "a second document (---) begins"},
+      {"speed: 1\n}\n", "cart.yaml:2", "not valid YAML"},
+      {"{speed: 1}\n,l", "cart.yaml:2", "not valid YAML"},
+      {",l", "cart.yaml:1", "not valid YAML"},
       {"", "cart.yaml", "key: value"},
   };
   for (const Case& c : cases) {

@@ -60,7 +60,7 @@ TEST_F(MapEdit, CropsMapsAndClouds) {
       run(fmt::format("map crop {} -o {} --box 90,90,90,99,99,99", cloud(), folder / "b.pcd")),
       "no point is left");
   expect_user_error(run(fmt::format("map crop {} -o {} --box 1,2,3", cloud(), folder / "b.pcd")),
-                    "--box: expected 6 numbers, got 3");
+                    "--box: 3 numbers where 6 are wanted: x,y,z of the lower corner");
   expect_user_error(
       run(fmt::format("map crop {} -o {} --max-height 2", cloud(), folder / "b.pfmap")),
       "map import");
@@ -162,7 +162,7 @@ TEST_F(MapEdit, TransformsAndLevels) {
   refused("--scale 2", "cannot be scaled");
   refused("--matrix '1 0 0 0 0 1 0 0 0 0 -1 0 0 0 0 1'", "mirrors");
   refused("--matrix '1 0.5 0 0 0 1 0 0 0 0 1 0 0 0 0 1'", "shears");
-  refused("--matrix '1 2 3'", "expected 16 numbers, got 3");
+  refused("--matrix '1 2 3'", "3 numbers where 16 are wanted: 4 x 4");
   refused("--pose 1,2,x,0,0,0", "'x' is no number");
 }
 

@@ -43,7 +43,8 @@ TEST_F(Program, WrongFlagsAreWrongInput) {
   expect_user_error(run("fly x.yaml -o /tmp/x --rate fast"), "--rate: 'fast'");
   expect_user_error(run(fmt::format("map import {} -o /tmp/x --resolution -1", cloud())),
                     "resolution");
-  expect_user_error(run(fmt::format("scan {} --pose 1,2,3", map())), "expected 6 numbers, got 3");
+  expect_user_error(run(fmt::format("scan {} --pose 1,2", map())),
+                    "2 numbers where 6 are wanted: x,y,z,roll");
   expect_user_error(run(fmt::format("scan {} --pose 1,2,3,4,5,x", map())), "'x' is no number");
   expect_user_error(run(fmt::format("scan {} --lidar mid36 --pose 1,2,3,0,0,0", map())),
                     "did you mean 'mid360'");
@@ -164,7 +165,7 @@ TEST_F(Program, FliesWhatTheCommandLineSays) {
   EXPECT_EQ(again.code, 0) << again.err;
   expect_contains(read_file(folder / "again/scenario.yaml"), "model: mid360");
   expect_user_error(run(fmt::format("fly {} -o {} --mission 1,2", map(), folder / "no")),
-                    "--mission (x,y,z x,y,z ...): expected 3 numbers, got 2");
+                    "--mission: 2 numbers where 3 are wanted: x,y,z x,y,z");
   expect_user_error(run(fmt::format("fly {} -o {} --lockstep 1", map(), folder / "no")),
                     "--lockstep: has no effect without --ros1, --ros2 or --view");
   const Result check = run(fmt::format("scenario check {} --json", folder / "run/scenario.yaml"));

@@ -27,11 +27,26 @@ def tap_in(pid):
     return tap
 
 
+def damaged(frame, rng):
+    """A packet of DDS with a few of its bytes changed behind the name of its sender; None for other frames."""
+    payload = 14 + 4 * (frame[14] & 15) + 8
+    is_udp = frame[12:14] == b"\x08\x00" and frame[23] == 17
+    is_whole = struct.unpack("!H", frame[20:22])[0] & 0x3FFF == 0
+    if not is_udp or not is_whole or frame[payload:payload + 4] != b"RTPS" or len(frame) < payload + 24:
+        return None
+    copy = bytearray(frame)
+    for _ in range(rng.choice([1, 1, 1, 2, 4])):
+        at = rng.randrange(payload + 20, len(copy))
+        copy[at] = rng.choice([copy[at] ^ 1 << rng.randrange(8), 0, 1, 0x7F, 0x80, 0xFF, rng.randrange(256)])
+    copy[payload - 2:payload] = b"\0\0"  # no checksum
+    return bytes(copy)
+
+
 def relay(pids, orders, counted):
     taps = [tap_in(pid) for pid in pids]
     orders.send("ready")
     rng = random.Random(1)
-    loss, delay, group = 0.0, 0.0, [0] * len(taps)
+    loss, delay, group, damage = 0.0, 0.0, [0] * len(taps), 0.0
     where = {}  # host by hardware address
     held = []  # (due, number, host, frame)
     number = 0
@@ -52,7 +67,7 @@ def relay(pids, orders, counted):
         for file in ready:
             if file is orders:
                 try:
-                    loss, delay, group = orders.recv()
+                    loss, delay, group, damage = orders.recv()
                 except EOFError:
                     return
                 continue
@@ -77,6 +92,10 @@ def relay(pids, orders, counted):
                         heapq.heappush(held, (now + delay, number, host, frame))
                     else:
                         put(host, frame)
+                    if damage > 0.0 and rng.random() < damage:
+                        changed = damaged(frame, rng)
+                        if changed:
+                            put(host, changed)
 
 
 class Lan:
@@ -100,11 +119,12 @@ class Lan:
                 ["nsenter", "-t", str(holder.pid), "--net", "sh", "-c",
                  f"ip link set lo up && ip addr add 10.98.0.{i + 1}/24 dev eth0 && ip link set eth0 up &&"
                  " ip route add default dev eth0"], check=True)
-        self.state = [0.0, 0.0, [0] * hosts]
+        self.state = [0.0, 0.0, [0] * hosts, 0.0]
 
-    def set(self, loss=None, delay=None, groups=None):
-        """Share of frames lost, s of delay each way, and which hosts hear each other (a number each)."""
-        for i, value in enumerate((loss, delay, groups)):
+    def set(self, loss=None, delay=None, groups=None, damage=None):
+        """Share of frames lost, s of delay each way, which hosts hear each other (a number each), and the share of
+        DDS' packets that come once more, with other bytes."""
+        for i, value in enumerate((loss, delay, groups, damage)):
             if value is not None:
                 self.state[i] = value
         self.orders.send(tuple(self.state))

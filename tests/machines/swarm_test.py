@@ -391,11 +391,26 @@ def fault_step_partition(trial, rng, result, number):
     say_what_was_missed(trial, result)
 
 
+def fault_step_damage(trial, rng, result, number):
+    """Packets that somebody changes can make DDS take all that is right for old. Who is heard no more is lost then,
+    and each flies on: nobody waits for ever."""
+    processes = trial.start_all()
+    trial.until(rng.uniform(1, 3))
+    trial.lan.set(damage=0.3)
+    time.sleep(4.0)
+    trial.lan.set(damage=0.0)
+    for process in processes:
+        code = process.end()  # within a minute
+        assert code in (0, 1), f"exit {code}: {process.text()}"
+        result["lost"] += "its body vanishes" in process.text() or "its body stays" in process.text()
+
+
 # fault: (what is done, seconds of the flight)
 KINDS = {"kill": (fault_kill, 13), "loss": (fault_loss, 10), "delay": (fault_delay, 10),
          "partition": (fault_partition, 18), "stop": (fault_stop, 14), "double": (fault_double, 5),
          "late": (fault_late, 10), "leave": (fault_leave, 8), "step_kill": (fault_step_kill, 10),
-         "step_stop": (fault_step_stop, 14), "step_partition": (fault_step_partition, 18)}
+         "step_stop": (fault_step_stop, 14), "step_partition": (fault_step_partition, 18),
+         "step_damage": (fault_step_damage, 10)}
 
 
 def try_fault(job):
@@ -437,7 +452,7 @@ def faults(kinds):
         fine = fine and total["done"] == times
         fine = fine and not (total["missed"] or total["late"] or total["not recovered"] or total["unknown"])
         # else nothing is shown: they meet each time they pass each other (where one leaves, it has not come so far)
-        fine = fine and (total["met"] > 0 or kind in ("double", "leave"))
+        fine = fine and (total["met"] > 0 or kind in ("double", "leave", "step_damage"))
         fine = fine and (total["missed while apart, said"] > 0 or "partition" not in kind)
     return fine
 

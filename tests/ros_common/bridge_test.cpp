@@ -9,6 +9,7 @@
 #include "pointflight/core/hash.hpp"
 #include "pointflight/ros/common/conversion.hpp"
 #include "pointflight/ros/common/scan_messages.hpp"
+#include "tests/ros_common/keeper.hpp"
 #include "tests/sim/runs.hpp"
 
 namespace pointflight {
@@ -17,55 +18,9 @@ namespace {
 using testing::error_of;
 using testing::expect_contains;
 using testing::hall;
+using testing::Keeper;
 
 constexpr Duration kEpoch = std::chrono::seconds(1'700'000'000);
-
-/// Keeps what it gets.
-class Keeper : public Outlet {
- public:
-  explicit Keeper(Wire wire = Wire::kCdr) : wire_(wire) {}
-  [[nodiscard]] Wire wire() const override { return wire_; }
-  int advertise(const Topic& topic) override {
-    topics.push_back(topic);
-    return static_cast<int>(topics.size()) - 1;
-  }
-  [[nodiscard]] bool has_readers(int /*topic*/) const override { return true; }
-  void send(int topic, const Bytes& bytes, std::int64_t time) override {
-    EXPECT_GE(time, last_);
-    last_ = time;
-    sent.push_back({topic, time, bytes});
-    for (const std::byte b : *bytes) all.push_back(b);
-  }
-
-  /// Messages of a topic.
-  template <class M>
-  std::vector<M> of(const std::string& name) const {
-    std::vector<M> messages;
-    for (const Sent& s : sent) {
-      const Topic& topic = topics[static_cast<std::size_t>(s.topic)];
-      if (topic.name != name) continue;
-      EXPECT_EQ(topic.type.md5, message_type<M>().md5) << name;
-      const auto message =
-          wire_ == Wire::kCdr ? decode<Wire::kCdr, M>(*s.bytes) : decode<Wire::kRos1, M>(*s.bytes);
-      EXPECT_TRUE(message) << name;
-      if (message) messages.push_back(*message);
-    }
-    return messages;
-  }
-
-  struct Sent {
-    int topic;
-    std::int64_t time;
-    Bytes bytes;
-  };
-  std::vector<Topic> topics;
-  std::vector<Sent> sent;
-  std::vector<std::byte> all;
-
- private:
-  Wire wire_;
-  std::int64_t last_ = 0;
-};
 
 /// A flight of a second along x with a Mid-360.
 Scenario flight(double duration = 1.0) {
@@ -381,9 +336,9 @@ TEST(ScanMessages, PointsThatAHullTouchesLieAroundIt) {
   const Solid hull{Sphere{0.3}};
   Pose pose;
   pose.translation = {6, 6, 3};
-  EXPECT_TRUE(touched_points(*map, hull, pose).empty());
+  EXPECT_TRUE(touched_points(*map, hull, pose, Vector3d::Zero()).empty());
   pose.translation.z() = 0.1;  // in the floor
-  const auto points = touched_points(*map, hull, pose);
+  const auto points = touched_points(*map, hull, pose, Vector3d::Zero());
   EXPECT_GT(points.size(), 3u);
   for (const Vector3f& p : points) {
     EXPECT_LT((p.cast<double>() - pose.translation).norm(), 0.3 + 2.0 * map->resolution());

@@ -5,6 +5,7 @@
 #include <deque>
 #include <functional>
 #include <mutex>
+#include <set>
 #include <vector>
 
 #include "pointflight/share/share_transport.hpp"
@@ -26,7 +27,15 @@ class Bus {
     void send(ShareChannel channel, const Bytes& bytes) override {
       bus_.send(number_, channel, *bytes);
     }
-    std::vector<ShareArrival> take() override { return bus_.take(number_); }
+    void repeat(const Bytes& bytes) override { bus_.repeat(number_, bytes); }
+    std::vector<ShareArrival> take() override {
+      std::vector<ShareArrival> arrivals = bus_.take(number_);
+      std::erase_if(arrivals,
+                    [this](const ShareArrival& a) { return ignored.count(a.writer) != 0; });
+      return arrivals;
+    }
+    void ignore(std::uint64_t writer) override { ignored.insert(writer); }
+    std::set<std::uint64_t> ignored;
     void wait(std::int64_t at_most) override { bus_.wait(number_, at_most); }
     [[nodiscard]] std::uint64_t bytes_sent() const override { return bus_.sent_[number_]; }
 
@@ -40,6 +49,7 @@ class Bus {
     const std::lock_guard lock(mutex_);
     inboxes_.emplace_back();
     sent_.push_back(0);
+    beats_.emplace_back();
     // whoever comes late gets the last introductions
     for (const Message& message : crew_) inboxes_.back().push_back(message);
     return std::make_unique<End>(*this, inboxes_.size() - 1);
@@ -97,7 +107,28 @@ class Bus {
     arrived_.notify_all();
   }
 
+  void repeat(std::size_t from, const Bytes& bytes) {
+    const std::lock_guard lock(mutex_);
+    beats_[from].bytes = bytes;
+  }
+
+  /// Of those that run: as if from threads of their own.
+  void send_beats() {
+    constexpr std::int64_t kPeriod = 20'000'000;
+    std::vector<std::pair<std::size_t, Bytes>> due;
+    {
+      const std::lock_guard lock(mutex_);
+      for (std::size_t from = 0; from < beats_.size(); ++from) {
+        if (!beats_[from].bytes || now_() < beats_[from].next) continue;
+        beats_[from].next = now_() + kPeriod;
+        due.emplace_back(from, beats_[from].bytes);
+      }
+    }
+    for (const auto& [from, bytes] : due) send(from, ShareChannel::kClock, *bytes);
+  }
+
   std::vector<ShareArrival> take(std::size_t to) {
+    send_beats();
     const std::lock_guard lock(mutex_);
     std::vector<ShareArrival> taken;
     std::deque<Message>& inbox = inboxes_[to];
@@ -120,6 +151,11 @@ class Bus {
   std::deque<std::deque<Message>> inboxes_;
   std::vector<Message> crew_;
   std::deque<std::uint64_t> sent_;
+  struct Beat {
+    Bytes bytes;
+    std::int64_t next = 0;
+  };
+  std::deque<Beat> beats_;
 };
 
 }  // namespace pointflight::testing

@@ -183,6 +183,68 @@ TEST(FleetShare, LockstepGoesOnWithoutWhoIsLostAndTakesItBack) {
   EXPECT_EQ(members[0]->simulation.state().skipped, Duration{0});
 }
 
+/// Two of whom one does not get something of the other's from 0.2 s on; both to their ends.
+std::vector<std::unique_ptr<Member>> fly_half_deaf(
+    Bus& bus, const std::function<bool(ShareChannel)>& is_lost) {
+  Scenario scenario = three(ShareTime::kLockstep);
+  scenario.obstacles.clear();
+  scenario.vehicles.pop_back();
+  for (VehicleSetup& v : scenario.vehicles) v.lidars.clear();
+  scenario.duration = 0.6;
+  ShareSetup setup;
+  setup.time = ShareTime::kLockstep;
+  setup.lease = 0.2;
+  scenario = with_share(scenario, setup);
+  std::atomic<bool> broken = false;
+  bus.loses = [&broken, is_lost](std::size_t from, std::size_t /*to*/, ShareChannel channel) {
+    return broken && from == 0 && is_lost(channel);
+  };
+  std::vector<std::unique_ptr<Member>> members;
+  for (std::size_t i = 0; i < 2; ++i) {
+    members.push_back(std::make_unique<Member>(bus, scenario, std::vector{i}, wall, i + 1));
+  }
+  std::vector<std::thread> threads;
+  for (const auto& member : members) {
+    threads.emplace_back([&m = *member, &broken] {
+      while (!m.link->is_ready()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      while (m.simulation.step(m.sink)) {
+        m.obey_share();
+        if (m.simulation.time() >= SimTime(std::chrono::milliseconds(200))) broken = true;
+      }
+      m.share->leave();
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  bus.loses = nullptr;
+  return members;
+}
+
+// Packets that somebody changes and sends once more make DDS take the right ones for old, for good.
+TEST(FleetShare, LockstepDoesNotWaitForStepsThatNeverCome) {
+  struct Case {
+    std::function<bool(ShareChannel)> is_lost;
+    const char* words;
+  };
+  const Case cases[] = {
+      {[](ShareChannel channel) { return channel == ShareChannel::kStates; },
+       "is heard, but its steps do not come"},
+      {[](ShareChannel) { return true; }, "has said nothing for 0.6 s"},
+  };
+  for (const Case& c : cases) {
+    Bus bus(wall);
+    const auto members = fly_half_deaf(bus, c.is_lost);
+    for (const auto& member : members) {
+      EXPECT_EQ(member->simulation.time(), SimTime(std::chrono::milliseconds(600)));
+    }
+    // the deaf one says so
+    const auto& events = members[1]->sink.events;
+    const auto lost = std::find_if(
+        events.begin(), events.end(), [](const VehicleEvent& e) { return e.kind == "lost"; });
+    ASSERT_NE(lost, events.end()) << c.words;
+    testing::expect_contains(lost->words, c.words);
+  }
+}
+
 TEST(FleetShare, LockstepThatGoesOnFromALogWaitsForTheOthersAsAnyDoes) {
   Scenario scenario = three(ShareTime::kLockstep);
   scenario.obstacles.clear();

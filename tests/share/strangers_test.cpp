@@ -60,6 +60,21 @@ TEST(FleetShare, StrangersChangeNothingAndAreSaidOnce) {
   EXPECT_EQ(hashes[0], hashes[1]);
 }
 
+TEST(FleetShare, AFloodIsReadOnlySoFar) {
+  World world;
+  Member& a = world.add(through_each_other(), {0});
+  world.pass(0.5);
+  const std::vector<std::byte> junk(50);
+  for (int k = 0; k < 5000; ++k) {
+    world.bus.shout(ShareChannel::kStates, junk);
+    if (k % 10 == 0) world.pass(1e-3);
+  }
+  EXPECT_GE(a.share->foreign(), 1000u);
+  EXPECT_LE(a.share->foreign(), 1010u);
+  const std::string said = a.lines.back();
+  testing::expect_contains(said, "1000 messages of that kind came from one program");
+}
+
 TEST(FleetShare, WhoSpeaksInAnothersNameIsNotHeardAndNoNumberIsTooLarge) {
   World world;
   Member& a = world.add(through_each_other(), {0});

@@ -14,6 +14,7 @@ constexpr Duration kLookPeriod = std::chrono::milliseconds(50);
 RosBridge::RosBridge(RunDescription run, const RosProfile& profile, Duration epoch)
     : ros_{.run = std::move(run), .profile = profile, .epoch = epoch},
       next_look_(SimTime{} + kLookPeriod) {
+  ros_.map_frame = map_frame_for(ros_.run.map->bounds_world(), profile);
   note_start();
   streams_ = output_streams(ros_);
   ros_.streams = &streams_;

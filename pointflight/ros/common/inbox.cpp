@@ -25,6 +25,7 @@ Inbox::Inbox(const RunDescription& run, const RosProfile& profile)
     context.motion = run.vehicles[v].setup.mission.motion;
     context.world_frame = bare_frame(profile.world_frame);
     context.world_alias = bare_frame(profile.world_alias);
+    context.map_frame = map_frame_for(run.map->bounds_world(), profile);
     context.body_frame =
         bare_frame(body_frame_of(profile, names_of(profile, run.vehicles[v].setup, v), v));
     if (run.vehicles[v].own) own_contexts_.push_back(context);

@@ -23,6 +23,16 @@ bool is_world(const std::string& frame, const OrderContext& context) {
          (!context.world_alias.empty() && name == context.world_alias);
 }
 
+bool is_map(const std::string& frame, const OrderContext& context) {
+  return context.map_frame.is_used() && bare_frame(frame) == context.map_frame.name;
+}
+
+/// Where the zero of a message's frame is in the world, m; nothing for a frame that is not known.
+std::optional<Vector3d> origin_of(const std::string& frame, const OrderContext& context) {
+  if (is_map(frame, context)) return context.map_frame.origin;
+  return is_world(frame, context) ? std::optional<Vector3d>(Vector3d::Zero()) : std::nullopt;
+}
+
 bool is_body(const std::string& frame, const OrderContext& context) {
   const std::string name = bare_frame(frame);
   return name == context.body_frame || name == "base_link";
@@ -104,9 +114,14 @@ OrderMaker read_position(const RosInput& input, Wire wire, const Received& recei
   const auto position = position_in(input, wire, received);
   if (!position) return {};
   return [position](const OrderContext& context, std::string& why) -> std::optional<Order> {
-    if (is_world(position->frame, context)) return told(context, position->command);
-    why = unknown_frame(position->frame, context);
-    return std::nullopt;
+    const auto origin = origin_of(position->frame, context);
+    if (!origin) {
+      why = unknown_frame(position->frame, context);
+      return std::nullopt;
+    }
+    PositionCommand command = position->command;
+    command.p_world += *origin;
+    return told(context, command);
   };
 }
 
@@ -124,12 +139,12 @@ std::optional<Order> velocity_order(const msg::TwistStamped& m,
   command.v_world = vector_of(m.twist.linear);
   command.yaw_rate = m.twist.angular.z;
   const std::string& frame = m.header.frame_id;
-  if (!is_world(frame, context) && !is_body(frame, context)) {
+  const bool is_turned_as_world = is_world(frame, context) || is_map(frame, context);
+  if (!is_turned_as_world && !is_body(frame, context)) {
     why = unknown_frame(frame, context);
     return std::nullopt;
   }
-  const bool in_world =
-      frame.empty() ? input.frame == VelocityFrame::kWorld : is_world(frame, context);
+  const bool in_world = frame.empty() ? input.frame == VelocityFrame::kWorld : is_turned_as_world;
   command.in_body = !in_world;
   command.turn = true;
   return told(context, command);
@@ -179,17 +194,19 @@ std::optional<Order> goal_order(const msg::PoseStamped& m,
                                 const RosInput& /*input*/,
                                 const OrderContext& context,
                                 std::string& why) {
-  if (!is_world(m.header.frame_id, context)) {
+  const auto origin = origin_of(m.header.frame_id, context);
+  if (!origin) {
     why = unknown_frame(m.header.frame_id, context);
     return std::nullopt;
   }
-  const Vector3d p = vector_of(m.pose.position);
+  Vector3d p = vector_of(m.pose.position);
   if (!p.allFinite()) return std::nullopt;
   WaypointCommand command;
   command.mission.motion = context.motion;
-  command.mission.waypoints = {p};
   // RViz' flat tool knows no height
   command.keep_height = p.z() == 0.0;
+  p += *origin;
+  command.mission.waypoints = {p};
   command.mission.final_yaw = yaw_of(rotation_of(m.pose.orientation));
   return told(context, command);
 }

@@ -14,6 +14,7 @@
 #include "pointflight/core/registry.hpp"
 #include "pointflight/ros/common/codec.hpp"
 #include "pointflight/ros/common/description.hpp"
+#include "pointflight/ros/common/map_frame.hpp"
 #include "pointflight/ros/common/profile.hpp"
 #include "pointflight/ros/common/services.hpp"
 #include "pointflight/ros/common/wire.hpp"
@@ -32,6 +33,7 @@ struct OrderContext {
   ///@{
   std::string world_frame, world_alias, body_frame;
   ///@}
+  MapFrame map_frame;  ///< Positions may be in it, if it is used.
 };
 
 /// A message that was read, as an order for any vehicle. Nothing, and `why` in words, if it

@@ -35,7 +35,7 @@ class Cloud : public Output {
 };
 
 msg::PointCloud2 world_cloud(const OutputStream& stream, const ScanSample& sample) {
-  const auto points = world_points(*sample.scan, sample.T_world_sensor);
+  const auto points = world_points(*sample.scan, sample.T_world_sensor, stream.frame_origin());
   return cloud_of(*sample.scan,
                   point_layout(stream.settings.layout),
                   stream.settings.frame,
@@ -113,6 +113,7 @@ std::vector<OutputType> lidar_outputs() {
        .help = "a scan in the world",
        .make = per_sample<world_cloud>(),
        .per = kLidar,
+       .frame = Frame::kMap,
        .large = true,
        .depth = 5},
       {.name = "depth",

@@ -27,6 +27,8 @@ std::string pattern_of(const RosRun& ros, Frame frame, bool camera) {
   switch (frame) {
     case Frame::kWorld:
       return ros.profile.world_frame;
+    case Frame::kMap:
+      return ros.map_frame.is_used() ? ros.map_frame.name : ros.profile.world_frame;
     case Frame::kBody:
     case Frame::kImu:
       return ros.profile.body_frame;
@@ -128,7 +130,10 @@ OutputStream::OutputStream(RosRun& run,
       schedule_(settings.rate > 0.0 ? settings.rate : 1.0) {
   RosOutput& s = settings;
   const bool camera = type.per == Per::kLidar && is_camera(of_lidar().settings);
-  if (s.frame.empty()) s.frame = pattern_of(ros, type.frame, camera);
+  const bool is_far = type.frame == Frame::kMap && ros.map_frame.is_used();
+  if (s.frame.empty() || (is_far && s.frame == ros.profile.world_frame)) {
+    s.frame = pattern_of(ros, type.frame, camera);
+  }
   if (s.child_frame.empty()) s.child_frame = pattern_of(ros, type.child, camera);
   s.frame = written_out(ros, s.frame, vehicle, lidar);
   s.child_frame = s.child_frame == "-" ? "" : written_out(ros, s.child_frame, vehicle, lidar);

@@ -17,6 +17,7 @@
 #include "pointflight/ros/common/codec.hpp"
 #include "pointflight/ros/common/conversion.hpp"
 #include "pointflight/ros/common/description.hpp"
+#include "pointflight/ros/common/map_frame.hpp"
 #include "pointflight/ros/common/profile.hpp"
 #include "pointflight/sim/run_description.hpp"
 #include "pointflight/sim/sensor.hpp"
@@ -37,9 +38,10 @@ struct OutputMaker {
 struct OutputType {
   /// One message stream for the run, each vehicle or each LiDAR.
   enum class Per { kRun, kVehicle, kLidar };
-  /// A frame of the profile; an IMU's is the body's unless the profile names one, which is then
-  /// among the static transforms.
-  enum class Frame { kWorld, kBody, kImu, kSensor, kOptical };
+  /// A frame of the profile. An IMU's is the body's unless the profile names one, which is then
+  /// among the static transforms. Points in single precision are in the map's: the world's, or a
+  /// frame beside it (`MapFrame`).
+  enum class Frame { kWorld, kMap, kBody, kImu, kSensor, kOptical };
   /// Which sensors a stream of a LiDAR is for.
   enum class Cameras {
     kExcluded,   ///< The first that is no camera; all if the topic names the LiDAR.
@@ -74,6 +76,7 @@ Registry<OutputType>& output_types();
 struct RosRun {
   RunDescription run;                  ///< What it is.
   RosProfile profile;                  ///< Names and customs.
+  MapFrame map_frame{};                ///< Of clouds in the world.
   Duration epoch{0};                   ///< What stamps count from, since the Unix epoch.
   std::vector<Outlet*> outlets{};      ///< Where messages go.
   SimTime latest{};                    ///< That anything left at: outlets see time go one way.
@@ -120,6 +123,14 @@ class OutputStream {
   [[nodiscard]] const VehicleDescription& of_vehicle() const { return ros.run.vehicles[vehicle]; }
   [[nodiscard]] const LidarDescription& of_lidar() const { return of_vehicle().lidars[lidar]; }
   ///@}
+  /// Where the zero of its frame is in the world, m: not at zero only in the map's frame.
+  [[nodiscard]] Vector3d frame_origin() const {
+    return type.frame == OutputType::Frame::kMap ? ros.map_frame.origin : Vector3d::Zero();
+  }
+  /// A pose in the world, in the stream's frame.
+  [[nodiscard]] Pose in_frame(const Pose& T_world_any) const {
+    return {T_world_any.rotation, T_world_any.translation - frame_origin()};
+  }
   /// Its stamp and frame.
   [[nodiscard]] msg::Header header(SimTime time) const {
     return header_of(time, ros.epoch, settings.frame);

@@ -4,6 +4,7 @@
 #include <future>
 #include <map>
 #include <numeric>
+#include <set>
 
 #include "pointflight/core/constants.hpp"
 #include "pointflight/geometry/rotation.hpp"
@@ -58,7 +59,8 @@ class MapOutput : public Output {
  private:
   [[nodiscard]] msg::PointCloud2 message(const msg::Header& header) const {
     const RosOutput& s = stream_.settings;
-    const MapCloud map = map_cloud(*stream_.ros.run.map, s.resolution, kMapPointsMax);
+    const MapCloud map =
+        map_cloud(*stream_.ros.run.map, s.resolution, kMapPointsMax, stream_.frame_origin());
     msg::PointCloud2 cloud = cloud_of_points(map.points, map.intensities, point_layout(s.layout));
     cloud.header = header;
     return cloud;
@@ -66,8 +68,8 @@ class MapOutput : public Output {
   std::future<msg::PointCloud2> made_;  ///< For a reader that came late.
 };
 
-/// Where sensors sit on their vehicles; small, and asked for before anything else: there before the
-/// first who asks.
+/// Where sensors sit on their vehicles, and where the map's frame is; small, and asked for before
+/// anything else: there before the first who asks.
 class StaticTransforms : public Output {
  public:
   using Output::Output;
@@ -84,6 +86,7 @@ class StaticTransforms : public Output {
       if (stream_.ros.run.vehicles[v].own) add_lidars(v, message);
     }
     for (const OutputStream& other : *stream_.ros.streams) add_own_frame(other, message);
+    add_map_frames(message);
     stream_.send(std::move(message), SimTime{}, true);
   }
   void add(const Pose& pose,
@@ -103,6 +106,17 @@ class StaticTransforms : public Output {
       const Pose turned{optical(Quaterniond::Identity()), Vector3d::Zero()};
       add(turned, frame, frame + kOpticalSuffix, message);
     }
+  }
+  /// Of clouds of a map far from zero; a profile may call them otherwise.
+  void add_map_frames(msg::TFMessage& message) const {
+    const RosRun& ros = stream_.ros;
+    if (!ros.map_frame.is_used()) return;
+    std::set<std::string> names{ros.map_frame.name};
+    for (const OutputStream& other : *ros.streams) {
+      if (other.type.frame == OutputType::Frame::kMap) names.insert(other.settings.frame);
+    }
+    const Pose origin{Quaterniond::Identity(), ros.map_frame.origin};
+    for (const std::string& name : names) add(origin, ros.profile.world_frame, name, message);
   }
   /// An IMU with a frame of its own.
   void add_own_frame(const OutputStream& other, msg::TFMessage& message) const {
@@ -180,7 +194,7 @@ msg::MarkerArray obstacle_markers(const OutputStream& stream, const ObstacleSamp
 msg::PointCloud2 obstacle_points(const OutputStream& stream, const ObstacleSample& sample) {
   std::vector<Vector3f> points;
   for (const auto& [label, pose, shape] : sample.obstacles) {
-    append_surface(shape, pose, kObstacleSpacing, points);
+    append_surface(shape, stream.in_frame(pose), kObstacleSpacing, points);
   }
   return points_message(stream, points, sample.time);
 }
@@ -241,11 +255,12 @@ std::vector<OutputType> leading_outputs() {
        .help = "the map's points, latched",
        .make = made_by<MapOutput, msg::PointCloud2>(),
        .per = Per::kRun,
+       .frame = OutputType::Frame::kMap,
        .latched = true,
        .large = true,
        .depth = 1},
       {.name = "tf_static",
-       .help = "sensors on their vehicles, latched",
+       .help = "sensors on their vehicles, the frame of a map far from zero, latched",
        .make = made_by<StaticTransforms, msg::TFMessage>(),
        .per = Per::kRun,
        .from_each = true,
@@ -259,6 +274,7 @@ std::vector<OutputType> trailing_outputs() {
       {.name = "moving_cloud",
        .help = "points on the surfaces of obstacles",
        .make = per_sample<obstacle_points>(),
+       .frame = OutputType::Frame::kMap,
        .large = true,
        .depth = 5},
       {.name = "obstacles",

@@ -61,7 +61,9 @@ void put_nearest(msg::Image& image, std::size_t pixel, float value, float empty)
 
 }  // namespace
 
-std::vector<Vector3f> world_points(const Scan& scan, const PoseTrack& T_world_sensor) {
+std::vector<Vector3f> world_points(const Scan& scan,
+                                   const PoseTrack& T_world_sensor,
+                                   const Vector3d& origin) {
   std::vector<Vector3f> points;
   points.reserve(scan.points.size());
   // several points leave at one time: their pose is worked out once
@@ -71,6 +73,7 @@ std::vector<Vector3f> world_points(const Scan& scan, const PoseTrack& T_world_se
     if (scan.seen_at(point) != known) {
       known = scan.seen_at(point);
       pose = T_world_sensor.at(known);
+      pose.translation -= origin;
     }
     points.emplace_back((pose * point.position_sensor.cast<double>()).cast<float>());
   }
@@ -134,7 +137,10 @@ msg::CameraInfo camera_info_of(const LidarSettings& lidar) {
   return info;
 }
 
-MapCloud map_cloud(const SurfelMap& map, double resolution, std::size_t points_max) {
+MapCloud map_cloud(const SurfelMap& map,
+                   double resolution,
+                   std::size_t points_max,
+                   const Vector3d& origin) {
   MapCloud cloud;
   cloud.resolution = std::max(resolution, map.resolution());
   const Vector3d low = map.bounds_world().empty() ? Vector3d(0, 0, 0) : map.bounds_world().min;
@@ -152,7 +158,7 @@ MapCloud map_cloud(const SurfelMap& map, double resolution, std::size_t points_m
       };
       const std::uint64_t key = index(0) | index(1) << 21 | index(2) << 42;
       if (!all && !taken.insert(key).second) return;
-      cloud.points.emplace_back(center.cast<float>());
+      cloud.points.emplace_back((center - origin).cast<float>());
       cloud.intensities.push_back(map.intensity(word));
     });
     if (cloud.points.size() <= points_max) return cloud;
@@ -161,25 +167,26 @@ MapCloud map_cloud(const SurfelMap& map, double resolution, std::size_t points_m
 }
 
 void append_surface(const BodyShape& shape,
-                    const Pose& T_world_body,
+                    const Pose& T_frame_body,
                     double spacing,
                     std::vector<Vector3f>& points) {
   const auto* solid = std::get_if<Solid>(&shape);
   if (solid == nullptr) {
     const auto& map = std::get<std::shared_ptr<const SurfelMap>>(shape);
     map->for_each_surfel([&](const Vector3d& p, const Vector3d&, double, std::uint32_t) {
-      points.emplace_back((T_world_body * p).cast<float>());
+      points.emplace_back((T_frame_body * p).cast<float>());
     });
     return;
   }
   for (const Vector3d& p : surface_points(*solid, spacing)) {
-    points.emplace_back((T_world_body * p).cast<float>());
+    points.emplace_back((T_frame_body * p).cast<float>());
   }
 }
 
 std::vector<Vector3f> touched_points(const SurfelMap& map,
                                      const Solid& hull,
-                                     const Pose& T_world_hull) {
+                                     const Pose& T_world_hull,
+                                     const Vector3d& origin) {
   const Vector3d reach = Vector3d::Constant(bounding_radius(hull));
   Aabb around;
   around.add(T_world_hull.translation - reach);
@@ -187,7 +194,9 @@ std::vector<Vector3f> touched_points(const SurfelMap& map,
   std::vector<Vector3f> points;
   visit_near(map, around, 0.0, [&](const SurfelBox& box) {
     const Separation s = separation(hull, T_world_hull, Solid{Box{box.half}}, box.T_world_box);
-    if (s.distance <= 0.0) points.emplace_back(box.T_world_box.translation.cast<float>());
+    if (s.distance <= 0.0) {
+      points.emplace_back((box.T_world_box.translation - origin).cast<float>());
+    }
     return 0.0;
   });
   return points;

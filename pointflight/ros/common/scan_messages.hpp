@@ -11,8 +11,11 @@
 
 namespace pointflight {
 
-/// Points of a scan in the world, each by the sensor's pose at its own time.
-std::vector<Vector3f> world_points(const Scan& scan, const PoseTrack& T_world_sensor);
+/// Points of a scan in the axes of the world, from `origin` (world, m) on, each by the sensor's
+/// pose at its own time.
+std::vector<Vector3f> world_points(const Scan& scan,
+                                   const PoseTrack& T_world_sensor,
+                                   const Vector3d& origin);
 
 /// Depth picture of a scan, encoding 32FC1. Pinhole cameras: depth along the optical axis, m, 0
 /// if nothing returned (REP 118 has NaN, planners expect 0). Other sensors: a picture over
@@ -32,23 +35,29 @@ msg::CameraInfo camera_info_of(const LidarSettings& lidar);
 /// The map's surfels as points, one for each cell of `resolution` (m) at least; coarser if there
 /// would be more than `points_max`.
 struct MapCloud {
-  std::vector<Vector3f> points;  ///< World, m.
+  std::vector<Vector3f> points;  ///< In the axes of the world, from an origin on, m.
   /// Of each point, in the cloud's scale; 0 if the map has none.
   std::vector<float> intensities;
   double resolution = 0.0;  ///< That was taken, m.
 };
 /// As many points as the map has, in the order of its file, if `resolution` is at most its own.
-MapCloud map_cloud(const SurfelMap& map, double resolution, std::size_t points_max);
+/// `origin` (world, m) becomes their zero.
+MapCloud map_cloud(const SurfelMap& map,
+                   double resolution,
+                   std::size_t points_max,
+                   const Vector3d& origin);
 
-/// Points on the surface of a shape, about `spacing` apart, in the world.
+/// Points on the surface of a shape, about `spacing` apart, in the frame of the pose.
 void append_surface(const BodyShape& shape,
-                    const Pose& T_world_body,
+                    const Pose& T_frame_body,
                     double spacing,
                     std::vector<Vector3f>& points);
 
-/// Centres of the map's surfels that a hull touches, in the world.
+/// Centres of the map's surfels that a hull touches, in the axes of the world, from `origin`
+/// (world, m) on.
 std::vector<Vector3f> touched_points(const SurfelMap& map,
                                      const Solid& hull,
-                                     const Pose& T_world_hull);
+                                     const Pose& T_world_hull,
+                                     const Vector3d& origin);
 
 }  // namespace pointflight

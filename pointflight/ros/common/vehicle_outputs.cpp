@@ -94,7 +94,7 @@ class VehicleCloud : public Output {
     if (!stream_.is_due(odometry->delivered)) return;
     std::vector<Vector3f> points;
     append_surface(stream_.ros.run.vehicles[odometry->vehicle].shape,
-                   odometry->state.T_world_body(),
+                   stream_.in_frame(odometry->state.T_world_body()),
                    kHullSpacing,
                    points);
     stream_.send(points_message(stream_, points, odometry->time), odometry->time);
@@ -109,8 +109,10 @@ class TouchedPoints : public Output {
     const auto* odometry = std::get_if<OdometrySample>(&sample);
     if (odometry == nullptr || !stream_.is_about(*odometry)) return;
     if (!stream_.is_due(odometry->delivered)) return;
-    const auto points = touched_points(
-        *stream_.ros.run.map, stream_.of_vehicle().hull, odometry->state.T_world_body());
+    const auto points = touched_points(*stream_.ros.run.map,
+                                       stream_.of_vehicle().hull,
+                                       odometry->state.T_world_body(),
+                                       stream_.frame_origin());
     stream_.send(points_message(stream_, points, odometry->time), odometry->time);
   }
 };
@@ -260,11 +262,13 @@ std::vector<OutputType> vehicle_outputs() {
       {.name = "vehicle_cloud",
        .help = "points on the hull of the other vehicle whose odometry came",
        .make = made_by<VehicleCloud, msg::PointCloud2>(),
+       .frame = OutputType::Frame::kMap,
        .large = true,
        .depth = 5},
       {.name = "collision_cloud",
        .help = "points of the map that the vehicle's hull touches",
-       .make = made_by<TouchedPoints, msg::PointCloud2>()},
+       .make = made_by<TouchedPoints, msg::PointCloud2>(),
+       .frame = OutputType::Frame::kMap},
   };
 }
 

@@ -1,7 +1,5 @@
 #include "pointflight/ros/ros2/transport.hpp"
 
-#include <dds/ddsrt/log.h>
-
 #include <algorithm>
 #include <atomic>
 #include <condition_variable>
@@ -13,6 +11,7 @@
 #include <thread>
 
 #include "pointflight/ros/common/ros_names.hpp"
+#include "pointflight/ros/ros2/dds_log.hpp"
 #include "pointflight/ros/ros2/node.hpp"
 #include "pointflight/ros/ros2/write_queue.hpp"
 
@@ -26,7 +25,6 @@ constexpr double kFastPace = 128e6;
 constexpr double kSlowRate = 45e6;
 constexpr double kFastRate = 90e6;
 constexpr std::size_t kRequests = 10;  // of a service that wait
-constexpr int kSaidMax = 3;            // of DDS' own warnings
 
 /// The DDS name of "sensor_msgs/msg/Imu".
 std::string dds_type_name(const MessageType& type) {
@@ -51,35 +49,10 @@ EndpointSettings endpoint_of(const Topic& topic) {
   return settings;
 }
 
-/// What DDS says of packets that it cannot read and the like, to the user: a few lines of it.
-class DdsLog {
- public:
-  explicit DdsLog(std::function<void(const std::string&)> log) : log_(std::move(log)) {
-    dds_set_log_sink(&DdsLog::take, this);
-  }
-  ~DdsLog() { dds_set_log_sink(nullptr, nullptr); }
-  DdsLog(const DdsLog&) = delete;
-  DdsLog& operator=(const DdsLog&) = delete;
-
- private:
-  static void take(void* self, const dds_log_data_t* data) {
-    static_cast<DdsLog*>(self)->say({data->message, data->size});
-  }
-  void say(std::string text) {
-    const int before = said_++;
-    if (!log_ || before >= kSaidMax) return;
-    while (!text.empty() && (text.back() == '\n' || text.back() == ' ')) text.pop_back();
-    constexpr std::size_t kLine = 160;
-    if (text.size() > kLine) text = text.substr(0, kLine) + " ...";
-    log_("ROS 2: DDS says: " + text + (before + 1 == kSaidMax ? " (more is not said)" : ""));
-  }
-  std::function<void(const std::string&)> log_;
-  std::atomic<int> said_{0};
-};
-
 class Ros2Transport : public Transport {
  public:
-  explicit Ros2Transport(const TransportOptions& options) : options_(options), dds_(options.log) {
+  explicit Ros2Transport(const TransportOptions& options)
+      : options_(options), dds_("ROS 2", options.log) {
     DiscoverySettings discovery = discovery_from(environment);
     if (options.localhost_only) discovery.range = DiscoverySettings::Range::kLocalhost;
     if (options.log && options.large_rate > kSlowRate) {

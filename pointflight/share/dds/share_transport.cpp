@@ -6,15 +6,20 @@
 #include <array>
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <condition_variable>
 #include <cstdlib>
 #include <cstring>
 #include <map>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <stdexcept>
+#include <stop_token>
+#include <thread>
 #include <utility>
 
+#include "pointflight/ros/ros2/dds_log.hpp"
 #include "pointflight/ros/ros2/discovery.hpp"
 #include "pointflight/ros/ros2/raw_type.hpp"
 
@@ -96,7 +101,9 @@ struct Domain {
 
 class DdsShareTransport : public ShareTransport {
  public:
-  explicit DdsShareTransport(const ShareTransportOptions& options) {
+  explicit DdsShareTransport(const ShareTransportOptions& options)
+      : log_("--share " + options.name, options.log),
+        beat_period_(std::chrono::nanoseconds(std::llround(1e9 * options.beat))) {
     DiscoverySettings discovery = discovery_from(environment);
     if (options.localhost_only) discovery.range = DiscoverySettings::Range::kLocalhost;
     discovery.domain = domain_for(discovery);
@@ -116,6 +123,14 @@ class DdsShareTransport : public ShareTransport {
     if (write_raw(end.writer, end.type, bytes)) bytes_sent_ += bytes->size();
   }
 
+  void repeat(const Bytes& bytes) override {
+    const std::lock_guard lock(beat_mutex_);
+    beat_ = bytes;
+    if (bytes && !beats_.joinable()) {
+      beats_ = std::jthread([this](const std::stop_token& stop) { send_beats(stop); });
+    }
+  }
+
   std::vector<ShareArrival> take() override {
     const std::lock_guard lock(mutex_);
     return std::exchange(inbox_, {});
@@ -124,6 +139,11 @@ class DdsShareTransport : public ShareTransport {
   void wait(std::int64_t at_most) override {
     std::unique_lock lock(mutex_);
     arrived_.wait_for(lock, std::chrono::nanoseconds(at_most), [this] { return !inbox_.empty(); });
+  }
+
+  void ignore(std::uint64_t writer) override {
+    const std::lock_guard lock(names_mutex_);
+    ignored_.insert(writer);
   }
 
   std::uint64_t bytes_sent() const override { return bytes_sent_; }
@@ -185,6 +205,17 @@ class DdsShareTransport : public ShareTransport {
     }
   }
 
+  void send_beats(const std::stop_token& stop) {
+    std::unique_lock lock(beat_mutex_);
+    while (!stop.stop_requested()) {
+      const Bytes bytes = beat_;
+      lock.unlock();
+      if (bytes) send(ShareChannel::kClock, bytes);
+      lock.lock();
+      beat_changes_.wait_for(lock, stop, beat_period_, [] { return false; });
+    }
+  }
+
   static void on_data(dds_entity_t reader, void* self) {
     const End& end = *static_cast<End*>(self);
     const std::int64_t now = steady_now();
@@ -194,6 +225,7 @@ class DdsShareTransport : public ShareTransport {
       if (sample.bytes.empty() || sample.bytes.size() > kMessageMost) continue;
       const std::uint64_t writer =
           end.transport->participant_of(reader, sample.info.publication_handle);
+      if (end.transport->is_ignored(writer)) continue;
       arrivals.push_back({end.channel, std::move(sample.bytes), writer, now});
     }
     end.transport->put(std::move(arrivals));
@@ -207,6 +239,11 @@ class DdsShareTransport : public ShareTransport {
     DdsShareTransport& transport = *end.transport;
     const std::uint64_t writer = transport.participant_of(reader, status.last_publication_handle);
     transport.put({{end.channel, {}, writer, steady_now()}});
+  }
+
+  [[nodiscard]] bool is_ignored(std::uint64_t writer) {
+    const std::lock_guard lock(names_mutex_);
+    return ignored_.count(writer) != 0;
   }
 
   /// Who a writer belongs to: the same for all its topics, and by DDS, not by what it says.
@@ -241,6 +278,7 @@ class DdsShareTransport : public ShareTransport {
     arrived_.notify_all();
   }
 
+  DdsLog log_;  ///< Ends last.
   std::array<End, kShareChannels> ends_;
   dds_entity_t participant_ = 0;
   std::atomic<std::uint64_t> bytes_sent_{0};
@@ -249,7 +287,13 @@ class DdsShareTransport : public ShareTransport {
   std::vector<ShareArrival> inbox_;
   std::mutex names_mutex_;
   std::map<dds_instance_handle_t, std::uint64_t> participants_;  ///< By publication.
-  Domain domain_;  ///< Ends first: its threads use all above.
+  std::set<std::uint64_t> ignored_;                              ///< Participants.
+  std::chrono::nanoseconds beat_period_;
+  std::mutex beat_mutex_;
+  std::condition_variable_any beat_changes_;
+  Bytes beat_;
+  Domain domain_;       ///< Ends before all above, which its threads use.
+  std::jthread beats_;  ///< Ends first.
 };
 
 }  // namespace

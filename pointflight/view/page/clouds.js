@@ -78,8 +78,9 @@ ${turbo}
 void main() {
   float fade = (1.0 - 0.7 * age) * (1.0 - 0.75 * older);
   vec4 world = modelMatrix * vec4(position, 1.0);
-  // a little nearer on the same sight line: points lie on what they measured and would sink into it
-  gl_Position = projectionMatrix * vec4(0.98 * (viewMatrix * world).xyz, 1.0);
+  // a little nearer on the same sight line: points lie on what they measured and would sink into it;
+  // not by way of the world, where single precision may be coarse
+  gl_Position = projectionMatrix * vec4(0.98 * (modelViewMatrix * vec4(position, 1.0)).xyz, 1.0);
   gl_PointSize = size;
   shade = byHeight ? vec4(linear(turboOfHeight(world.z, heights)), 1.0) : vec4(tint, fade);
 }`;

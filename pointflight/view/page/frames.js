@@ -10,25 +10,31 @@ const KEPT = 2; // s of poses: clouds come a little later than what they are sta
 
 export class Frames {
   constructor() {
-    this.edges = new Map(); // child -> { parent, isTf, poses: [{ t, matrix }] }
+    this.edges = new Map(); // child -> { parent, isTf, isStatic, poses: [{ t, matrix }] }
   }
 
   // t: s, of the header's stamp. Odometry gives way to TF, which says the same more exactly.
-  set(parent, child, t, matrix, isTf) {
+  set(parent, child, t, matrix, isTf, isStatic = false) {
     parent = plainFrame(parent);
     child = plainFrame(child);
     if (!child || parent === child) return;
     const known = this.edges.get(child);
     if (known?.isTf && !isTf) return;
     const goesOn = known?.parent === parent && known.isTf === isTf && t >= known.poses.at(-1).t;
-    const edge = goesOn ? known : { parent, isTf, poses: [] };
+    const edge = goesOn ? known : { parent, isTf, isStatic, poses: [] };
     edge.poses.push({ t, matrix });
     while (edge.poses[0].t < t - KEPT) edge.poses.shift();
     this.edges.set(child, edge);
   }
 
-  has(frame) {
-    return this.edges.has(plainFrame(frame));
+  // True for a frame that nothing is known to move.
+  stays(frame) {
+    frame = plainFrame(frame);
+    for (let left = 50; left > 0 && this.edges.has(frame); --left) {
+      if (!this.edges.get(frame).isStatic) return false;
+      frame = this.edges.get(frame).parent;
+    }
+    return true;
   }
 
   rootOf(frame) {

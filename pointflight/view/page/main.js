@@ -168,6 +168,8 @@ client.want("/pointflight/run", (bytes) => {
   state.vehicles = run.vehicles.map((v, i) => new Vehicle(scene, $("tags"), v, i));
   $("title").textContent = run.vehicles.length > 1 ? `${run.vehicles.length} vehicles` : run.vehicles[0]?.name ?? "map";
   listVehicles();
+  const origin = new THREE.Vector3(...run.cloud_origin);
+  const place = new THREE.Matrix4().makeTranslation(origin);
   for (const vehicle of state.vehicles) {
     for (const lidar of vehicle.description.lidars) {
       const trail = new ScanTrail(scene, vehicle.colour.clone().lerp(new THREE.Color("#ffd23f"), 0.7), map.uniforms.heights);
@@ -177,8 +179,8 @@ client.want("/pointflight/run", (bytes) => {
       client.want(lidar.topic, (data, stamp, channel) => {
         if (!$("scans").checked) return;
         decode ??= decoderOf(channel);
-        trail.add(cloudOfMessage(decode(data)), 1e-9 * Number(stamp - BigInt(run.epoch)));
-        if (vehicle === chosen()) drawRange($("image"), trail.cloud, vehicle);
+        trail.add(cloudOfMessage(decode(data)), 1e-9 * Number(stamp - BigInt(run.epoch)), place);
+        if (vehicle === chosen()) drawRange($("image"), trail.cloud, vehicle, origin);
       }, { latest: true });
     }
   }

@@ -44,7 +44,7 @@ void main() {
   place = corner;
   float reach = 2.5 * resolution * grow;  // discs of full cells close the gaps between their corners
   vec3 local = middle + reach * (corner.x * s1 * ax1 + corner.y * s2 * ax2);
-  gl_Position = projectionMatrix * viewMatrix * modelMatrix * vec4(local, 1.0);
+  gl_Position = projectionMatrix * modelViewMatrix * vec4(local, 1.0);
   if (any(lessThan(world, clipLow)) || any(greaterThan(world, clipHigh))) gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
   vec3 sight = normalize(cameraPosition - world);
   float light = 0.55 + 0.45 * abs(dot(normal, normalize(sight + vec3(0.3, 0.2, 0.9))));

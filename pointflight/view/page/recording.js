@@ -78,7 +78,10 @@ export class Recording {
   // Takes what a topic's messages say into the scene; nothing if nobody knows how.
   drawerOf(topic) {
     const { kind } = topic;
-    if (kind === "tf2_msgs/TFMessage" || kind === "tf/tfMessage") return (m) => this.takeTransforms(m.transforms);
+    if (kind === "tf2_msgs/TFMessage" || kind === "tf/tfMessage") {
+      const isStatic = topic.channel.topic.endsWith("tf_static");
+      return (m) => this.takeTransforms(m.transforms, isStatic);
+    }
     if (kind === "nav_msgs/Odometry") return this.poseDrawer(topic, (m) => m.pose.pose, (m) => m.child_frame_id, (m) => m.twist.twist);
     if (kind === "geometry_msgs/PoseStamped") return this.poseDrawer(topic, (m) => m.pose, () => "", () => null);
     if (kind === "nav_msgs/Path") return this.pathDrawer(topic);
@@ -87,9 +90,9 @@ export class Recording {
     return null;
   }
 
-  takeTransforms(transforms) {
+  takeTransforms(transforms, isStatic) {
     for (const { header, child_frame_id, transform } of transforms) {
-      this.frames.set(header.frame_id, child_frame_id, secondsOf(header.stamp), matrixOf(transform.translation, transform.rotation), true);
+      this.frames.set(header.frame_id, child_frame_id, secondsOf(header.stamp), matrixOf(transform.translation, transform.rotation), true, isStatic);
     }
   }
 
@@ -153,7 +156,7 @@ export class Recording {
       const frame = message.header.frame_id;
       // a place rather than a scan: large, without times, in a frame that stays, and always the same one
       trail.first ??= t;
-      trail.byHeight = !cloud.hasTimes && t === trail.first && bytes > LARGE && !this.frames.has(frame);
+      trail.byHeight = !cloud.hasTimes && t === trail.first && bytes > LARGE && this.frames.stays(frame);
       if (trail.byHeight) this.heights.include(cloud.positions);
       trail.add(cloud, t, this.placeOf(topic, frame, secondsOf(message.header.stamp)));
       const vehicle = this.vehicles.find((v) => topic.channel.topic.startsWith(`/${v.description.name}/`)) ?? this.vehicles[0];
