@@ -69,7 +69,7 @@ void crop_cloud(const CropFlags& flags, CropRegion region, bool asks_ground) {
     ground->finish();
     region.ground = ground;
   }
-  CloudOutput output(flags, columns_of(*source.open({}, progress)));
+  CloudOutput output(flags, columns_of_edit(source, progress));
   points = 0;
   const std::uint64_t not_finite =
       stream_points(source, points, "cropping", progress, [&](std::vector<CloudPoint>& batch) {
@@ -131,7 +131,7 @@ void thin(const ThinFlags& flags) {
   }
   const Progress progress = interruptible_progress();
   const CloudSource source = only_cloud(flags, progress);
-  CloudColumns columns = columns_of(*source.open({}, progress));
+  CloudColumns columns = columns_of_edit(source, progress);
   if (flags.every > 0) {
     CloudOutput output(flags, columns);
     std::uint64_t points = 0;

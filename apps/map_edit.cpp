@@ -1,6 +1,7 @@
 #include "apps/map_edit.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <filesystem>
 #include <utility>
@@ -10,6 +11,7 @@
 #include "apps/terminal.hpp"
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/core/number_text.hpp"
+#include "pointflight/io/byte_cursor.hpp"
 
 namespace pointflight::apps {
 namespace {
@@ -128,9 +130,11 @@ void finish_map(const EditFlags& flags, OutputFile output, const EditedMap& edit
 CloudOutput::CloudOutput(const EditFlags& flags, const CloudColumns& columns)
     : flags_(flags), writer_(write_cloud(OutputFile(flags.output), columns)) {}
 
-void CloudOutput::write(std::span<const CloudPoint> points) {
-  writer_->write(points);
-  for (const CloudPoint& point : points) sample_.add(point.position);
+void CloudOutput::write(std::span<const CloudPoint> points, std::span<const std::byte> raw) {
+  writer_->write(points, raw);
+  for (const CloudPoint& point : points) {
+    if (point.position.allFinite()) sample_.add(point.position);
+  }
 }
 
 void CloudOutput::write(std::span<const CloudRow> rows) {
@@ -171,6 +175,18 @@ CloudColumns columns_of(const CloudReader& reader) {
   columns.intensity = reader.has_intensity();
   columns.color = reader.has_color();
   return columns;
+}
+
+CloudColumns columns_of_edit(const CloudSource& source, const Progress& progress) {
+  const auto reader = source.open({}, progress);
+  std::vector<std::string> names;
+  for (const RawColumn& column : reader->raw_columns()) names.push_back(excerpt(column.name));
+  if (!names.empty()) {
+    log(fmt::format("left out      {} of {} (map export keeps columns)",
+                    fmt::join(names, ", "),
+                    source.name()));
+  }
+  return columns_of(*reader);
 }
 
 std::uint64_t stream_points(const CloudSource& source,

@@ -61,7 +61,7 @@ class CloudOutput {
  public:
   CloudOutput(const EditFlags& flags, const CloudColumns& columns);
 
-  void write(std::span<const CloudPoint> points);
+  void write(std::span<const CloudPoint> points, std::span<const std::byte> raw = {});
   void write(std::span<const CloudRow> rows);
 
   /// Completes the file, says what became of `points_read`, and draws it if --png asks. Throws
@@ -74,8 +74,10 @@ class CloudOutput {
   picture::PointSample sample_;
 };
 
-/// Columns of what a reader gives.
+/// Columns of what a reader gives, as points.
 CloudColumns columns_of(const CloudReader& reader);
+/// The same for an edit, which writes nothing else: says what is left out.
+CloudColumns columns_of_edit(const CloudSource& source, const Progress& progress);
 
 /// Calls `visit` with the finite points of a cloud, batch by batch; it may change them. Returns how
 /// many were not finite, and adds all to `points_read`.

@@ -36,24 +36,57 @@ CloudColumns columns_of_map(const ExportFlags& flags, const SurfelMap& map) {
   return columns;
 }
 
+/// Drops what is not finite from a batch and its raw columns. Returns how many that were.
+std::uint64_t drop_not_finite(std::vector<CloudPoint>& points, std::vector<std::byte>& raw) {
+  const std::size_t size = points.empty() ? 0 : raw.size() / points.size();
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (!points[i].position.allFinite()) continue;
+    points[kept] = points[i];
+    std::copy_n(raw.data() + i * size, size, raw.data() + kept * size);
+    ++kept;
+  }
+  const std::uint64_t dropped = points.size() - kept;
+  points.resize(kept);
+  raw.resize(kept * size);
+  return dropped;
+}
+
+/// Cloud to cloud: with all columns that the format holds; an organised one stays organised.
+void export_cloud(const ExportFlags& flags, const Progress& progress) {
+  if (!flags.what.empty() || flags.density > 0.0) {
+    throw InputError(
+        fmt::format("{}: is a cloud; --what and --density are for maps", flags.inputs.front()));
+  }
+  const CloudSource source =
+      cloud_sources(flags.inputs, flags.format, scratch_of(flags), progress).front();
+  const auto reader = source.open({}, progress);
+  reader->keep_raw();
+  CloudColumns columns = columns_of(*reader);
+  columns.raw = reader->raw_columns();
+  if (flags.output.ends_with(".pcd")) columns.shape = reader->shape();
+  CloudOutput output(flags, columns);
+  std::uint64_t read = 0;
+  std::uint64_t not_finite = 0;
+  std::vector<CloudPoint> points;
+  while (reader->read(points)) {
+    read += points.size();
+    std::vector<std::byte> raw(reader->raw().begin(), reader->raw().end());
+    if (!columns.shape) not_finite += drop_not_finite(points, raw);
+    output.write(points, raw);
+    report(progress, "exporting", reader->share_read());
+  }
+  output.finish(read, not_finite, "exported");
+  if (columns.shape)
+    log(fmt::format("organised     {} x {}", columns.shape->width, columns.shape->height));
+}
+
 void export_map(const ExportFlags& flags) {
   require_writable_cloud(flags.output);
   check_outputs({flags.output, flags.png}, flags.inputs, flags.force);
   const Progress progress = interruptible_progress();
   if (!is_map(flags.inputs.front())) {
-    if (!flags.what.empty() || flags.density > 0.0) {
-      throw InputError(
-          fmt::format("{}: is a cloud; --what and --density are for maps", flags.inputs.front()));
-    }
-    const CloudSource source =
-        cloud_sources(flags.inputs, flags.format, scratch_of(flags), progress).front();
-    CloudOutput output(flags, columns_of(*source.open({}, progress)));
-    std::uint64_t points = 0;
-    const std::uint64_t not_finite =
-        stream_points(source, points, "exporting", progress, [&](std::vector<CloudPoint>& batch) {
-          output.write(std::span<const CloudPoint>(batch));
-        });
-    output.finish(points, not_finite, "exported");
+    export_cloud(flags, progress);
     return;
   }
   const auto map = open_sound_map(flags.inputs.front());

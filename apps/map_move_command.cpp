@@ -160,7 +160,7 @@ void transform_cloud(const TransformFlags& flags) {
   std::optional<FloorPlane> floor;
   if (flags.level || flags.ground_zero) floor = floor_of(flags, source, all, progress);
   complete(flags, floor, all);
-  CloudOutput output(flags, columns_of(*source.open({}, progress)));
+  CloudOutput output(flags, columns_of_edit(source, progress));
   std::uint64_t points = 0;
   const std::uint64_t not_finite =
       stream_points(source, points, "moving", progress, [&](std::vector<CloudPoint>& batch) {
@@ -244,7 +244,7 @@ void merge_clouds(const MergeFlags& flags, const std::vector<Pose>& poses) {
   // what all of them have; else some points would have made-up values
   CloudColumns columns{.intensity = true, .color = true};
   for (const CloudSource& source : sources) {
-    const CloudColumns own = columns_of(*source.open({}, progress));
+    const CloudColumns own = columns_of_edit(source, progress);
     columns.intensity = columns.intensity && own.intensity;
     columns.color = columns.color && own.color;
   }

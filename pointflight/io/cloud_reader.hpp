@@ -41,6 +41,19 @@ struct FileColumns {
   std::vector<std::string> notes;     ///< Whatever else a person should know, a line each.
 };
 
+/// A column that is passed on as it is in the file, whatever it means.
+struct RawColumn {
+  std::string name;      ///< The file's own.
+  char type = 'F';       ///< As PCD has it: 'F' floating, 'I' signed, 'U' unsigned.
+  std::size_t size = 4;  ///< Bytes of a value: 1, 2, 4, 8.
+};
+
+/// Rows and columns of an organised cloud, whose points without a return are NaN.
+struct CloudShape {
+  std::uint64_t width = 0;   ///< Points in a row.
+  std::uint64_t height = 1;  ///< Rows.
+};
+
 /// Reads a cloud front to back in batches: the whole cloud is never in memory (but for
 /// binary_compressed PCD, whose layout forces one decompressed copy).
 class CloudReader {
@@ -68,6 +81,20 @@ class CloudReader {
   /// Numbers of the channels that measured the points of the last batch; empty if the file does
   /// not say.
   [[nodiscard]] virtual std::span<const std::int32_t> rings() const { return {}; }
+
+  /// Scalar columns beside position, intensity and colour, times and rings among them; empty if the
+  /// format's reader passes none on.
+  [[nodiscard]] virtual std::vector<RawColumn> raw_columns() const { return {}; }
+
+  /// From now on `raw` is kept.
+  virtual void keep_raw() {}
+
+  /// Of the last batch, if it is kept: a row of the raw columns for each point, little-endian,
+  /// without padding.
+  [[nodiscard]] virtual std::span<const std::byte> raw() const { return {}; }
+
+  /// Of an organised cloud; nothing if it is none.
+  [[nodiscard]] virtual std::optional<CloudShape> shape() const { return std::nullopt; }
 
   /// What is read of its columns, and what is not.
   [[nodiscard]] virtual FileColumns columns() const { return {}; }

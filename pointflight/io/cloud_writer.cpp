@@ -1,6 +1,7 @@
 #include "pointflight/io/cloud_writer.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
@@ -10,6 +11,7 @@
 #include <limits>
 #include <utility>
 
+#include "pointflight/core/argument.hpp"
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/core/version.hpp"
 
@@ -27,8 +29,8 @@ void put(std::vector<std::byte>& bytes, const T& value) {
 
 /// One column of PCD and PLY.
 struct Column {
-  const char* pcd;
-  const char* ply;
+  std::string pcd;
+  std::string ply;
   char type;  ///< As in PCD: 'F', or 'U'.
   int size;
 };
@@ -53,7 +55,8 @@ class RowWriter : public CloudWriter {
  protected:
   void begin(std::span<const CloudRow> rows) override {
     for (const CloudRow& row : rows) {
-      wide_ = wide_ || !(row.point.position.cwiseAbs().maxCoeff() < kFloatIsExactEnough);
+      const Vector3d& p = row.point.position;  // NaN: a beam of an organised cloud
+      wide_ = wide_ || (p.allFinite() && p.cwiseAbs().maxCoeff() >= kFloatIsExactEnough);
     }
     file_.write(header(std::numeric_limits<std::uint64_t>::max()));
   }
@@ -86,14 +89,40 @@ class RowWriter : public CloudWriter {
       }
     }
     if (columns_.normal) put_vector(bytes, row.normal);
-    if (!columns_.ellipsoid) return;
-    put_vector(bytes, row.spread);
-    put(bytes, row.axes.w());
-    put_vector(bytes, row.axes.vec());
-    put(bytes, row.surfel);
+    if (columns_.ellipsoid) {
+      put_vector(bytes, row.spread);
+      put(bytes, row.axes.w());
+      put_vector(bytes, row.axes.vec());
+      put(bytes, row.surfel);
+    }
+    put_raw(bytes, row.raw);
   }
 
  private:
+  /// PLY knows no whole numbers of 64 bits.
+  [[nodiscard]] bool is_widened(const RawColumn& column) const {
+    return !is_pcd_ && column.size == 8 && column.type != 'F';
+  }
+
+  void put_raw(std::vector<std::byte>& bytes, std::span<const std::byte> raw) {
+    for (const RawColumn& column : columns_.raw) {
+      require_argument(raw.size() >= column.size, "CloudWriter: a row lacks raw columns");
+      const auto value = raw.first(column.size);
+      raw = raw.subspan(column.size);
+      if (!is_widened(column)) {
+        bytes.insert(bytes.end(), value.begin(), value.end());
+        continue;
+      }
+      const auto number = [&](auto whole) {
+        std::memcpy(&whole, value.data(), sizeof whole);
+        const auto wide = static_cast<double>(whole);
+        is_rounded_ = is_rounded_ || std::abs(wide) > 9007199254740992.0;
+        return wide;
+      };
+      put(bytes, column.type == 'I' ? number(std::int64_t{}) : number(std::uint64_t{}));
+    }
+  }
+
   static void put_vector(std::vector<std::byte>& bytes, const Vector3f& v) {
     for (int axis = 0; axis < 3; ++axis) put(bytes, v[axis]);
   }
@@ -116,6 +145,10 @@ class RowWriter : public CloudWriter {
       add({{"s0", "s0", 'F', 4}, {"s1", "s1", 'F', 4}, {"s2", "s2", 'F', 4}});
       add({{"qw", "qw", 'F', 4}, {"qx", "qx", 'F', 4}, {"qy", "qy", 'F', 4}, {"qz", "qz", 'F', 4}});
       add({{"surfel", "surfel", 'U', 4}});
+    }
+    for (const RawColumn& raw : columns_.raw) {
+      const char type = is_widened(raw) ? 'F' : raw.type;
+      add({{raw.name, raw.name, type, static_cast<int>(raw.size)}});
     }
     return all;
   }
@@ -144,7 +177,7 @@ class RowWriter : public CloudWriter {
     }
     return fmt::format(
         "# .PCD v0.7 - Point Cloud Data file format\n# pointflight {}{}\nVERSION 0.7\nFIELDS{}\n"
-        "SIZE{}\nTYPE{}\nCOUNT{}\nWIDTH {}\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS {}\n"
+        "SIZE{}\nTYPE{}\nCOUNT{}\nWIDTH {}\nHEIGHT {}\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS {}\n"
         "DATA binary\n",
         kVersion,
         filler,
@@ -152,16 +185,26 @@ class RowWriter : public CloudWriter {
         sizes,
         types,
         counts,
-        points,
+        columns_.shape ? std::to_string(columns_.shape->width) : points,
+        columns_.shape ? columns_.shape->height : 1,
         points);
+  }
+
+  [[nodiscard]] std::string loss() const override {
+    return is_rounded_ ? "PLY has no whole numbers of 64 bits: they are written as doubles, rounded"
+                       : "";
+  }
+
+  static std::string ply_type(const Column& column) {
+    if (column.type == 'F') return column.size == 8 ? "double" : "float";
+    const std::string whole = column.size == 4 ? "int" : column.size == 2 ? "short" : "char";
+    return column.type == 'U' ? "u" + whole : whole;
   }
 
   [[nodiscard]] std::string ply_header(const std::string& points, const std::string& filler) const {
     std::string properties;
     for (const Column& column : columns()) {
-      const char* whole = column.size == 4 ? "uint" : "uchar";
-      const char* type = column.type == 'U' ? whole : (column.size == 8 ? "double" : "float");
-      properties += fmt::format("property {} {}\n", type, column.ply);
+      properties += fmt::format("property {} {}\n", ply_type(column), column.ply);
     }
     return fmt::format(
         "ply\nformat binary_little_endian 1.0\ncomment pointflight {}{}\nelement vertex {}\n{}"
@@ -175,6 +218,7 @@ class RowWriter : public CloudWriter {
   CloudColumns columns_;
   bool is_pcd_;
   bool wide_ = false;
+  bool is_rounded_ = false;
 };
 
 /// LAS 1.2, point format 0, or 2 with colours (ASPRS LAS Specification 1.2).
@@ -198,16 +242,21 @@ class LasWriter : public CloudWriter {
   }
 
   [[nodiscard]] std::string loss() const override {
-    if (!columns_.intensity || !intensity_.fits()) {
-      return columns_.intensity
-                 ? fmt::format(
-                       "LAS holds intensities as whole numbers from 0 to 65535; these went "
-                       "from {:.4g} to {:.4g}",
-                       intensity_.min,
-                       intensity_.max)
-                 : std::string();
+    std::vector<std::string> lost;
+    if (columns_.intensity && !intensity_.fits()) {
+      lost.push_back(
+          fmt::format("LAS holds intensities as whole numbers from 0 to 65535; these "
+                      "went from {:.4g} to {:.4g}",
+                      intensity_.min,
+                      intensity_.max));
     }
-    return {};
+    if (!columns_.raw.empty()) {
+      std::vector<std::string> names;
+      for (const RawColumn& column : columns_.raw) names.push_back(column.name);
+      lost.push_back(
+          fmt::format("LAS has no place for {}; .pcd and .ply keep them", fmt::join(names, ", ")));
+    }
+    return fmt::format("{}", fmt::join(lost, "; "));
   }
 
  protected:
@@ -309,9 +358,13 @@ Kind kind_of(const std::string& path) {
 
 }  // namespace
 
-void CloudWriter::write(std::span<const CloudPoint> points) {
+void CloudWriter::write(std::span<const CloudPoint> points, std::span<const std::byte> raw) {
   rows_.resize(points.size());
-  for (std::size_t i = 0; i < points.size(); ++i) rows_[i].point = points[i];
+  const std::size_t size = points.empty() ? 0 : raw.size() / points.size();
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    rows_[i].point = points[i];
+    rows_[i].raw = raw.subspan(i * size, size);
+  }
   write(std::span<const CloudRow>(rows_));
 }
 

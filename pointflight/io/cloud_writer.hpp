@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -14,10 +15,12 @@ namespace pointflight {
 
 /// What the points of a written cloud carry beside x, y and z.
 struct CloudColumns {
-  bool intensity = false;  ///< float32; 16 bits in LAS.
-  bool color = false;      ///< Red, green, blue.
-  bool normal = false;     ///< Not in LAS.
-  bool ellipsoid = false;  ///< Deviations, axes and number of a surfel; not in LAS.
+  bool intensity = false;                ///< float32; 16 bits in LAS.
+  bool color = false;                    ///< Red, green, blue.
+  bool normal = false;                   ///< Not in LAS.
+  bool ellipsoid = false;                ///< Deviations, axes and number of a surfel; not in LAS.
+  std::vector<RawColumn> raw = {};       ///< Passed on behind all others; not in LAS.
+  std::optional<CloudShape> shape = {};  ///< Of an organised cloud; PCD alone has it.
 };
 
 /// One row of a written cloud; what its columns lack is not looked at.
@@ -26,7 +29,8 @@ struct CloudRow {
   Vector3f normal = Vector3f::Zero();                        ///< Unit length.
   Vector3f spread = Vector3f::Zero();                        ///< Standard deviations, m.
   Eigen::Quaternionf axes = Eigen::Quaternionf::Identity();  ///< World <- surfel.
-  std::uint32_t surfel = 0;  ///< Its number, as scans' truth has it.
+  std::uint32_t surfel = 0;             ///< Its number, as scans' truth has it.
+  std::span<const std::byte> raw = {};  ///< Its raw columns (`CloudReader::raw`).
 };
 
 /// Writes a cloud row by row, never held; it appears under its name with `commit`.
@@ -37,8 +41,9 @@ class CloudWriter {
  public:
   virtual ~CloudWriter() = default;
 
-  /// Appends points without normals and ellipsoids. Throws InputError.
-  void write(std::span<const CloudPoint> points);
+  /// Appends points without normals and ellipsoids, with their raw columns (`CloudReader::raw`).
+  /// Throws InputError.
+  void write(std::span<const CloudPoint> points, std::span<const std::byte> raw = {});
   /// Appends rows. Throws InputError.
   void write(std::span<const CloudRow> rows);
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <charconv>
 #include <cmath>
 #include <optional>
 
@@ -51,6 +52,7 @@ class PcdReader : public CloudReader {
     batch.clear();
     times_.clear();
     rings_.clear();
+    raw_.clear();
     const std::uint64_t count = std::min<std::uint64_t>(kBatch, header_.points - next_);
     if (header_.encoding == PcdEncoding::kAscii) {
       read_ascii(count, batch);
@@ -66,6 +68,21 @@ class PcdReader : public CloudReader {
   [[nodiscard]] std::span<const double> times() const override { return times_; }
   [[nodiscard]] double time_unit() const override { return time_unit_; }
   [[nodiscard]] std::span<const std::int32_t> rings() const override { return rings_; }
+  [[nodiscard]] std::vector<RawColumn> raw_columns() const override {
+    std::vector<RawColumn> columns;
+    for (const PcdColumn& field : raw_fields_) {
+      columns.push_back({field.name, field.type, field.size});
+    }
+    return columns;
+  }
+  void keep_raw() override { keeps_raw_ = true; }
+  [[nodiscard]] std::span<const std::byte> raw() const override { return raw_; }
+  [[nodiscard]] std::optional<CloudShape> shape() const override {
+    const auto [width, height] = std::pair(header_.width, header_.height);
+    const bool fits =
+        height > 1 && width > 0 && header_.points / height == width && header_.points % height == 0;
+    return fits ? std::optional(CloudShape{width, height}) : std::nullopt;
+  }
   [[nodiscard]] FileColumns columns() const override { return about_; }
   [[nodiscard]] std::optional<FileUnit> unit() const override { return header_.unit; }
   [[nodiscard]] double share_read() const override {
@@ -98,6 +115,18 @@ class PcdReader : public CloudReader {
     ring_ = find(ColumnRole::kRing);
     color_ = find(ColumnRole::kPackedColor);
     if (color_ && color_->size != 4) color_.reset();
+    for (const PcdColumn& field : header_.fields) {
+      const auto is_it = [&](const std::optional<PcdColumn>& other) {
+        return other && other->offset == field.offset;
+      };
+      const bool is_position = std::any_of(
+          position_.begin(), position_.end(), [&](const auto& axis) { return is_it(axis); });
+      if (field.count != 1 || field.name == "_" || is_position || is_it(intensity_) ||
+          is_it(color_)) {
+        continue;
+      }
+      raw_fields_.push_back(field);
+    }
     about_ = columns.about();
     if (!header_.viewpoint.empty()) {
       about_.notes.push_back(
@@ -154,6 +183,7 @@ class PcdReader : public CloudReader {
     if (color_) to_columns(*color_);
     if (time_) to_columns(*time_);
     if (ring_) to_columns(*ring_);
+    for (PcdColumn& field : raw_fields_) to_columns(field);
   }
 
   /// In unpacked data `offset` is where the field's column starts.
@@ -207,6 +237,11 @@ class PcdReader : public CloudReader {
       }
       if (time_) times_.push_back(seconds_of(binary_number(next_ + i, *time_)));
       if (ring_) rings_.push_back(ring_of(binary_number(next_ + i, *ring_)));
+      if (!keeps_raw_) continue;
+      for (const PcdColumn& field : raw_fields_) {
+        const std::byte* at = place_of(next_ + i, field);
+        raw_.insert(raw_.end(), at, at + field.size);
+      }
     }
     if (header_.encoding == PcdEncoding::kBinary) {
       file_.release_before(header_.data_offset + (next_ + count) * header_.point_size);
@@ -225,10 +260,12 @@ class PcdReader : public CloudReader {
       }
       if (line.empty()) continue;
       words_.clear();
+      texts_.clear();
       for (auto word = take_word(line); !word.empty(); word = take_word(line)) {
         double value = 0.0;
         if (!parse_number(word, value)) fail_line(fmt::format("'{}' is no number", excerpt(word)));
         words_.push_back(value);
+        texts_.push_back(word);
       }
       if (words_.size() != header_.columns) {
         fail_line(
@@ -242,7 +279,27 @@ class PcdReader : public CloudReader {
       if (color_) point.color = unpack_color(color_bits(words_[color_->offset]));
       if (time_) times_.push_back(seconds_of(words_[time_->offset]));
       if (ring_) rings_.push_back(ring_of(words_[ring_->offset]));
+      if (!keeps_raw_) continue;
+      for (const PcdColumn& field : raw_fields_) keep_raw_text(field);
     }
+  }
+
+  /// Whole numbers of 64 bits have more digits than a double.
+  void keep_raw_text(const PcdColumn& field) {
+    const auto keep = [&](auto value) {
+      const auto* bytes = reinterpret_cast<const std::byte*>(&value);
+      raw_.insert(raw_.end(), bytes, bytes + field.size);
+    };
+    const std::string_view text = texts_[field.offset];
+    const double number = words_[field.offset];
+    if (field.type == 'F' && field.size == 4) return keep(static_cast<float>(number));
+    if (field.type == 'F') return keep(number);
+    std::int64_t whole = 0;
+    std::uint64_t natural = 0;
+    const char* end = text.data() + text.size();
+    if (std::from_chars(text.data(), end, natural).ptr == end) return keep(natural);
+    if (std::from_chars(text.data(), end, whole).ptr == end) return keep(whole);
+    keep(std::abs(number) < 9e18 ? static_cast<std::int64_t>(number) : 0);
   }
 
   [[noreturn]] void fail_line(const std::string& what) const {
@@ -260,7 +317,11 @@ class PcdReader : public CloudReader {
   std::optional<PcdColumn> ring_;
   std::optional<LineCursor> lines_;
   std::vector<std::byte> unpacked_;
+  std::vector<PcdColumn> raw_fields_;
+  bool keeps_raw_ = false;
+  std::vector<std::byte> raw_;
   std::vector<double> words_;
+  std::vector<std::string_view> texts_;
   std::vector<double> times_;
   std::vector<std::int32_t> rings_;
   double time_unit_ = 1.0;

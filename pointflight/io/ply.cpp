@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <optional>
 
 #include "pointflight/io/byte_cursor.hpp"
@@ -27,6 +28,7 @@ class PlyReader : public CloudReader {
 
   bool read(std::vector<CloudPoint>& batch) override {
     batch.clear();
+    raw_.clear();
     const PlyElement& vertex = header_.elements[vertex_];
     const std::uint64_t count = std::min<std::uint64_t>(kBatch, vertex.count - next_);
     while (batch.size() < count) {
@@ -39,6 +41,9 @@ class PlyReader : public CloudReader {
       if (has_color()) {
         for (std::size_t c = 0; c < 3; ++c) point.color[c] = color_part(*color_[c]);
       }
+      if (keeps_raw_) {
+        for (const std::size_t column : raw_columns_) keep_raw_value(vertex, column);
+      }
       ++next_;
     }
     file_.release_before(rows_.offset());
@@ -47,6 +52,16 @@ class PlyReader : public CloudReader {
 
   [[nodiscard]] bool has_intensity() const override { return intensity_.has_value(); }
   [[nodiscard]] bool has_color() const override { return color_[0] && color_[1] && color_[2]; }
+  [[nodiscard]] std::vector<RawColumn> raw_columns() const override {
+    std::vector<RawColumn> columns;
+    for (const std::size_t column : raw_columns_) {
+      const PlyProperty& property = header_.elements[vertex_].properties[column];
+      columns.push_back({property.name, kind_of(property.type), size_of(property.type)});
+    }
+    return columns;
+  }
+  void keep_raw() override { keeps_raw_ = true; }
+  [[nodiscard]] std::span<const std::byte> raw() const override { return raw_; }
   [[nodiscard]] FileColumns columns() const override { return about_; }
   [[nodiscard]] std::optional<FileUnit> unit() const override { return header_.unit; }
   [[nodiscard]] double share_read() const override {
@@ -71,6 +86,43 @@ class PlyReader : public CloudReader {
     }
     intensity_ = columns.find(ColumnRole::kIntensity);
     about_ = columns.about();
+    std::vector<bool> is_taken(names.size(), false);
+    for (const std::size_t axis : position_) is_taken[axis] = true;
+    if (intensity_) is_taken[*intensity_] = true;
+    for (const auto& part : color_) {
+      if (part) is_taken[*part] = true;
+    }
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      if (!is_taken[i] && !names[i].empty()) raw_columns_.push_back(i);
+    }
+  }
+
+  /// As in PCD.
+  static char kind_of(PlyScalar type) {
+    switch (type) {
+      case PlyScalar::kFloat:
+      case PlyScalar::kDouble:
+        return 'F';
+      case PlyScalar::kInt8:
+      case PlyScalar::kInt16:
+      case PlyScalar::kInt32:
+        return 'I';
+      default:
+        return 'U';
+    }
+  }
+
+  /// Of the row that was read; a whole number out of its type's range, which a text may have, is 0.
+  void keep_raw_value(const PlyElement& vertex, std::size_t column) {
+    const PlyScalar type = vertex.properties[column].type;
+    const double value = values_[column];
+    const auto keep = [&](auto number) {
+      const auto* bytes = reinterpret_cast<const std::byte*>(&number);
+      raw_.insert(raw_.end(), bytes, bytes + size_of(type));
+    };
+    if (type == PlyScalar::kFloat) return keep(static_cast<float>(value));
+    if (type == PlyScalar::kDouble) return keep(value);
+    keep(std::abs(value) < 4294967296.0 ? static_cast<std::int64_t>(value) : 0);
   }
 
   /// Whole numbers fill their type, others go from 0 to 1.
@@ -90,6 +142,9 @@ class PlyReader : public CloudReader {
   std::array<std::size_t, 3> position_{};
   std::optional<std::size_t> intensity_;
   std::array<std::optional<std::size_t>, 3> color_;
+  std::vector<std::size_t> raw_columns_;
+  bool keeps_raw_ = false;
+  std::vector<std::byte> raw_;
   std::vector<double> values_;
   std::vector<double> list_;
   std::uint64_t next_ = 0;

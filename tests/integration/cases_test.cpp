@@ -71,6 +71,21 @@ TEST(Cases, TimesOfPointsInRecordings) {
   }
 }
 
+TEST(Cases, AFlightInUtmHasAFrameForItsClouds) {
+  const std::string cases = shared_data("../cases/imports");
+  SKIP_WITHOUT(cases);
+  const TemporaryFolder folder;
+  std::filesystem::copy_file(cases + "/utm_flight.yaml", folder / "utm_flight.yaml");
+  ASSERT_EQ(
+      run(fmt::format("map import {}/utm_f64.pcd -o {}", cases, folder / "utm_f64.pfmap")).code, 0);
+  const Result flown = run(fmt::format("fly {} -o {} --record {} --duration 0.3 --no-picture",
+                                       folder / "utm_flight.yaml",
+                                       folder / "run",
+                                       folder / "run.mcap"));
+  EXPECT_EQ(flown.code, 0) << flown.err;
+  expect_contains(flown.err, "clouds in the world are in frame map, whose zero is at 836400,4818");
+}
+
 TEST(Cases, StartsAndKeysAndKinds) {
   const std::string cases = shared_data("../cases/imports");
   SKIP_WITHOUT(cases);

@@ -60,6 +60,69 @@ TEST(CloudWriter, WhatIsWrittenReadsBackInEveryFormat) {
   }
 }
 
+/// All of a cloud with its raw columns, written as another.
+void pass_on(const std::string& from, const std::string& to) {
+  const auto reader = open_cloud(from);
+  reader->keep_raw();
+  CloudColumns columns{.intensity = reader->has_intensity()};
+  columns.raw = reader->raw_columns();
+  columns.shape = reader->shape();
+  const auto writer = write_cloud(OutputFile(to), columns);
+  std::vector<CloudPoint> points;
+  while (reader->read(points)) writer->write(points, reader->raw());
+  writer->commit();
+}
+
+TEST(CloudWriter, ColumnsOfScansPassThroughAsTheyAre) {
+  const TemporaryFolder folder;
+  // whole numbers of 64 bits, signed bytes, a field of three, padding
+  write_file(folder / "a.pcd",
+             "VERSION 0.7\nFIELDS x y z t intensity ring tilt _ hist stamp\n"
+             "SIZE 4 4 4 8 4 2 1 1 4 8\nTYPE F F F U F U I U F F\nCOUNT 1 1 1 1 1 1 1 1 3 1\n"
+             "WIDTH 2\nHEIGHT 2\nPOINTS 4\nDATA ascii\n"
+             "1 2 3 1700000000123456789 10 4 -3 0 1 2 3 0.125\n"
+             "nan nan nan 18446744073709551615 0 65535 127 0 1 2 3 -1e300\n"
+             "4 5 6 0 11 5 -128 0 1 2 3 2.5\n7 8 9 1 12 6 0 0 1 2 3 0\n");
+  pass_on(folder / "a.pcd", folder / "b.pcd");
+  const std::string binary = read_file(folder / "b.pcd");
+  expect_contains(binary, "FIELDS x y z intensity t ring tilt stamp\nSIZE 4 4 4 4 8 2 1 8\n");
+  expect_contains(binary, "TYPE F F F F U U I F\n");
+  expect_contains(binary, "WIDTH 2\nHEIGHT 2\n");
+  const auto reader = open_cloud(folder / "b.pcd");
+  reader->keep_raw();
+  std::vector<CloudPoint> points;
+  ASSERT_TRUE(reader->read(points));
+  ASSERT_EQ(points.size(), 4u);
+  EXPECT_TRUE(std::isnan(points[1].position.x()));
+  EXPECT_EQ(points[2].position, Vector3d(4, 5, 6));
+  ASSERT_EQ(reader->raw().size(), 4u * 19u);
+  std::uint64_t t = 0;
+  std::memcpy(&t, reader->raw().data(), 8);
+  EXPECT_EQ(t, 1'700'000'000'123'456'789u);
+  std::memcpy(&t, reader->raw().data() + 19, 8);
+  EXPECT_EQ(t, 18'446'744'073'709'551'615u);
+  // once more: the same bytes
+  pass_on(folder / "b.pcd", folder / "c.pcd");
+  EXPECT_EQ(read_file(folder / "c.pcd"), binary);
+  // PLY and back; what has no place there is said
+  const auto scan = open_cloud(folder / "b.pcd");
+  scan->keep_raw();
+  const auto writer =
+      write_cloud(OutputFile(folder / "d.ply"), {.intensity = true, .raw = scan->raw_columns()});
+  while (scan->read(points)) writer->write(points, scan->raw());
+  writer->commit();
+  expect_contains(writer->loss(), "no whole numbers of 64 bits");
+  expect_contains(read_file(folder / "d.ply"),
+                  "property double t\nproperty ushort ring\nproperty char tilt\n"
+                  "property double stamp\nend_header");
+  pass_on(folder / "d.ply", folder / "e.ply");
+  EXPECT_EQ(read_file(folder / "e.ply"), read_file(folder / "d.ply"));
+  pass_on(folder / "d.ply", folder / "e.pcd");
+  expect_contains(read_file(folder / "e.pcd"), "TYPE F F F F F U I F\n");
+  const auto las = write_cloud(OutputFile(folder / "f.las"), {.raw = {{"ring", 'U', 2}}});
+  expect_contains(las->loss(), "LAS has no place for ring");
+}
+
 TEST(CloudWriter, PlacesFarFromZeroKeepTheirMillimetres) {
   const TemporaryFolder folder;
   const CloudPoint far{{500000.1234, 5400000.4567, 300.7891}, 0.0f};

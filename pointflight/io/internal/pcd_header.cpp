@@ -170,6 +170,8 @@ class PcdHeaderParser {
       }
       header_.points = width_ * height_;
     }
+    header_.width = width_;
+    header_.height = height_;
     header_.data_offset = lines_.offset();
     header_.data_line = lines_.number();
   }

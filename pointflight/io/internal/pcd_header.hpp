@@ -26,6 +26,7 @@ struct PcdHeader {
   std::vector<PcdColumn> fields;
   std::uint64_t points = 0;
   bool has_points = false;
+  std::uint64_t width = 0, height = 1;  ///< As the file has them.
   PcdEncoding encoding = PcdEncoding::kAscii;
   std::size_t point_size = 0;
   std::size_t columns = 0;
