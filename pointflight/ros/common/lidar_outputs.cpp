@@ -1,4 +1,9 @@
 // Messages about each scan of a LiDAR: clouds, pictures, the sensor's poses.
+#include <fmt/format.h>
+
+#include <optional>
+
+#include "pointflight/core/input_error.hpp"
 #include "pointflight/ros/common/output_rows.hpp"
 #include "pointflight/ros/common/point_layout.hpp"
 #include "pointflight/ros/common/scan_messages.hpp"
@@ -14,10 +19,21 @@ float plain_intensity(const OutputStream& stream) {
   return stream.ros.run.map->has_intensity() ? 0.0f : kPlainIntensity;
 }
 
+/// The cells of a stream's clouds; nothing if they are not organised.
+std::optional<CloudGrid> grid_of(const OutputStream& stream) {
+  const RosOutput& s = stream.settings;
+  if (!s.organized) return std::nullopt;
+  if (s.layout != kLivoxCustom) return CloudGrid(stream.of_lidar().settings);
+  throw InputError(
+      fmt::format("{}: {}: Livox' own message has no rows; give organized: true another layout",
+                  stream.ros.profile.path,
+                  s.topic));
+}
+
 /// In the sensor's frame, in one of the layouts or Livox' own message.
 class Cloud : public Output {
  public:
-  using Output::Output;
+  explicit Cloud(OutputStream& stream) : Output(stream), grid_(grid_of(stream)) {}
   void on_sample(const Sample& sample) override {
     const auto* scanned = std::get_if<ScanSample>(&sample);
     if (scanned == nullptr || !stream_.is_about(*scanned)) return;
@@ -29,20 +45,39 @@ class Cloud : public Output {
     if (s.layout == kLivoxCustom) {
       stream_.send(custom_cloud_of(scan, s.frame, epoch, plain), scan.end);
     } else {
-      stream_.send(cloud_of(scan, point_layout(s.layout), s.frame, epoch, {}, plain), scan.end);
+      const CloudGrid* grid = grid_ ? &*grid_ : nullptr;
+      stream_.send(cloud_of(scan, point_layout(s.layout), s.frame, epoch, {}, plain, grid),
+                   scan.end);
     }
   }
+
+ private:
+  std::optional<CloudGrid> grid_;
 };
 
-msg::PointCloud2 world_cloud(const OutputStream& stream, const ScanSample& sample) {
-  const auto points = world_points(*sample.scan, sample.T_world_sensor, stream.frame_origin());
-  return cloud_of(*sample.scan,
-                  point_layout(stream.settings.layout),
-                  stream.settings.frame,
-                  stream.ros.epoch,
-                  points,
-                  plain_intensity(stream));
-}
+/// The same in the world.
+class WorldCloud : public Output {
+ public:
+  explicit WorldCloud(OutputStream& stream) : Output(stream), grid_(grid_of(stream)) {}
+  void on_sample(const Sample& sample) override {
+    const auto* scanned = std::get_if<ScanSample>(&sample);
+    if (scanned == nullptr || !stream_.is_about(*scanned)) return;
+    const Scan& scan = *scanned->scan;
+    if (!stream_.is_due(scan.end)) return;
+    const auto points = world_points(scan, scanned->T_world_sensor, stream_.frame_origin());
+    stream_.send(cloud_of(scan,
+                          point_layout(stream_.settings.layout),
+                          stream_.settings.frame,
+                          stream_.ros.epoch,
+                          points,
+                          plain_intensity(stream_),
+                          grid_ ? &*grid_ : nullptr),
+                 scan.end);
+  }
+
+ private:
+  std::optional<CloudGrid> grid_;
+};
 
 msg::Image depth_image(const OutputStream& stream, const ScanSample& sample) {
   msg::Image image = depth_image_of(*sample.scan, stream.of_lidar().settings);
@@ -111,7 +146,7 @@ std::vector<OutputType> lidar_outputs() {
        .layout = "xyzit"},
       {.name = "cloud_world",
        .help = "a scan in the world",
-       .make = per_sample<world_cloud>(),
+       .make = made_by<WorldCloud, msg::PointCloud2>(),
        .per = kLidar,
        .frame = Frame::kMap,
        .large = true,

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <limits>
 
 #include "pointflight/core/input_error.hpp"
 
@@ -200,6 +201,38 @@ void write_point(std::uint8_t* at, const PointLayout& layout, const Values& valu
   }
 }
 
+Values values_at(SimTime fired, SimTime stamp, Duration epoch) {
+  Values values;
+  values.after = fired - stamp;
+  values.absolute = (fired.time_since_epoch() + epoch).count();
+  return values;
+}
+
+/// An organised cloud in which nothing has come back.
+msg::PointCloud2 blank_grid(const Scan& scan,
+                            const PointLayout& layout,
+                            const CloudGrid& grid,
+                            SimTime stamp,
+                            Duration epoch) {
+  const std::size_t columns = grid.cells_of(scan).columns;
+  msg::PointCloud2 cloud = empty_cloud(layout, grid.rows() * columns);
+  cloud.height = static_cast<std::uint32_t>(grid.rows());
+  cloud.width = static_cast<std::uint32_t>(columns);
+  cloud.row_step = layout.step * cloud.width;
+  cloud.is_dense = false;
+  for (std::size_t column = 0; column < columns; ++column) {
+    const auto share = static_cast<double>(column) / static_cast<double>(columns);
+    const SimTime fired = scan.start + from_seconds(share * to_seconds(scan.end - scan.start));
+    Values values = values_at(fired, stamp, epoch);
+    values.position.setConstant(std::numeric_limits<float>::quiet_NaN());
+    for (std::size_t row = 0; row < grid.rows(); ++row) {
+      values.ring = grid.ring_of(row);
+      write_point(cloud.data.data() + (row * columns + column) * layout.step, layout, values);
+    }
+  }
+  return cloud;
+}
+
 std::uint8_t as_byte(float value) {
   return static_cast<std::uint8_t>(std::clamp(std::nearbyint(value), 0.0f, 255.0f));
 }
@@ -236,24 +269,29 @@ msg::PointCloud2 cloud_of(const Scan& scan,
                           const std::string& frame,
                           Duration epoch,
                           std::span<const Vector3f> positions,
-                          float plain) {
-  msg::PointCloud2 cloud = empty_cloud(layout, scan.points.size());
-  const SimTime time = cloud_time(scan, layout.timed);
+                          float plain,
+                          const CloudGrid* grid) {
+  // of an organised one: cells without a return have times too
+  const SimTime time =
+      grid != nullptr && layout.timed ? scan.start : cloud_time(scan, layout.timed);
+  msg::PointCloud2 cloud = grid == nullptr ? empty_cloud(layout, scan.points.size())
+                                           : blank_grid(scan, layout, *grid, time, epoch);
+  const CloudGrid::Cells cells = grid == nullptr ? CloudGrid::Cells{} : grid->cells_of(scan);
   cloud.header.stamp = stamp_of(time, epoch);
   cloud.header.frame_id = frame;
   for (std::size_t i = 0; i < scan.points.size(); ++i) {
     const ScanPoint& point = scan.points[i];
-    Values values;
+    if (grid != nullptr && point.echo > 0) continue;
+    const std::size_t cell =
+        grid == nullptr ? i : grid->row_of(point) * cloud.width + grid->column_of(point, cells);
+    Values values = values_at(scan.start + point.time_offset, time, epoch);
     values.position = positions.empty() ? point.position_sensor : positions[i];
     values.intensity = point.intensity == 0.0f ? plain : point.intensity;
     values.ring = point.ring;
     values.range = point.range;
     values.is_unknown = point.is_unknown;
     values.echo = point.echo;
-    const SimTime fired = scan.start + point.time_offset;
-    values.after = fired - time;
-    values.absolute = (fired.time_since_epoch() + epoch).count();
-    write_point(cloud.data.data() + i * layout.step, layout, values);
+    write_point(cloud.data.data() + cell * layout.step, layout, values);
   }
   return cloud;
 }

@@ -8,6 +8,7 @@
 
 #include "pointflight/core/time.hpp"
 #include "pointflight/lidar/scan.hpp"
+#include "pointflight/ros/common/cloud_grid.hpp"
 #include "pointflight/ros/common/messages.hpp"
 
 namespace pointflight {
@@ -71,13 +72,16 @@ inline constexpr float kPlainIntensity = 45.0f;
 
 /// The scan as a cloud: height 1, no NaN, in firing order. Stamps count from `epoch`. Positions are
 /// the sensor's at each point's own time, unless `positions` (one for each point) gives others.
-/// `plain` is the intensity of returns that have none.
+/// `plain` is the intensity of returns that have none. With a `grid` it is organised instead: the
+/// first return of each beam in its cell; cells without one are NaN at about the time of their
+/// firing.
 msg::PointCloud2 cloud_of(const Scan& scan,
                           const PointLayout& layout,
                           const std::string& frame,
                           Duration epoch,
                           std::span<const Vector3f> positions = {},
-                          float plain = 0.0f);
+                          float plain = 0.0f,
+                          const CloudGrid* grid = nullptr);
 
 /// The same as Livox' CustomMsg: tag 0x10, line = ring.
 msg::CustomMsg custom_cloud_of(const Scan& scan,

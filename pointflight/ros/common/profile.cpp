@@ -216,6 +216,7 @@ RosProfile profile_for(const Scenario& scenario, const std::string& name) {
         take(own.child_frame, base.child_frame);
         take(own.layout, base.layout);
         if (own.rate < 0.0) own.rate = base.rate;
+        own.organized = own.organized || base.organized;
         if (own.resolution <= 0.0) own.resolution = base.resolution;
       });
   profile.inputs = merged(profile.inputs, ros.inputs, [&](RosInput& own, const RosInput& base) {

@@ -1,6 +1,7 @@
 #include "pointflight/ros/common/ros_setup.hpp"
 
 #include "pointflight/ros/common/output.hpp"
+#include "pointflight/ros/common/point_layout.hpp"
 
 namespace pointflight {
 namespace {
@@ -57,6 +58,12 @@ void describe(SettingsVisitor& v, RosOutput& s) {
   const bool has_points = type == nullptr || type->make.type().name == "PointCloud2";
   v.only_if(has_points, "a kind of cloud, or map", [&](SettingsVisitor& w) {
     w.value({"layout", "", "livox, livox_custom, velodyne, ouster, xyzi, ..."}, s.layout);
+  });
+  const bool is_of_lidar = type == nullptr || (has_points && type->per == OutputType::Per::kLidar);
+  v.only_if(is_of_lidar && s.layout != kLivoxCustom, "kind: cloud, cloud_world", [&](auto& w) {
+    w.value(
+        {"organized", "", "a row for each ring, a column for each firing, NaN without a return"},
+        s.organized);
   });
   v.only_if(s.kind == "map", "kind: map", [&](SettingsVisitor& w) {
     w.value({"resolution", "m", "0: the map's own", 0, 100}, s.resolution);

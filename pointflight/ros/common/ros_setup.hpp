@@ -17,6 +17,7 @@ struct RosOutput {
   double rate = -1.0;       ///< Hz at most; 0: each sample; -1: as the profile has it, or each.
   std::string layout;       ///< Of clouds.
   double resolution = 0.0;  ///< Of the map's cloud, m; 0: the map's own.
+  bool organized = false;   ///< Of a LiDAR's clouds: rows and columns, NaN without a return.
 };
 
 /// Of rotor speeds: rad/s or rpm.
