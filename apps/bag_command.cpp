@@ -11,6 +11,7 @@
 #include "apps/terminal.hpp"
 #include "pointflight/core/mapped_file.hpp"
 #include "pointflight/recording/mcap_reader.hpp"
+#include "pointflight/recording/sqlite_reader.hpp"
 
 namespace pointflight::apps {
 namespace {
@@ -38,11 +39,14 @@ nlohmann::ordered_json json_of(const std::string& path, const RecordingInfo& inf
 }
 
 void show(const std::string& path, bool as_json) {
-  require_kind(path, {InputKind::kRecording}, "a recording (.mcap, .bag)");
+  require_kind(
+      path, {InputKind::kRecording, InputKind::kSqlite}, "a recording (.mcap, .bag, .db3)");
   require_regular_file(path);
   const bool is_bag = path.ends_with(".bag") || path.ends_with(".bag.active");
-  const RecordingInfo info =
-      is_bag ? ros1_module().read_bag(path) : read_mcap(path, terminal_progress());
+  const bool is_sqlite = kind_of_input(path) == InputKind::kSqlite || path.ends_with(".db3");
+  const RecordingInfo info = is_bag      ? ros1_module().read_bag(path)
+                             : is_sqlite ? read_sqlite(path, terminal_progress())
+                                         : read_mcap(path, terminal_progress());
   const double seconds = 1e-9 * static_cast<double>(info.end - info.start);
   if (as_json) {
     print_json(json_of(path, info, seconds));
@@ -85,7 +89,7 @@ void add_bag_command(CLI::App& parent, int& /*exit_code*/) {
   app->require_subcommand(1);
   auto* info = app->add_subcommand("info", "What is in a recording");
   auto path = std::make_shared<std::string>();
-  info->add_option("file", *path, "A .mcap or .bag, or a .mcap.active that was cut short")
+  info->add_option("file", *path, "A .mcap, .bag or .db3, or a .mcap.active that was cut short")
       ->required();
   auto as_json = std::make_shared<bool>(false);
   info->add_flag("--json", *as_json, "JSON on stdout");

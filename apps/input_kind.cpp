@@ -69,7 +69,11 @@ std::string about(const std::string& path, InputKind kind) {
           name,
           map);
     case InputKind::kSqlite:
-      return "a recording in SQLite, which is not read; convert it to MCAP: ros2 bag convert";
+      return fmt::format(
+          "a recording in SQLite: pointflight map import --scans {0} -o {1}, pointflight bag info "
+          "{0}; for all else convert it to MCAP: ros2 bag convert",
+          name,
+          map);
     case InputKind::kRecordingFolder:
       return fmt::format(
           "a folder of a recording: pointflight map import --scans {0} -o {1}, "

@@ -19,6 +19,7 @@
 #include "pointflight/lidar/lidar_settings.hpp"
 #include "pointflight/recording/mcap_reader.hpp"
 #include "pointflight/recording/recorded_survey.hpp"
+#include "pointflight/recording/sqlite_reader.hpp"
 #include "pointflight/survey/survey_signal.hpp"
 
 namespace pointflight::apps {
@@ -30,11 +31,8 @@ std::vector<std::string> recordings_in(const std::string& folder) {
   std::error_code error;
   for (fs::directory_iterator at(folder, error); !error && at != fs::directory_iterator();
        at.increment(error)) {
-    if (at->path().extension() == ".mcap") paths.push_back(at->path().string());
-    if (at->path().extension() == ".db3") {
-      throw InputError(fmt::format(
-          "{}: is stored by SQLite, which is not read; convert it: ros2 bag convert", folder));
-    }
+    const auto extension = at->path().extension();
+    if (extension == ".mcap" || extension == ".db3") paths.push_back(at->path().string());
   }
   std::sort(paths.begin(), paths.end());
   return paths;
@@ -53,9 +51,18 @@ std::optional<RecordingOpener> recording_of(const std::string& path) {
       return ros1_module().bag_messages(path, topics);
     };
   }
-  if (!paths.front().ends_with(".mcap")) {
-    throw InputError(
-        fmt::format("{}: is no folder of clouds and no recording (.bag, .mcap)", path));
+  const auto all_are = [&](const char* extension) {
+    return std::all_of(
+        paths.begin(), paths.end(), [&](const std::string& p) { return p.ends_with(extension); });
+  };
+  if (all_are(".db3")) {
+    return [paths](const std::vector<std::string>& topics) {
+      return open_sqlite(paths, topics, terminal_progress());
+    };
+  }
+  if (!all_are(".mcap")) {
+    throw InputError(fmt::format(
+        "{}: is no folder of clouds and no recording (.mcap, .bag, .db3) of one kind", path));
   }
   return [paths](const std::vector<std::string>&) { return open_mcap(paths, terminal_progress()); };
 }
@@ -78,8 +85,8 @@ std::unique_ptr<SurveySource> open_survey(const ScansFlags& flags, const Progres
   std::optional<Pose> T_pose_sensor;
   if (!flags.sensor_pose.empty()) T_pose_sensor = parse_pose(flags.sensor_pose, "--sensor-pose");
   require_kind(files.scans,
-               {InputKind::kRecording, InputKind::kRecordingFolder},
-               "a folder of clouds or a recording (.mcap, .bag)");
+               {InputKind::kRecording, InputKind::kSqlite, InputKind::kRecordingFolder},
+               "a folder of clouds or a recording (.mcap, .bag, .db3)");
   const auto recording = recording_of(files.scans);
   if (!recording) {
     if (files.poses.empty()) throw InputError("--scans: a folder of clouds wants --poses");

@@ -90,7 +90,8 @@ std::optional<std::string> recording_in(const std::string& folder) {
   const bool is_recording = kind_of_input(folder) == InputKind::kRecordingFolder ||
                             fs::exists(fs::path(folder) / "metadata.yaml", ignored);
   if (!is_recording) return std::nullopt;
-  const std::vector<std::string> found = recordings_in(folder);
+  std::vector<std::string> found = recordings_in(folder);
+  std::erase_if(found, [](const std::string& path) { return !path.ends_with(".mcap"); });
   if (found.empty()) {
     throw InputError(fmt::format(
         "{}: is a recording without an .mcap file; ros2 bag convert makes one", folder));

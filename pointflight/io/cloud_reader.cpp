@@ -41,6 +41,7 @@ constexpr Format kFormats[] = {
     {".las", open_las},
     {".bin", open_kitti_bin},
     {".npy", open_npy},
+    {".npz", open_npz},
     {".obj", open_obj_points, obj_has_faces},
     {".stl", nullptr},
     {".off", nullptr},
@@ -106,6 +107,7 @@ std::string format_by_content(const MappedFile& file) {
   }
   if (begins_with("LASF")) return ".las";
   if (begins_with("\x93NUMPY")) return ".npy";
+  if (begins_with("PK\x03\x04")) return ".npz";
   if (begins_with("ply\n") || begins_with("ply\r")) return ".ply";
   for (const char* word : {"# .PCD", "VERSION", "FIELDS", "COLUMNS"}) {
     if (begins_with(word)) return ".pcd";

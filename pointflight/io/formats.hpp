@@ -45,6 +45,10 @@ std::unique_ptr<CloudReader> open_kitti_bin(MappedFile file);
 /// width, numbers), structured arrays with fields x, y, z.
 std::unique_ptr<CloudReader> open_npy(MappedFile file);
 
+/// NumPy's .npz: the first of its arrays that `open_npy` takes, those called points or alike before
+/// others.
+std::unique_ptr<CloudReader> open_npz(MappedFile file);
+
 /// ASPRS LAS 1.0 to 1.4, uncompressed, point formats 0 to 10.
 std::unique_ptr<CloudReader> open_las(MappedFile file);
 

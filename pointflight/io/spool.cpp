@@ -31,7 +31,7 @@ void write_all(int file, const std::byte* bytes, std::size_t size, const std::st
 
 }  // namespace
 
-std::shared_ptr<const int> spool(int descriptor,
+std::shared_ptr<const int> spool(const BlockReader& read,
                                  const std::string& name,
                                  const std::string& folder,
                                  const Progress& progress) {
@@ -42,18 +42,30 @@ std::shared_ptr<const int> spool(int descriptor,
   std::vector<std::byte> buffer(1 << 20);
   for (;;) {
     report(progress, "reading " + name, 0.0);
+    const auto size = read(buffer);
+    if (!size) continue;
+    if (*size == 0) return file;
+    write_all(*file, buffer.data(), *size, name);
+  }
+}
+
+std::shared_ptr<const int> spool(int descriptor,
+                                 const std::string& name,
+                                 const std::string& folder,
+                                 const Progress& progress) {
+  const auto read = [&](std::span<std::byte> block) -> std::optional<std::size_t> {
     // with a limit, so that a signal is noticed while nothing comes
     constexpr int kPollMilliseconds = 100;
     struct pollfd ready {
       descriptor, POLLIN, 0
     };
-    if (::poll(&ready, 1, kPollMilliseconds) <= 0) continue;
-    const ssize_t size = ::read(descriptor, buffer.data(), buffer.size());
-    if (size < 0 && (errno == EINTR || errno == EAGAIN)) continue;
+    if (::poll(&ready, 1, kPollMilliseconds) <= 0) return std::nullopt;
+    const ssize_t size = ::read(descriptor, block.data(), block.size());
+    if (size < 0 && (errno == EINTR || errno == EAGAIN)) return std::nullopt;
     if (size < 0) fail(name, "cannot be read", errno);
-    if (size == 0) return file;
-    write_all(*file, buffer.data(), static_cast<std::size_t>(size), name);
-  }
+    return static_cast<std::size_t>(size);
+  };
+  return spool(read, name, folder, progress);
 }
 
 }  // namespace pointflight

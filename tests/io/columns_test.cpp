@@ -1,6 +1,7 @@
 // What columns of files mean, by their names and by what stands in them.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <zip.h>
 
 #include <cstring>
 
@@ -239,6 +240,49 @@ TEST(Npy, BadFilesSayWhat) {
                   "no fields x, y and z; it has: a");
   write_file(folder / "b.npy", "PK and so on");
   expect_contains(error_of([&] { read_all(folder / "b.npy"); }), "does not begin as NumPy's");
+}
+
+/// Arrays by their names.
+void write_npz(const std::string& path, const std::map<std::string, std::string>& arrays) {
+  int error = 0;
+  zip_t* archive = zip_open(path.c_str(), ZIP_CREATE | ZIP_TRUNCATE, &error);
+  ASSERT_NE(archive, nullptr);
+  for (const auto& [name, bytes] : arrays) {
+    zip_source_t* source = zip_source_buffer(archive, bytes.data(), bytes.size(), 0);
+    ASSERT_GE(zip_file_add(archive, name.c_str(), source, 0), 0);
+  }
+  ASSERT_EQ(zip_close(archive), 0);
+}
+
+TEST(Npz, TheArrayOfPointsIsTaken) {
+  const TemporaryFolder folder;
+  const std::string points =
+      npy("{'descr': '<f4', 'fortran_order': False, 'shape': (3, 4), }",
+          bytes_of<float>({1.5, -2.25, 3, 10, 0, 0.5, -0.125, 20, -7, 8, 9.5, 30}));
+  const std::string labels =
+      npy("{'descr': '<i4', 'fortran_order': False, 'shape': (1,), }", std::string("\1\0\0\0", 4));
+  const std::string others = npy("{'descr': '<f4', 'fortran_order': False, 'shape': (1, 3), }",
+                                 bytes_of<float>({1, 2, 3}));
+  write_npz(folder / "a.npz",
+            {{"colors.npy", others}, {"labels.npy", labels}, {"points.npy", points}});
+  expect_points(read_all(folder / "a.npz"), true);
+  const FileColumns columns = open_cloud(folder / "a.npz")->columns();
+  ASSERT_EQ(columns.notes.size(), 1u);
+  EXPECT_EQ(columns.notes[0], "its array points.npy is taken; left out: colors.npy, labels.npy");
+  write_npz(folder / "b.npz", {{"arr_0.npy", labels}, {"arr_1.npy", points}});
+  expect_points(read_all(folder / "b.npz"), true);
+  write_npz(folder / "c.npz", {{"arr_0.npy", labels}});
+  expect_contains(error_of([&] { read_all(folder / "c.npz"); }), "c.npz: arr_0.npy: its shape");
+  write_npz(folder / "d.npz", {{"readme.txt", "x"}});
+  expect_contains(error_of([&] { read_all(folder / "d.npz"); }), "has no array (.npy) in it");
+  write_file(folder / "e.npz", "no archive");
+  expect_contains(error_of([&] { read_all(folder / "e.npz"); }), "is no zip archive of arrays");
+  write_npz(folder / "f.npz", {{"points.npy", points}});
+  std::string cut = testing::read_file(folder / "f.npz");
+  cut[60] = static_cast<char>(cut[60] ^ '\x55');
+  write_file(folder / "f.npz", cut);
+  expect_contains(error_of([&] { read_all(folder / "f.npz"); }),
+                  "f.npz: points.npy: does not unpack");
 }
 
 TEST(Ptx, ScansStandWhereTheirMatrixSays) {

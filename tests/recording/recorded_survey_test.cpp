@@ -11,10 +11,12 @@
 #include "pointflight/geometry/rotation.hpp"
 #include "pointflight/recording/mcap_reader.hpp"
 #include "pointflight/recording/mcap_writer.hpp"
+#include "pointflight/recording/sqlite_reader.hpp"
 #include "pointflight/ros/common/cloud_points.hpp"
 #include "pointflight/ros/common/conversion.hpp"
 #include "pointflight/ros/common/description.hpp"
 #include "pointflight/ros/common/point_layout.hpp"
+#include "tests/recording/database.hpp"
 #include "tests/support.hpp"
 
 namespace pointflight {
@@ -130,6 +132,38 @@ void expect_places(const std::vector<SurveyRay>& rays, double tolerance, bool de
     EXPECT_EQ(rays[i].intensity, 10.0f + static_cast<float>(place));
     EXPECT_TRUE(rays[i].is_return);
   }
+}
+
+TEST(RecordedSurvey, OfSqliteIsTheSameAsOfMcap) {
+  const TemporaryFolder folder;
+  Recorder recorder(folder / "a.mcap");
+  add_mount(recorder);
+  add_odometry(recorder);
+  for (int i = 0; i < kScans; ++i) {
+    recorder.add("/points", cloud_of(scan_from(i), point_layout("livox"), "lidar", kEpoch));
+  }
+  recorder.close();
+  {
+    testing::Database file(folder / "a.db3");
+    file.make_tables();
+    std::map<std::string, int> topics;
+    const auto messages = open_mcap({folder / "a.mcap"});
+    for (Recorded m; messages->next(m);) {
+      const int number = static_cast<int>(topics.size()) + 1;
+      const auto [at, is_new] = topics.try_emplace(std::string(m.topic), number);
+      if (is_new) file.add_topic(number, std::string(m.topic), std::string(m.type));
+      std::string hex;
+      for (std::size_t i = 0; i < m.size; ++i) {
+        hex += fmt::format("{:02x}", static_cast<unsigned>(m.data[i]));
+      }
+      file.add_message(at->second, m.time, hex);
+    }
+  }
+  RecordedSurveyOptions options;
+  options.name = folder / "a.db3";
+  const RecordedSurvey survey(
+      [&](const auto& topics) { return open_sqlite({folder / "a.db3"}, topics); }, options);
+  expect_places(rays_of(survey), 1e-4);
 }
 
 TEST(RecordedSurvey, CloudsOfAllDriversWithTimesLieWhereTheyWere) {
