@@ -58,11 +58,13 @@ int jobs_of(const CampaignFlags& flags) {
 /// Sets `stop` once a signal came, as long as it lives.
 class StopWatch {
  public:
-  StopWatch() {
+  /// `has_limit`: flights end by themselves after a time.
+  explicit StopWatch(bool has_limit) : says_waiting_(!has_limit) {
     catch_interrupts();
     thread_ = std::thread([this] {
       while (!over_) {
         if (interrupted()) stop_ = true;
+        say_waiting();
         std::this_thread::sleep_for(std::chrono::milliseconds(50));
       }
     });
@@ -74,8 +76,23 @@ class StopWatch {
   StopWatch(const StopWatch&) = delete;
   StopWatch& operator=(const StopWatch&) = delete;
   [[nodiscard]] const std::atomic<bool>& stop() const { return stop_; }
+  /// A flight has ended.
+  void note_flight() { flown_ = Clock::now(); }
 
  private:
+  using Clock = std::chrono::steady_clock;
+  /// A program that waits for something, a lock say, would do so unseen.
+  void say_waiting() {
+    constexpr auto kLong = std::chrono::minutes(2);
+    if (!says_waiting_ || Clock::now() - flown_.load() < kLong) return;
+    says_waiting_ = false;
+    log("no flight has ended for two minutes; `limits: {time: SECONDS}` in the study ends those "
+        "that "
+        "never do (said once)");
+  }
+
+  std::atomic<Clock::time_point> flown_ = Clock::now();
+  bool says_waiting_;
   std::atomic<bool> stop_ = false;
   std::atomic<bool> over_ = false;
   std::thread thread_;
@@ -83,7 +100,8 @@ class StopWatch {
 
 /// Says how far it is: so many of `all` are done already. With `others` flying them too the folder
 /// is asked, now and then.
-FlightDone teller(const Campaign& campaign, std::size_t done, std::size_t all, bool others) {
+FlightDone teller(
+    const Campaign& campaign, std::size_t done, std::size_t all, bool others, StopWatch* watch) {
   using Clock = std::chrono::steady_clock;
   struct Count {
     std::size_t done = 0, failed = 0;
@@ -92,8 +110,9 @@ FlightDone teller(const Campaign& campaign, std::size_t done, std::size_t all, b
   };
   auto count = std::make_shared<Count>();
   count->done = done;
-  return [&campaign, count, all, others](std::size_t /*number*/, const RunRecord& record) {
+  return [&campaign, count, all, others, watch](std::size_t /*number*/, const RunRecord& record) {
     ++count->done;
+    if (watch != nullptr) watch->note_flight();
     if (others && Clock::now() - count->asked > std::chrono::seconds(2)) {
       count->asked = Clock::now();
       count->done = all - campaign.missing().size();
@@ -159,9 +178,10 @@ void clear(const Campaign& campaign) {
 
 /// A worker's part: no tables, and nobody is kept out.
 int fly_share(const Campaign& campaign, const CampaignFlags& flags) {
-  const StopWatch watch;
+  StopWatch watch(campaign.study().time_limit > 0.0);
   const auto own = share_of(campaign.missing(), parse_share(flags.share));
-  fly_here(campaign, own, jobs_of(flags), watch.stop(), teller(campaign, 0, own.size(), false));
+  fly_here(
+      campaign, own, jobs_of(flags), watch.stop(), teller(campaign, 0, own.size(), false, &watch));
   end_progress();
   return watch.stop() ? kInterrupted : kDone;
 }
@@ -171,7 +191,7 @@ int coordinate(Campaign& campaign,
                const CampaignFlags& flags,
                const std::vector<Condition>& conditions) {
   const FolderLock lock(campaign.folder());
-  const StopWatch watch;
+  StopWatch watch(campaign.study().time_limit > 0.0 || flags.engine == "slurm");
   clear(campaign);
   if (flags.retry) campaign.forget_failed();
   const std::vector<std::size_t> missing = campaign.missing();
@@ -196,7 +216,7 @@ int coordinate(Campaign& campaign,
              missing,
              jobs_of(flags),
              watch.stop(),
-             teller(campaign, all - missing.size(), all, false));
+             teller(campaign, all - missing.size(), all, false, &watch));
   }
   return finish(campaign, flags, conditions, watch.stop());
 }
@@ -218,10 +238,10 @@ int fly_by_mpi(const CampaignFlags& flags, const std::vector<Condition>& conditi
   if (!is_first) campaign.emplace(load_study(flags.study), flags.folder, own_program());
   const std::vector<std::size_t> missing = campaign->missing();
   mpi.barrier();  // nobody flies while others look what is missing
-  const StopWatch watch;
+  StopWatch watch(true);
   const std::size_t all = campaign->plan().runs.size();
   const FlightDone done =
-      is_first ? teller(*campaign, all - missing.size(), all, true) : FlightDone();
+      is_first ? teller(*campaign, all - missing.size(), all, true, nullptr) : FlightDone();
   for (std::size_t i = 0; !watch.stop() && (i = mpi.next()) < missing.size();) {
     const auto record = campaign->fly(missing[i], watch.stop());
     if (record && done) done(missing[i], *record);

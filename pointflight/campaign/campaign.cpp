@@ -17,7 +17,6 @@
 #include "pointflight/campaign/process.hpp"
 #include "pointflight/core/hash.hpp"
 #include "pointflight/core/input_error.hpp"
-#include "pointflight/core/locked_file.hpp"
 #include "pointflight/core/mapped_file.hpp"
 #include "pointflight/core/output_file.hpp"
 #include "pointflight/core/owned_files.hpp"
@@ -266,12 +265,9 @@ std::size_t Campaign::remove_leftovers() const {
         pid == getpid() || (kill(static_cast<pid_t>(pid), 0) != 0 && errno == ESRCH);
     if (!is_gone) continue;
     if (runs->entry(name) != Entry::kFolder) continue;
-    try {
-      // containers have process numbers of their own: whoever flies there holds the folder
-      const FolderLock lock(runs->path() + "/" + name);
-      left += remove_flight(*runs, name) ? 0 : 1;
-    } catch (const InputError&) {  // somebody flies there
-    }
+    // containers have process numbers of their own: whoever flies there fills the folder
+    if (is_being_filled(*runs, name)) continue;
+    left += remove_flight(*runs, name) ? 0 : 1;
   }
   return left;
 }

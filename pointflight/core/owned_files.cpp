@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -114,10 +115,21 @@ OwnedFolder::OwnedFolder(const Folder& parent, const std::string& name)
   if (list_ < 0) {
     throw InputError(fmt::format("{}/{}: {}", path(), kFileList, write_error_text(errno)));
   }
+  // not the folder: a program of the user's that runs in it may lock that, and would wait for ever
+  static_cast<void>(::flock(list_, LOCK_EX | LOCK_NB));
 }
 
 OwnedFolder::~OwnedFolder() {
   ::close(list_);
+}
+
+bool is_being_filled(const Folder& parent, const std::string& name) {
+  const std::string list = fmt::format("{}/{}/{}", parent.path(), name, kFileList);
+  const int file = ::open(list.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
+  if (file < 0) return false;
+  const bool is_locked = ::flock(file, LOCK_SH | LOCK_NB) != 0 && errno == EWOULDBLOCK;
+  ::close(file);
+  return is_locked;
 }
 
 std::string OwnedFolder::file(const std::string& name) {

@@ -44,7 +44,7 @@ class OutputFolder {
 };
 
 /// A folder that is being filled: each file is listed before it is made, so that whatever ends the
-/// process, what is ours can be told from what is not.
+/// process, what is ours can be told from what is not. Its list is locked meanwhile.
 class OwnedFolder : public OutputFolder {
  public:
   /// Makes `name` in `parent` and begins its list. Throws InputError, also if it is there already.
@@ -70,6 +70,10 @@ class OwnedFolder : public OutputFolder {
   int list_ = -1;                      ///< Descriptor that appends to the list.
   std::map<std::string, bool> files_;  ///< By name: it is a link.
 };
+
+/// True while some process' `OwnedFolder` fills the folder `name`; false where the file system
+/// knows no locks.
+bool is_being_filled(const Folder& parent, const std::string& name);
 
 /// Removes files of a list and the folders of their names that are empty then. What is no longer
 /// what we wrote (a link for a file, a folder) stays. `keeps`: names that stay as well.

@@ -184,6 +184,15 @@ TEST_F(Campaigns, AUsersProgramIsJudgedByItsCodeItsFiguresAndItsLimits) {
   expect_contains(table("c"), "2,0,3,completed,");
 }
 
+TEST_F(Campaigns, AUsersProgramMayLockItsFolder) {
+  const std::string file =
+      study("seeds: 2\ncommand: [sh, -c, 'flock -w 20 \"$(dirname {scenario})\" true']\n");
+  const Result result = run(fmt::format("campaign {} -o {}", file, here_ / "c"));
+  EXPECT_EQ(result.code, 0) << result.err;
+  expect_contains(table("c"), "0,0,1,completed,");
+  expect_contains(table("c"), "1,0,2,completed,");
+}
+
 TEST_F(Campaigns, MoreJobsThanTheMemoryAllowsAreSaidAndLeaveNothing) {
   if (testing::kSanitized) return;  // the sanitizer takes far more
   write_file(here_ / "sleep.yaml",

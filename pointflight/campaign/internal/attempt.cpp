@@ -56,11 +56,7 @@ bool remove_flight(const Folder& home, const std::string& name) {
 }
 
 Attempt::Attempt(const Folder& home, std::size_t number)
-    : home_(home),
-      number_(number),
-      name_(attempt_name(number)),
-      folder_(home, name_),
-      lock_(folder_.path()) {}
+    : home_(home), number_(number), name_(attempt_name(number)), folder_(home, name_) {}
 
 Attempt::~Attempt() {
   if (kept_) return;

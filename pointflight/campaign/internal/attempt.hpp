@@ -8,7 +8,6 @@
 
 #include "pointflight/campaign/run_record.hpp"
 #include "pointflight/core/folder.hpp"
-#include "pointflight/core/locked_file.hpp"
 #include "pointflight/core/owned_files.hpp"
 
 namespace pointflight {
@@ -53,7 +52,6 @@ class Attempt {
   std::size_t number_;
   std::string name_;
   OwnedFolder folder_;
-  FolderLock lock_;
   bool kept_ = false;
 };
 
