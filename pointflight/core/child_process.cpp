@@ -125,7 +125,7 @@ void restrict_child(const ChildLimits& limits, pid_t parent) {
     work(to_parent);
     write_text(output, Record::kDone, {});
   } catch (const std::bad_alloc&) {
-    write_text(output, Record::kFailure, "it takes too much memory");
+    write_text(output, Record::kFailure, kTooMuchMemory);
   } catch (const std::exception& error) {
     write_text(output, Record::kFailure, error.what());
   } catch (...) {

@@ -27,6 +27,9 @@ class ChildOutput {
   int pipe_;
 };
 
+/// `ChildResult::failure` of a child that wanted more memory than it may have.
+inline constexpr const char* kTooMuchMemory = "it takes too much memory";
+
 /// What came back from a child.
 struct ChildResult {
   std::vector<std::byte> bytes;  ///< All that was written, in order.

@@ -9,6 +9,7 @@
 #include <cerrno>
 #include <cstdlib>
 #include <filesystem>
+#include <new>
 #include <system_error>
 
 #include "pointflight/core/input_error.hpp"
@@ -19,6 +20,7 @@ namespace {
 constexpr std::size_t kPage = 4096;
 
 [[noreturn]] void fail(const std::string& folder, std::size_t bytes, int error) {
+  if (error == ENOMEM) throw std::bad_alloc();  // of addresses, whatever the place
   throw InputError(
       fmt::format("{}: no room for {:.1f} GB of intermediate results: {}; choose "
                   "another place or a coarser --resolution",

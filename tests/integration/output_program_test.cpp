@@ -252,6 +252,26 @@ TEST_F(Output, AClosedTerminalEndsAsAnInterrupt) {
   EXPECT_EQ(nlohmann::json::parse(read_file(in("run/summary.json")))["end"], "interrupted");
 }
 
+TEST_F(Output, AMeshThatTakesTooMuchMemoryIsNotCalledDamaged) {
+  if (testing::kSanitized) return;  // the sanitizer takes far more
+  // 180,000 triangles as STL: read by the library of importers, in a process of its own
+  constexpr std::uint32_t kTriangles = 180'000;
+  std::string stl(80, ' ');
+  stl.append(reinterpret_cast<const char*>(&kTriangles), sizeof kTriangles);
+  for (std::uint32_t i = 0; i < kTriangles; ++i) {
+    const auto x = static_cast<float>(i % 400) * 0.05f;
+    const auto y = static_cast<float>(i / 400) * 0.05f;
+    const float numbers[12] = {0, 0, 1, x, y, 0, x + 0.05f, y, 0, x, y + 0.05f, 0};
+    stl.append(reinterpret_cast<const char*>(numbers), sizeof numbers);
+    stl.append(2, '\0');
+  }
+  write_file(in("m.stl"), stl);
+  const Result result =
+      run(fmt::format("map import {} -o {}", in("m.stl"), in("m.pfmap")), "ulimit -d 40000;");
+  if (result.err.find("libassimp-dev") != std::string::npos) return;  // built without it
+  expect_user_error(result, "this mesh takes more memory than there is for it");
+}
+
 TEST_F(Output, SmallStacksAndFewOpenFilesAreEnough) {
   const std::string flight = scenario(0.2);
   EXPECT_EQ(run(fmt::format("fly {} -o {}", flight, in("run")), "ulimit -s 256;").code, 0);

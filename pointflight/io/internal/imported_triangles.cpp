@@ -3,6 +3,8 @@
 
 #include <array>
 #include <cstring>
+#include <new>
+#include <string_view>
 #include <utility>
 
 #include "pointflight/core/child_process.hpp"
@@ -75,8 +77,13 @@ void import_triangles(const std::string& path, ChildOutput& output) {
       importer.ReadFile(path,
                         aiProcess_ValidateDataStructure | aiProcess_Triangulate |
                             aiProcess_PreTransformVertices | aiProcess_SortByPType);
-  if (scene == nullptr)
+  if (scene == nullptr) {
+    const std::string_view said = importer.GetErrorString();
+    if (said.find("bad_alloc") != said.npos || said.find("memory") != said.npos) {
+      throw std::bad_alloc();
+    }
     throw InputError(cannot_read(path, "it is damaged, or of a kind that is not known"));
+  }
   constexpr std::size_t kBatch = 4096;
   std::vector<Corners> batch;
   for (unsigned m = 0; m < scene->mNumMeshes; ++m) {
@@ -101,6 +108,12 @@ std::vector<std::byte> read_triangles(const std::string& path,
                                     {limits.cpu_seconds, limits.memory_bytes},
                                     [&] { report(progress, "reading the mesh", 0.0); });
   if (result.failure.rfind(path, 0) == 0) throw InputError(result.failure);
+  if (result.failure == kTooMuchMemory) {
+    throw InputError(fmt::format(
+        "{}: this mesh takes more memory than there is for it; raise the limit (ulimit -d, -v, a "
+        "container's) or split it; a small one is damaged",
+        path));
+  }
   if (!result.failure.empty()) {
     throw InputError(cannot_read(path, fmt::format("its reader failed ({})", result.failure)));
   }
