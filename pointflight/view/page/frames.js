@@ -27,6 +27,10 @@ export class Frames {
     this.edges.set(child, edge);
   }
 
+  has(frame) {
+    return this.edges.has(plainFrame(frame));
+  }
+
   // True for a frame that nothing is known to move.
   stays(frame) {
     frame = plainFrame(frame);
