@@ -10,9 +10,13 @@ const colourOf = ({ r, g, b }) => new THREE.Color().setRGB(r, g, b, THREE.SRGBCo
 const solidMaterial = (c) =>
   new THREE.MeshStandardMaterial({ color: colourOf(c), roughness: 0.7, transparent: c.a < 1, opacity: c.a, side: THREE.DoubleSide });
 
+// Points lie around the first one: single precision is coarse far from zero.
+const middleOf = (points) => points?.[0] ?? { x: 0, y: 0, z: 0 };
+const around = (p, middle) => [p.x - middle.x, p.y - middle.y, p.z - middle.z];
+
 function positionsOf(points) {
   const positions = new Float32Array(3 * points.length);
-  points.forEach((p, i) => positions.set([p.x, p.y, p.z], 3 * i));
+  points.forEach((p, i) => positions.set(around(p, middleOf(points)), 3 * i));
   return new THREE.BufferAttribute(positions, 3);
 }
 
@@ -43,7 +47,8 @@ function objectOf(marker) {
   if (type === KIND.TRIANGLE_LIST) geometry.computeVertexNormals();
   else if (type === KIND.CUBE_LIST || type === KIND.SPHERE_LIST) {
     const many = new THREE.InstancedMesh(geometry, solidMaterial(marker.color), marker.points.length);
-    marker.points.forEach((p, i) => many.setMatrixAt(i, new THREE.Matrix4().makeTranslation(p.x, p.y, p.z)));
+    const middle = middleOf(marker.points);
+    marker.points.forEach((p, i) => many.setMatrixAt(i, new THREE.Matrix4().makeTranslation(...around(p, middle))));
     return many;
   } else if (type > KIND.CYLINDER) return null; // texts and meshes
   return new THREE.Mesh(geometry, solidMaterial(marker.color));
@@ -67,6 +72,9 @@ export class Markers {
       object.frustumCulled = false;
       object.matrixAutoUpdate = false;
       object.matrix.multiplyMatrices(frames.toRoot(marker.header.frame_id, secondsOf(marker.header.stamp)), matrixOf(marker.pose.position, marker.pose.orientation));
+      const hasOwnShape = marker.type <= KIND.CYLINDER;
+      const { x, y, z } = middleOf(hasOwnShape ? [] : marker.points);
+      object.matrix.multiply(new THREE.Matrix4().makeTranslation(x, y, z));
       this.known.set(key, object);
       this.group.add(object);
     }

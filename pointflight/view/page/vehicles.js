@@ -125,14 +125,17 @@ export function line(colour, most, dashed = false) {
   return object;
 }
 
+// Points lie around the first one: single precision is coarse far from zero.
 export function append(object, p) {
   const { count, most } = object.userData;
+  if (count === 0) object.position.set(...p);
   const attribute = object.geometry.getAttribute("position");
   if (count === most) {
     attribute.array.copyWithin(0, 3 * Math.floor(most / 2));
     object.userData.count = most - Math.floor(most / 2);
   }
-  attribute.setXYZ(object.userData.count++, ...p);
+  const { x, y, z } = object.position;
+  attribute.setXYZ(object.userData.count++, p[0] - x, p[1] - y, p[2] - z);
   attribute.needsUpdate = true;
   object.geometry.setDrawRange(0, object.userData.count);
 }
