@@ -307,7 +307,7 @@ TEST_F(Program, WrongRecordingsAreSaid) {
   expect_user_error(fly(fmt::format("--record {}", folder / "nowhere/run.mcap")), "No such file");
   expect_user_error(fly(fmt::format("--record {0} --record {0}", folder / "a.mcap")), "twice");
   expect_user_error(run(fmt::format("bag info {}", yaml)),
-                    "a recording (.mcap, .bag) is wanted here, and this is a YAML file");
+                    "a recording (.mcap, .bag, .db3) is wanted here, and this is a YAML file");
   expect_user_error(run(fmt::format("bag info {}", folder / "none.mcap")), "none.mcap");
 }
 

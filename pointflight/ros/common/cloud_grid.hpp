@@ -19,8 +19,8 @@ class CloudGrid {
 
   /// Where the beams of one scan lie.
   struct Cells {
-    std::size_t columns = 0;
-    std::size_t first = 0;  ///< Place of its first beam in a firing, which may have begun before.
+    std::size_t columns = 0;  ///< Of the cloud.
+    std::size_t first = 0;    ///< Place of its first beam in a firing, which may have begun before.
   };
   /// Of a scan of this sensor.
   [[nodiscard]] Cells cells_of(const Scan& scan) const;
