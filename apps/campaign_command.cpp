@@ -86,9 +86,8 @@ class StopWatch {
     constexpr auto kLong = std::chrono::minutes(2);
     if (!says_waiting_ || Clock::now() - flown_.load() < kLong) return;
     says_waiting_ = false;
-    log("no flight has ended for two minutes; `limits: {time: SECONDS}` in the study ends those "
-        "that "
-        "never do (said once)");
+    log("no flight has ended for two minutes; those that never do are ended by `limits: {time: "
+        "SECONDS}` in the study (said once)");
   }
 
   std::atomic<Clock::time_point> flown_ = Clock::now();

@@ -193,9 +193,8 @@ std::string man_page(const CLI::App& app, const std::string& version) {
   add_commands(app, page);
   page +=
       ".SH EXIT STATUS\n"
-      ".TP\n0\nDone. A run is completed; its time (--duration) is up; it was idle: nothing was "
-      "left to do and "
-      "nobody commanded it.\n"
+      ".TP\n0\nDone. A run is completed; its time (--duration) is up; it was idle: "
+      "nothing was left to do and nobody commanded it.\n"
       ".TP\n1\nA run ended with its mission unfinished, by a collision, or because a vehicle left "
       "the map.\n"
       ".TP\n2\nSomething outside is wrong; one line on standard error says what, where, and what "

@@ -42,12 +42,13 @@ std::vector<double> parse_numbers(const std::string& text, const std::string& fl
   return numbers;
 }
 
-std::vector<double> parse_numbers(const std::string& text,
-                                  std::size_t count,
-                                  const std::string& flag,
-                                  const std::string& form) {
-  std::vector<double> numbers = parse_numbers(text, flag);
-  if (numbers.size() == count) return numbers;
+namespace {
+
+void require_count(const std::vector<double>& numbers,
+                   std::size_t count,
+                   const std::string& flag,
+                   const std::string& form) {
+  if (numbers.size() == count) return;
   throw InputError(fmt::format("{}: {} number{} where {} are wanted: {}",
                                flag,
                                numbers.size(),
@@ -56,16 +57,21 @@ std::vector<double> parse_numbers(const std::string& text,
                                form));
 }
 
+}  // namespace
+
+std::vector<double> parse_numbers(const std::string& text,
+                                  std::size_t count,
+                                  const std::string& flag,
+                                  const std::string& form) {
+  std::vector<double> numbers = parse_numbers(text, flag);
+  require_count(numbers, count, flag, form);
+  return numbers;
+}
+
 Pose parse_pose(const std::string& text, const std::string& flag) {
   std::vector<double> n = parse_numbers(text, flag);
   if (n.size() == 3) n.resize(6, 0.0);
-  if (n.size() != 6) {
-    throw InputError(fmt::format(
-        "{}: {} number{} where 6 are wanted: x,y,z,roll,pitch,yaw in metres and degrees (or x,y,z)",
-        flag,
-        n.size(),
-        n.size() == 1 ? "" : "s"));
-  }
+  require_count(n, 6, flag, "x,y,z,roll,pitch,yaw in metres and degrees (or x,y,z)");
   return {quaternion_from_rpy(n[3] * kDegree, n[4] * kDegree, n[5] * kDegree), {n[0], n[1], n[2]}};
 }
 

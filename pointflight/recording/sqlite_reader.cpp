@@ -78,9 +78,6 @@ class SqliteFile {
     return code == SQLITE_ROW;
   }
 
-  /// Of the messages, for reports.
-  void set_share(double share) { share_ = share; }
-
  private:
   struct FileDeleter {
     void operator()(sqlite3* file) const { sqlite3_close_v2(file); }
@@ -95,7 +92,7 @@ class SqliteFile {
   static int on_progress(void* self) {
     auto& file = *static_cast<SqliteFile*>(self);
     try {
-      report(file.progress_, "reading the recording", file.share_);
+      report(file.progress_, "reading the recording", 0.0);  // what it sorts it does not tell
       return 0;
     } catch (...) {
       file.interrupt_ = std::current_exception();
@@ -136,7 +133,6 @@ class SqliteFile {
 
   std::string path_;
   const Progress& progress_;
-  double share_ = 0.0;
   std::exception_ptr interrupt_;
   std::unique_ptr<sqlite3, FileDeleter> file_;
   std::map<std::int64_t, Topic> topics_;

@@ -8,6 +8,7 @@
 #include "pointflight/ros/common/description.hpp"
 #include "pointflight/ros/common/inputs.hpp"
 #include "pointflight/ros/common/ros1_definition.hpp"
+#include "tests/ros_common/keeper.hpp"
 #include "tests/sim/runs.hpp"
 
 namespace pointflight {
@@ -56,18 +57,10 @@ std::optional<Order> order_for(const std::string& kind,
 }
 
 TEST(Inputs, FramesThatAreNotKnownAreRefused) {
-  InputStream stream;
-  stream.topic.name = "/in";
   const auto reason_for =
-      [&](const std::string& kind, const auto& message, const OrderContext& c) -> std::string {
-    stream.type = input_types().find(kind);
-    const auto bytes = encode<Wire::kCdr>(message);
-    Received received;
-    received.data = bytes.data();
-    received.size = bytes.size();
+      [](const std::string& kind, const auto& message, const OrderContext& c) -> std::string {
     std::string reason;
-    const OrderContext contexts[] = {c};
-    return orders_of(stream, Wire::kCdr, received, contexts, reason).empty() ? reason : "taken";
+    return testing::orders_for(kind, message, c, reason).empty() ? reason : "taken";
   };
   OrderContext alias = context();
   alias.world_alias = "map";

@@ -2,10 +2,14 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "pointflight/ros/common/bridge.hpp"
+#include "pointflight/ros/common/inputs.hpp"
+#include "pointflight/sim/simulation.hpp"
 
 namespace pointflight::testing {
 
@@ -55,5 +59,35 @@ class Keeper : public Outlet {
   Wire wire_;
   std::int64_t last_ = 0;
 };
+
+/// What a run's outlet gets.
+inline Keeper kept(const Scenario& scenario,
+                   const std::shared_ptr<const SurfelMap>& map,
+                   const RosProfile& profile) {
+  const Executor executor(1);
+  Simulation simulation(scenario, map, executor);
+  RosBridge bridge(describe_run(simulation), profile, std::chrono::seconds(1000));
+  Keeper keeper;
+  bridge.add(keeper);
+  bridge.start();
+  while (simulation.step(bridge)) bridge.on_time(simulation.time());
+  return keeper;
+}
+
+/// The orders of a message in CDR for a vehicle, and in `reason` why there are none.
+template <class M>
+std::vector<Order> orders_for(const std::string& kind,
+                              const M& message,
+                              const OrderContext& context,
+                              std::string& reason) {
+  InputStream stream;
+  stream.topic.name = "/in";
+  stream.type = input_types().find(kind);
+  const auto bytes = encode<Wire::kCdr>(message);
+  Received received;
+  received.data = bytes.data();
+  received.size = bytes.size();
+  return orders_of(stream, Wire::kCdr, received, {&context, 1}, reason);
+}
 
 }  // namespace pointflight::testing

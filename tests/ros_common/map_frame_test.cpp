@@ -45,14 +45,7 @@ Scenario far_flight() {
 }
 
 Keeper flown(const RosProfile& profile) {
-  const Executor executor(1);
-  Simulation simulation(far_flight(), far_hall(), executor);
-  RosBridge bridge(describe_run(simulation), profile, Duration{0});
-  Keeper keeper;
-  bridge.add(keeper);
-  bridge.start();
-  while (simulation.step(bridge)) bridge.on_time(simulation.time());
-  return keeper;
+  return testing::kept(far_flight(), far_hall(), profile);
 }
 
 std::vector<Vector3d> points_of_message(const msg::PointCloud2& cloud) {
@@ -136,16 +129,9 @@ TEST(MapFrame, GoalsAndCommandsMayBeInIt) {
   OrderContext context;
   context.world_frame = "world";
   context.map_frame = {"map", kUtm, 0.5};
-  InputStream stream;
-  stream.topic.name = "/in";
   const auto command_for = [&](const std::string& kind, const auto& message) {
-    stream.type = input_types().find(kind);
-    const auto bytes = encode<Wire::kCdr>(message);
-    Received received;
-    received.data = bytes.data();
-    received.size = bytes.size();
     std::string reason;
-    const auto orders = orders_of(stream, Wire::kCdr, received, {&context, 1}, reason);
+    const auto orders = testing::orders_for(kind, message, context, reason);
     EXPECT_EQ(reason, "");
     return std::get<VehicleOrder>(orders.at(0)).command;
   };

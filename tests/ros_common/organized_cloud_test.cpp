@@ -42,13 +42,7 @@ Clouds clouds_of(const std::string& lidar,
     output.layout = layout;
     output.organized = organized;
     profile.outputs = {output};
-    const Executor executor(1);
-    Simulation simulation(scenario, hall(), executor);
-    RosBridge bridge(describe_run(simulation), profile, std::chrono::seconds(1000));
-    Keeper keeper;
-    bridge.add(keeper);
-    bridge.start();
-    while (simulation.step(bridge)) bridge.on_time(simulation.time());
+    const Keeper keeper = testing::kept(scenario, hall(), profile);
     (organized ? clouds.organized : clouds.plain) = keeper.of<msg::PointCloud2>("/c");
   }
   return clouds;
@@ -92,6 +86,17 @@ TEST(OrganizedClouds, HaveARowForEachRing) {
   EXPECT_EQ(os1.organized[0].width, 1024u);
   expect_same_returns(clouds_of("xt32", "hesai", "cloud"), 32);
   expect_same_returns(clouds_of("mid360", "livox", "cloud"), 4);
+  // whose channels fire at times of their own, some beyond their cycle
+  for (const auto& [lidar, rings] : std::map<std::string, std::size_t>{{"hdl32e", 32},
+                                                                       {"hdl64e_s3", 64},
+                                                                       {"vlp32c", 32},
+                                                                       {"vls128", 128},
+                                                                       {"pandar40p", 40},
+                                                                       {"pandar64", 64},
+                                                                       {"qt64", 64}}) {
+    SCOPED_TRACE(lidar);
+    expect_same_returns(clouds_of(lidar, "xyzit", "cloud"), rings);
+  }
 }
 
 TEST(OrganizedClouds, OfCamerasAreTheirPixels) {
@@ -125,6 +130,8 @@ TEST(OrganizedClouds, TimesOfCellsWithoutAReturnAreThoseOfTheirFiring) {
 TEST(OrganizedClouds, AreRefusedWhereThereAreNoRows) {
   expect_contains(error_of([] { clouds_of("mid360", kLivoxCustom, "cloud", {true}); }),
                   "/c: Livox' own message has no rows");
+  expect_contains(error_of([] { clouds_of("mid360", kLivoxCustom, "cloud_world", {false}); }),
+                  "/c: Livox' own message is of the sensor's frame");
   // fires ring 0 twice
   const testing::TemporaryFolder folder;
   testing::write_file(folder / "t.csv",

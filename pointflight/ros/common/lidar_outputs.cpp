@@ -19,9 +19,17 @@ float plain_intensity(const OutputStream& stream) {
   return stream.ros.run.map->has_intensity() ? 0.0f : kPlainIntensity;
 }
 
-/// The cells of a stream's clouds; nothing if they are not organised.
+/// The cells of a stream's clouds; nothing if they are not organised. Throws InputError if its
+/// layout cannot be.
 std::optional<CloudGrid> grid_of(const OutputStream& stream) {
   const RosOutput& s = stream.settings;
+  if (s.layout == kLivoxCustom && stream.type.frame != Frame::kSensor) {
+    throw InputError(
+        fmt::format("{}: {}: Livox' own message is of the sensor's frame; give it "
+                    "another layout",
+                    stream.ros.profile.path,
+                    s.topic));
+  }
   if (!s.organized) return std::nullopt;
   if (s.layout != kLivoxCustom) return CloudGrid(stream.of_lidar().settings);
   throw InputError(
@@ -30,7 +38,8 @@ std::optional<CloudGrid> grid_of(const OutputStream& stream) {
                   s.topic));
 }
 
-/// In the sensor's frame, in one of the layouts or Livox' own message.
+/// In the sensor's frame or the world, in one of the layouts or Livox' own message.
+template <bool in_world>
 class Cloud : public Output {
  public:
   explicit Cloud(OutputStream& stream) : Output(stream), grid_(grid_of(stream)) {}
@@ -44,34 +53,12 @@ class Cloud : public Output {
     const float plain = plain_intensity(stream_);
     if (s.layout == kLivoxCustom) {
       stream_.send(custom_cloud_of(scan, s.frame, epoch, plain), scan.end);
-    } else {
-      const CloudGrid* grid = grid_ ? &*grid_ : nullptr;
-      stream_.send(cloud_of(scan, point_layout(s.layout), s.frame, epoch, {}, plain, grid),
-                   scan.end);
+      return;
     }
-  }
-
- private:
-  std::optional<CloudGrid> grid_;
-};
-
-/// The same in the world.
-class WorldCloud : public Output {
- public:
-  explicit WorldCloud(OutputStream& stream) : Output(stream), grid_(grid_of(stream)) {}
-  void on_sample(const Sample& sample) override {
-    const auto* scanned = std::get_if<ScanSample>(&sample);
-    if (scanned == nullptr || !stream_.is_about(*scanned)) return;
-    const Scan& scan = *scanned->scan;
-    if (!stream_.is_due(scan.end)) return;
-    const auto points = world_points(scan, scanned->T_world_sensor, stream_.frame_origin());
-    stream_.send(cloud_of(scan,
-                          point_layout(stream_.settings.layout),
-                          stream_.settings.frame,
-                          stream_.ros.epoch,
-                          points,
-                          plain_intensity(stream_),
-                          grid_ ? &*grid_ : nullptr),
+    std::vector<Vector3f> positions;
+    if (in_world) positions = world_points(scan, scanned->T_world_sensor, stream_.frame_origin());
+    const CloudGrid* grid = grid_ ? &*grid_ : nullptr;
+    stream_.send(cloud_of(scan, point_layout(s.layout), s.frame, epoch, positions, plain, grid),
                  scan.end);
   }
 
@@ -138,7 +125,7 @@ std::vector<OutputType> lidar_outputs() {
        .per = kLidar},
       {.name = "cloud",
        .help = "a scan in the sensor's frame",
-       .make = made_by<Cloud, msg::PointCloud2>(),
+       .make = made_by<Cloud<false>, msg::PointCloud2>(),
        .per = kLidar,
        .frame = Frame::kSensor,
        .large = true,
@@ -146,7 +133,7 @@ std::vector<OutputType> lidar_outputs() {
        .layout = "xyzit"},
       {.name = "cloud_world",
        .help = "a scan in the world",
-       .make = made_by<WorldCloud, msg::PointCloud2>(),
+       .make = made_by<Cloud<true>, msg::PointCloud2>(),
        .per = kLidar,
        .frame = Frame::kMap,
        .large = true,
