@@ -60,11 +60,14 @@ void describe(SettingsVisitor& v, RosOutput& s) {
     w.value({"layout", "", "livox, livox_custom, velodyne, ouster, xyzi, ..."}, s.layout);
   });
   const bool is_of_lidar = type == nullptr || (has_points && type->per == OutputType::Per::kLidar);
-  v.only_if(is_of_lidar && s.layout != kLivoxCustom, "kind: cloud, cloud_world", [&](auto& w) {
-    w.value(
-        {"organized", "", "a row for each ring, a column for each firing, NaN without a return"},
-        s.organized);
-  });
+  v.only_if(is_of_lidar && s.layout != kLivoxCustom,
+            "kind: cloud or cloud_world, in any layout but livox_custom",
+            [&](auto& w) {
+              w.value({"organized",
+                       "",
+                       "a row for each ring, a column for each firing, NaN without a return"},
+                      s.organized);
+            });
   v.only_if(s.kind == "map", "kind: map", [&](SettingsVisitor& w) {
     w.value({"resolution", "m", "0: the map's own", 0, 100}, s.resolution);
   });
