@@ -15,6 +15,7 @@
 #include "apps/cli.hpp"
 #include "apps/command_line.hpp"
 #include "apps/commands.hpp"
+#include "apps/memory_reserve.hpp"
 #include "apps/modules.hpp"
 #include "apps/terminal.hpp"
 #include "pointflight/core/input_error.hpp"
@@ -100,13 +101,15 @@ void require_stack() {
                   limit.rlim_cur / 1024));
 }
 
-/// What helps where memory has run out.
-std::string memory_remedy(int argc, char** argv) {
+/// Says that memory has run out, and what helps.
+std::string memory_line(int argc, char** argv) {
   const std::string_view verb = argc > 1 ? argv[1] : "";
-  const std::string_view limit = "raise the limit (ulimit -v, a container's)";
-  if (verb == "map") return fmt::format("give a coarser --resolution, or {}", limit);
-  if (verb == "campaign") return fmt::format("give fewer --jobs, or {}", limit);
-  return fmt::format("{} or close other programs", limit);
+  const std::string_view first = verb == "map"        ? "give a coarser --resolution, or "
+                                 : verb == "campaign" ? "give fewer --jobs, or "
+                                                      : "";
+  return fmt::format("pointflight: out of memory; {}raise the limit (ulimit -v, a container's){}\n",
+                     first,
+                     first.empty() ? " or close other programs" : "");
 }
 
 /// Runs the program; every error becomes a line and an exit code.
@@ -116,6 +119,8 @@ int guarded_run(int argc, char** argv) {
   std::signal(SIGPIPE, SIG_IGN);
   pointflight::survive_cut_files();
   allow_many_files();
+  const std::string no_memory = memory_line(argc, argv);
+  pointflight::apps::keep_memory_reserve(no_memory);
   using pointflight::apps::end_progress;
   using pointflight::apps::say;
   try {
@@ -131,8 +136,9 @@ int guarded_run(int argc, char** argv) {
     end_progress();
     say(fmt::format("pointflight: {}\n", error.what()));
   } catch (const std::bad_alloc&) {
+    pointflight::apps::release_memory_reserve();
     end_progress();
-    say(fmt::format("pointflight: out of memory; {}\n", memory_remedy(argc, argv)));
+    say(no_memory);
   } catch (const std::exception& error) {
     end_progress();
     // TBB's words and the library's own
