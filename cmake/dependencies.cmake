@@ -34,6 +34,15 @@ foreach(library sleef xxhash lzf lzma hwy md zstd lz4 z zip sqlite3)
   find_library(POINTFLIGHT_${library} ${library} REQUIRED)
 endforeach()
 
+# functions of many numbers whose bits are those of one (SLEEF may be built without some of them)
+include(CheckLibraryExists)
+foreach(name IN ITEMS logd8_u10avx512fnofma erfcd4_u15avx sincosd2_u10sse4 expd2_u10sse2)
+  check_library_exists(${POINTFLIGHT_sleef} Sleef_cinz_${name} "" POINTFLIGHT_SLEEF_${name})
+  if(NOT POINTFLIGHT_SLEEF_${name})
+    set(POINTFLIGHT_SLEEF_LACKS_VECTORS ON)
+  endif()
+endforeach()
+
 # Random123 is headers only.
 find_path(POINTFLIGHT_RANDOM123 Random123/philox.h REQUIRED)
 

@@ -49,9 +49,10 @@ inline double pow(double x, double y) {
   return Sleef_cinz_powd1_u10purec(x, y);
 }
 
+inline constexpr double kHalfRoot = 0.70710678118654752440;  ///< 1 / sqrt(2)
+
 /// Probability that a standard normal lies below `x`; within 1.5 ULP of the true one's tail.
 inline double normal_probability(double x) {
-  constexpr double kHalfRoot = 0.70710678118654752440;
   return 0.5 * Sleef_cinz_erfcd1_u15purec(-x * kHalfRoot);
 }
 /// Where `normal_probability` is `p`, 0 < p < 1, to 1e-14; for set-up, not for each beam.

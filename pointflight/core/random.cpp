@@ -2,9 +2,11 @@
 
 #include <Random123/philox.h>
 
+#include <cassert>
 #include <cmath>
 
 #include "pointflight/core/constants.hpp"
+#include "pointflight/core/internal/random_kernel.hpp"
 #include "pointflight/core/math.hpp"
 
 namespace pointflight {
@@ -39,6 +41,18 @@ std::array<double, 2> RandomStream::normal2(std::uint64_t index) const {
   const double radius = std::sqrt(-2.0 * math::log(1.0 - u));
   const auto angle = math::sincos(2.0 * kPi * v);
   return {radius * angle.cos, radius * angle.sin};
+}
+
+void RandomStream::uniform2(std::uint64_t first, std::span<double> u, std::span<double> v) const {
+  assert(u.size() == v.size());
+  draw_uniforms(
+      {seed_, static_cast<std::uint32_t>(stream_), entity_}, first, u.size(), u.data(), v.data());
+}
+
+void RandomStream::normal2(std::uint64_t first, std::span<double> u, std::span<double> v) const {
+  assert(u.size() == v.size());
+  draw_normals(
+      {seed_, static_cast<std::uint32_t>(stream_), entity_}, first, u.size(), u.data(), v.data());
 }
 
 }  // namespace pointflight

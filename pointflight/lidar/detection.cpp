@@ -6,6 +6,7 @@
 
 #include "pointflight/core/interpolation.hpp"
 #include "pointflight/core/math.hpp"
+#include "pointflight/lidar/internal/return_kernel.hpp"
 
 namespace pointflight {
 namespace {
@@ -150,6 +151,15 @@ double DetectionModel::least_strength() const {
 double DetectionModel::reach() const {
   const double reach = rated_range(1.0 / std::max(margin_at(kFurthestShare), 0.01));
   return limit_ > 0.0 ? std::min(limit_, reach) : reach;
+}
+
+SignalFigures DetectionModel::figures() const {
+  return {.log_ranges = log_ranges_,
+          .log_reflectivities = log_reflectivities_,
+          .near_ranges = near_ranges_,
+          .near_shares = near_shares_,
+          .threshold = threshold_,
+          .slope = slope_};
 }
 
 }  // namespace pointflight

@@ -9,6 +9,8 @@
 
 namespace pointflight {
 
+struct SignalFigures;
+
 /// How far a sensor sees a diffuse (Lambertian) target that it looks at face on.
 struct RatedRange {
   double reflectivity = 0.1;  ///< Of the target, 0 to 1.
@@ -95,6 +97,8 @@ class DetectionModel {
   /// No diffuse target comes back from farther than this with a probability above 0.001, m;
   /// `range_limit` if that is less.
   [[nodiscard]] double reach() const;
+  /// What `measure_signals` needs of this model, which must outlive it.
+  [[nodiscard]] SignalFigures figures() const;
 
  private:
   std::vector<double> log_reflectivities_;  ///< Of targets, ascending; two at least, or none.

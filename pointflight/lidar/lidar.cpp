@@ -1,7 +1,9 @@
 #include "pointflight/lidar/lidar.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <span>
 #include <utility>
 
 #include "pointflight/core/constants.hpp"
@@ -136,8 +138,14 @@ void Lidar::add_direction_noise(Aimed& aimed, const Executor& executor) const {
   if (sigma <= 0.0) return;
   const RandomStream random(request.seed, StreamId::kLidarAngle, sensor_);
   executor.parallel_for(rays.size(), kChunk, [&](std::size_t begin, std::size_t end) {
+    std::array<double, kChunk> us;
+    std::array<double, kChunk> vs;
+    random.normal2(request.index << 32 | begin,
+                   std::span(us).first(end - begin),
+                   std::span(vs).first(end - begin));
     for (std::size_t i = begin; i < end; ++i) {
-      const auto [u, v] = random.normal2(request.index << 32 | i);
+      const double u = us[i - begin];
+      const double v = vs[i - begin];
       const Vector3d d = rays[i].direction_world.cast<double>();
       // any two axes across will do: the noise has none
       const Vector3d across =

@@ -91,6 +91,10 @@ class Lidar {
     std::size_t most = 1;                ///< Returns that a beam may have.
     std::vector<std::uint8_t> infrared;  ///< `Scan::infrared`
   };
+  template <class Seen>
+  [[nodiscard]] Received reported(const Aimed& aimed,
+                                  std::span<const Seen> seen,
+                                  const Executor& executor) const;
   [[nodiscard]] Received received(const Aimed& aimed,
                                   std::span<const Hit> hits,
                                   const Executor& executor) const;

@@ -91,56 +91,111 @@ void add_truth(std::span<const Return> returns, const PoseTrack& T_world_sensor,
   }
 }
 
+/// Draws for the returns of beams that follow each other, the first of which has an even number.
+class ReturnChances {
+ public:
+  ReturnChances(const ScanRequest& request, std::uint32_t sensor)
+      : request_(request),
+        noise_(request.seed, StreamId::kLidarRangeNoise, sensor),
+        detection_(request.seed, StreamId::kLidarDetection, sensor),
+        weather_(request.seed, StreamId::kLidarWeather, sensor),
+        sensor_(sensor) {}
+
+  /// Valid until the next call.
+  BeamChances of(std::size_t first, std::size_t count) {
+    const std::uint64_t address = request_.index << 32 | first;
+    normals_.assign(count + count % 2, 0.0);
+    detections_.resize(count);
+    places_.resize(count);
+    detection_.uniform2(address, detections_, places_);
+    if (request_.noise) {  // two neighbours share a draw of two
+      const std::size_t pairs = normals_.size() / 2;
+      even_.resize(pairs);
+      odd_.resize(pairs);
+      noise_.normal2(request_.index << 32 | first / 2, even_, odd_);
+      for (std::size_t i = 0; i < pairs; ++i) {
+        normals_[2 * i] = even_[i];
+        normals_[2 * i + 1] = odd_[i];
+      }
+    }
+    return {normals_, detections_, places_, [this, address](std::size_t beam, std::size_t echo) {
+              return more(address + beam, echo);
+            }};
+  }
+
+ private:
+  [[nodiscard]] EchoChance more(std::uint64_t address, std::size_t echo) const {
+    const RandomStream own(
+        request_.seed, StreamId::kLidarEcho, static_cast<std::uint32_t>(echo) << 28 | sensor_);
+    EchoChance chance;
+    chance.normal = request_.noise ? own.normal(2 * address) : 0.0;
+    chance.detection = own.uniform(2 * address + 1);
+    if (echo == Echoes::kMost) {
+      const auto [drop, drop_position] = weather_.uniform2(address);
+      chance.drop = drop;
+      chance.drop_position = drop_position;
+    }
+    return chance;
+  }
+
+  const ScanRequest& request_;
+  RandomStream noise_, detection_, weather_;
+  std::uint32_t sensor_;
+  std::vector<double> normals_, detections_, places_, even_, odd_;
+};
+
+/// `Echoes` or `Hit` of a beam whose ranges times `share` are what the sensor measures.
+///@{
+Echoes scaled(Echoes echoes, float share) {
+  for (std::size_t k = 0; k < echoes.count; ++k) echoes.all[k].range *= share;
+  return echoes;
+}
+Hit scaled(Hit hit, float share) {
+  if (hit.is_return()) hit.range *= share;
+  return hit;
+}
+///@}
+
 }  // namespace
 
-/// What the sensor reports of each beam's echoes; a negative range if it reports nothing.
-Lidar::Received Lidar::received(const Aimed& aimed,
-                                std::span<const Echoes> echoes,
+/// What the sensor reports of each beam, of which `seen` are the `Echoes` or `Hit`s.
+template <class Seen>
+Lidar::Received Lidar::reported(const Aimed& aimed,
+                                std::span<const Seen> seen,
                                 const Executor& executor) const {
-  const ScanRequest& request = aimed.request;
   const std::vector<Beam>& beams = aimed.beams();
   Received received;
   received.most = most_returns(settings_.detection.returns);
   const std::size_t most = received.most;
-  std::vector<Return>& returns = received.returns;
-  returns.resize(beams.size() * most);
-  const RandomStream noise(request.seed, StreamId::kLidarRangeNoise, sensor_);
-  const RandomStream detection(request.seed, StreamId::kLidarDetection, sensor_);
-  const RandomStream weather(request.seed, StreamId::kLidarWeather, sensor_);
+  received.returns.resize(beams.size() * most);
   executor.parallel_for(beams.size(), kReturnsPerChunk, [&](std::size_t begin, std::size_t end) {
-    BeamNormals normals(noise, request.index);
-    std::size_t i = begin;
-    const ChanceOf chance_of = [&](std::size_t echo) {
-      BeamChance chance;
-      const std::uint64_t address = request.index << 32 | i;
-      if (echo == 0) {
-        const auto [detected, place] = detection.uniform2(address);
-        return BeamChance{request.noise ? normals(i) : 0.0, detected, place};
-      }
-      const RandomStream own(
-          request.seed, StreamId::kLidarEcho, static_cast<std::uint32_t>(echo) << 28 | sensor_);
-      chance.normal = request.noise ? own.normal(2 * address) : 0.0;
-      chance.detection = own.uniform(2 * address + 1);
-      if (echo == Echoes::kMost) {
-        const auto [drop, drop_position] = weather.uniform2(address);
-        chance.drop = drop;
-        chance.drop_position = drop_position;
-      }
-      return chance;
-    };
-    for (; i < end; ++i) {
-      const float share = depth_share(beams[i]);
-      Echoes seen = echoes[i];
-      for (std::size_t k = 0; k < seen.count; ++k) seen.all[k].range *= share;
-      const std::span<Return> made(returns.data() + i * most, most);
-      const std::size_t count = returns_->measure(seen.span(), chance_of, made);
-      for (std::size_t k = 0; k < count; ++k) {
-        made[k].range /= share;
-        made[k].true_range /= share;
-      }
+    ReturnChances chances(aimed.request, sensor_);
+    const std::size_t count = end - begin;
+    const std::span<Return> made(received.returns.data() + begin * most, count * most);
+    if (!measures_depth_) {
+      returns_->measure(seen.subspan(begin, count), chances.of(begin, count), made);
+      return;
+    }
+    std::vector<Seen> depths;
+    depths.reserve(count);
+    for (std::size_t i = begin; i < end; ++i) {
+      depths.push_back(scaled(seen[i], depth_share(beams[i])));
+    }
+    returns_->measure(std::span<const Seen>(depths), chances.of(begin, count), made);
+    for (std::size_t i = 0; i < made.size(); ++i) {
+      if (!made[i].is_return()) continue;
+      const float share = depth_share(beams[begin + i / most]);
+      made[i].range /= share;
+      made[i].true_range /= share;
     }
   });
   return received;
+}
+
+Lidar::Received Lidar::received(const Aimed& aimed,
+                                std::span<const Echoes> echoes,
+                                const Executor& executor) const {
+  return reported(aimed, echoes, executor);
 }
 
 /// Where returns are not modelled: whatever is hit comes back, with noise.
@@ -228,13 +283,7 @@ Lidar::Received Lidar::received(const Aimed& aimed,
   if (stereo_) {
     made = received_as_stereo(aimed, hits, executor);
   } else {
-    std::vector<Echoes> echoes(hits.size());
-    for (std::size_t i = 0; i < hits.size(); ++i) {
-      if (!hits[i].is_return()) continue;
-      echoes[i].all[0] = returns_->echo_of(hits[i]);
-      echoes[i].count = 1;
-    }
-    made = received(aimed, std::span<const Echoes>(echoes), executor);
+    made = reported(aimed, hits, executor);
   }
   if (measures_depth_) made.infrared = infrared_of(aimed.beams(), hits);
   return made;

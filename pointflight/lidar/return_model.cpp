@@ -8,12 +8,12 @@
 
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/math.hpp"
+#include "pointflight/lidar/internal/return_kernel.hpp"
 
 namespace pointflight {
 namespace {
 
 constexpr double kDarkest = 1e-3;                   // reflectivity of anything
-constexpr double kNearest = 0.01;                   // m, of signals
 constexpr double kShortestPulse = 0.1;              // ns
 constexpr double kBrightest = 255.0;                // a byte, in every vendor's packets
 constexpr double kUsualDivergence = 0.2 * kDegree;  // rad, if a sensor file gives none
@@ -113,7 +113,7 @@ bool ReturnModel::is_marginal(const Echo& echo, double less, double more) const 
   const auto range = static_cast<double>(echo.range);
   const double margin =
       detection_.margin(static_cast<double>(echo.reflectivity) * weather_.left_after(range),
-                        std::max(range, kNearest));
+                        std::max(range, kNearestSignal));
   return detection_.probability(more * margin) - detection_.probability(less * margin) > 0.05;
 }
 
@@ -129,18 +129,17 @@ float ReturnModel::rounded(double range) const {
   return static_cast<float>(range);
 }
 
-Return ReturnModel::from_surface(const Echo& echo, const BeamChance& chance) const {
-  const auto range = static_cast<double>(echo.range);
-  const double near = std::max(range, kNearest);
-  const double reflectivity = static_cast<double>(echo.reflectivity) * weather_.left_after(range);
-  double margin = std::numeric_limits<double>::infinity();
-  if (!detection_.is_ideal()) {
-    margin = detection_.margin(reflectivity, near);
-    if (chance.detection >= detection_.probability(margin)) return {};
-  }
+/// Reflectivity of a target in clear air that would be as bright.
+double ReturnModel::left_of(const Echo& echo) const {
+  const auto reflectivity = static_cast<double>(echo.reflectivity);
+  if (weather_.is_clear()) return reflectivity;
+  return reflectivity * weather_.left_after(static_cast<double>(echo.range));
+}
+
+Return ReturnModel::from_surface(const Echo& echo, double reflectivity, float measured) const {
+  const double near = std::max(static_cast<double>(echo.range), kNearestSignal);
   Return made;
-  made.range = rounded(range + range_sigma(range, margin) * chance.normal);
-  if (static_cast<double>(made.range) < range_min_) return {};
+  made.range = measured;
   made.intensity = intensity_scale_ > 0.0
                        ? static_cast<float>(std::min(kBrightest, intensity_scale_ * reflectivity))
                        : echo.intensity;
@@ -156,7 +155,7 @@ Return ReturnModel::from_surface(const Echo& echo, const BeamChance& chance) con
 /// What fog or a drop within `range` gives. Its margin is by the pure link budget from the darkest
 /// rated target on: sheets say nothing of signals so near and so weak, and their own law, which the
 /// sun flattens, would let a sensor see every wisp of haze.
-Return ReturnModel::from_air(double range, const BeamChance& chance) const {
+Return ReturnModel::from_air(double range, const EchoChance& chance) const {
   const auto soft = weather_.soft(range, chance.drop, chance.drop_position);
   if (!soft || soft->range < range_min_) return {};
   const double margin = soft->strength / detection_.least_strength();
@@ -172,60 +171,149 @@ Return ReturnModel::from_air(double range, const BeamChance& chance) const {
   return made;
 }
 
-std::size_t ReturnModel::measure(std::span<const Echo> echoes,
-                                 const ChanceOf& chance_of,
-                                 std::span<Return> returns) const {
-  const BeamChance first = chance_of(0);
-  if (first.detection < false_alarm_) {
-    returns[0] = {};
-    returns[0].range = rounded(range_min_ + (reach_ - range_min_) * first.place);
-    returns[0].true_range = returns[0].range;
-    returns[0].label = kFalseReturn;
-    return 1;
-  }
-  std::array<Return, Echoes::kMost + 1> seen;
-  std::size_t count = 0;
-  for (std::size_t k = 0; k < echoes.size(); ++k) {
-    seen[count] = from_surface(echoes[k], k == 0 ? first : chance_of(k));
-    count += seen[count].is_return() ? 1 : 0;
-  }
-  if (!weather_.is_clear()) {
-    const double end = echoes.empty() ? reach_ : static_cast<double>(echoes.back().range);
-    seen[count] = from_air(end, chance_of(Echoes::kMost));
-    count += seen[count].is_return() ? 1 : 0;
-  }
-  if (count == 0) return 0;
-  const auto all = std::span(seen).first(count);
-  const auto is_nearer = [](const Return& a, const Return& b) { return a.range < b.range; };
-  if (mode_ == ReturnMode::kFirst) {
-    returns[0] = *std::ranges::min_element(all, is_nearer);
-    return 1;
-  }
-  if (mode_ == ReturnMode::kLast) {
-    returns[0] = *std::ranges::max_element(all, is_nearer);
-    return 1;
-  }
-  std::ranges::stable_sort(
-      all, [](const Return& a, const Return& b) { return a.strength > b.strength; });
-  returns[0] = all[0];
-  if (mode_ == ReturnMode::kDual && count > 1) {
-    const auto last = std::ranges::max_element(all, is_nearer);
-    returns[1] = last == all.begin() ? all[1] : *last;
-    return 2;
-  }
-  const std::size_t reported = std::min(count, most_returns(mode_));
-  std::copy(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(reported), returns.begin());
-  return reported;
+/// A false alarm.
+Return ReturnModel::from_nothing(double place) const {
+  Return made;
+  made.range = rounded(range_min_ + (reach_ - range_min_) * place);
+  made.true_range = made.range;
+  made.label = kFalseReturn;
+  return made;
 }
 
-Return ReturnModel::measure(const Hit& hit, const BeamChance& chance) const {
-  const Echo echo = echo_of(hit);
-  std::array<Return, 3> returns;
-  const std::size_t count = measure(
-      hit.is_return() ? std::span(&echo, 1) : std::span<const Echo>(),
-      [&](std::size_t) { return chance; },
-      returns);
-  return count > 0 ? returns[0] : Return{};
+/// Which of a beam's returns are reported: into the first of `returns`.
+void ReturnModel::choose(std::span<Return> seen, std::span<Return> returns) const {
+  if (seen.size() == 1) {
+    returns[0] = seen[0];
+    return;
+  }
+  const auto is_nearer = [](const Return& a, const Return& b) { return a.range < b.range; };
+  if (mode_ == ReturnMode::kFirst) {
+    returns[0] = *std::ranges::min_element(seen, is_nearer);
+    return;
+  }
+  if (mode_ == ReturnMode::kLast) {
+    returns[0] = *std::ranges::max_element(seen, is_nearer);
+    return;
+  }
+  // the strongest first, of equals the nearest; a handful
+  for (std::size_t i = 1; i < seen.size(); ++i) {
+    for (std::size_t k = i; k > 0 && seen[k].strength > seen[k - 1].strength; --k) {
+      std::swap(seen[k], seen[k - 1]);
+    }
+  }
+  returns[0] = seen[0];
+  if (mode_ == ReturnMode::kDual) {
+    const auto last = std::ranges::max_element(seen, is_nearer);
+    returns[1] = last == seen.begin() ? seen[1] : *last;
+    return;
+  }
+  const std::size_t reported = std::min(seen.size(), most_returns(mode_));
+  std::copy(seen.begin(), seen.begin() + static_cast<std::ptrdiff_t>(reported), returns.begin());
+}
+
+/// The signals of some beams that follow each other.
+struct ReturnModel::Block {
+  SignalBlock signals;
+  std::array<Echo, SignalBlock::kMost> echoes;
+  std::size_t first = 0;                                  ///< Beam
+  std::size_t beams = 0;                                  ///< How many.
+  std::array<std::uint8_t, SignalBlock::kMost> counts{};  ///< Echoes of each.
+};
+
+/// Measures a block's signals and reports what its beams see, but for false alarms, which have no
+/// echoes.
+void ReturnModel::report(Block& block,
+                         const BeamChances& chances,
+                         std::span<Return> returns) const {
+  SignalFigures figures = detection_.figures();
+  figures.range_sigma = noise_.range_sigma;
+  figures.range_sigma_per_m2 = noise_.range_sigma_per_m2;
+  figures.range_sigma_at_limit = noise_.range_sigma_at_limit;
+  figures.range_step = noise_.range_step;
+  measure_signals(figures, block.signals);
+  const std::size_t most = most_returns(mode_);
+  std::array<Return, Echoes::kMost + 1> seen;
+  std::size_t signal = 0;
+  for (std::size_t i = 0; i < block.beams; ++i) {
+    const std::size_t beam = block.first + i;
+    if (chances.detection[beam] < false_alarm_) continue;
+    std::size_t count = 0;
+    const std::size_t end = signal + block.counts[i];
+    for (; signal < end; ++signal) {
+      const float measured = block.signals.measured[signal];
+      if (static_cast<double>(measured) < range_min_ || measured < 0.0f) continue;
+      seen[count++] =
+          from_surface(block.echoes[signal], block.signals.reflectivity[signal], measured);
+    }
+    if (!weather_.is_clear()) {
+      const double before =
+          block.counts[i] == 0 ? reach_ : static_cast<double>(block.echoes[end - 1].range);
+      seen[count] = from_air(before, chances.more(beam, Echoes::kMost));
+      count += seen[count].is_return() ? 1 : 0;
+    }
+    if (count > 0) choose(std::span(seen).first(count), returns.subspan(beam * most, most));
+  }
+}
+
+template <class EchoesOf>
+void ReturnModel::measure_all(std::size_t count,
+                              const EchoesOf& echoes_of,
+                              const BeamChances& chances,
+                              std::span<Return> returns) const {
+  std::ranges::fill(returns, Return{});
+  const std::size_t most = most_returns(mode_);
+  Block block;
+  for (std::size_t i = 0; i < count; ++i) {
+    const bool is_full = block.beams == block.counts.size() ||
+                         block.signals.count + Echoes::kMost > SignalBlock::kMost;
+    if (is_full) {
+      report(block, chances, returns);
+      block.first = i;
+      block.beams = 0;
+      block.signals.count = 0;
+    }
+    std::uint8_t& echoes = block.counts[block.beams++];
+    echoes = 0;
+    if (chances.detection[i] < false_alarm_) {
+      returns[i * most] = from_nothing(chances.place[i]);
+      continue;
+    }
+    echoes_of(i, [&](const Echo& echo) {
+      SignalBlock& signals = block.signals;
+      const std::size_t at = signals.count++;
+      block.echoes[at] = echo;
+      signals.range[at] = static_cast<double>(echo.range);
+      signals.reflectivity[at] = left_of(echo);
+      if (echoes == 0) {
+        signals.normal[at] = chances.normal[i];
+        signals.detection[at] = chances.detection[i];
+      } else {
+        const EchoChance chance = chances.more(i, echoes);
+        signals.normal[at] = chance.normal;
+        signals.detection[at] = chance.detection;
+      }
+      ++echoes;
+    });
+  }
+  report(block, chances, returns);
+}
+
+void ReturnModel::measure(std::span<const Echoes> echoes,
+                          const BeamChances& chances,
+                          std::span<Return> returns) const {
+  const auto echoes_of = [&](std::size_t i, const auto& take) {
+    for (const Echo& echo : echoes[i].span()) take(echo);
+  };
+  measure_all(echoes.size(), echoes_of, chances, returns);
+}
+
+void ReturnModel::measure(std::span<const Hit> hits,
+                          const BeamChances& chances,
+                          std::span<Return> returns) const {
+  const auto echoes_of = [&](std::size_t i, const auto& take) {
+    if (hits[i].is_return()) take(echo_of(hits[i]));
+  };
+  measure_all(hits.size(), echoes_of, chances, returns);
 }
 
 }  // namespace pointflight

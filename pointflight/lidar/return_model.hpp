@@ -36,17 +36,22 @@ void describe(SettingsVisitor& visitor, Surroundings& surroundings);
 /// The same with the map's own scale of reflectivities if they give none.
 Surroundings surroundings_in(const SurfelMap& map, Surroundings surroundings);
 
-/// The random part of one beam.
-struct BeamChance {
+/// The random part of one echo.
+struct EchoChance {
   double normal = 0.0;         ///< Standard normal, of the range.
   double detection = 0.0;      ///< Uniform in [0, 1): whether it comes back.
-  double place = 0.0;          ///< Uniform in [0, 1): where a false return lies.
   double drop = 0.0;           ///< Uniform in [0, 1): what the air gives back (`Weather::soft`).
   double drop_position = 0.0;  ///< Uniform in [0, 1).
 };
 
-/// The random part of each echo of a beam; that of the air is `Echoes::kMost`.
-using ChanceOf = std::function<BeamChance(std::size_t echo)>;
+/// The random part of some beams: of most, only the nearest echo's counts.
+struct BeamChances {
+  std::span<const double> normal;     ///< Of the nearest echo of each beam: standard normal.
+  std::span<const double> detection;  ///< Uniform in [0, 1): whether it comes back.
+  std::span<const double> place;      ///< Uniform in [0, 1): where a false return lies.
+  /// Of an echo that is not the nearest; of what the air gives back the echo is `Echoes::kMost`.
+  std::function<EchoChance(std::size_t beam, std::size_t echo)> more;
+};
 
 /// One return as the sensor reports it.
 struct Return {
@@ -87,20 +92,32 @@ class ReturnModel {
   /// True if scaling the echo's energy by `less` or `more` changes its probability of detection by
   /// more than 0.05.
   [[nodiscard]] bool is_marginal(const Echo& echo, double less, double more) const;
-  /// What the sensor reports of a beam's echoes, the nearest first, whose ranges are what it
-  /// measures: at most `most_returns`, the strongest first. None if nothing comes back, or from
-  /// nearer than the sensor's least range. A beam whose draw lies below the false alarms' share
-  /// reports a range anywhere. What is in the air before the last echo counts as one more, if it is
-  /// stronger than the surface behind it. Returns how many.
-  std::size_t measure(std::span<const Echo> echoes,
-                      const ChanceOf& chance_of,
-                      std::span<Return> returns) const;
-  /// The same of a beam that is a line, all draws from one chance.
-  [[nodiscard]] Return measure(const Hit& hit, const BeamChance& chance) const;
+  /// What the sensor reports of each beam's echoes, the nearest first, whose ranges are what it
+  /// measures: at most `most_returns`, the strongest first, the others none; all in `returns`, beam
+  /// by beam. None if nothing comes back, or from nearer than the sensor's least range. A beam
+  /// whose draw lies below the false alarms' share reports a range anywhere. What is in the air
+  /// before the last echo counts as one more, if it is stronger than the surface behind it.
+  void measure(std::span<const Echoes> echoes,
+               const BeamChances& chances,
+               std::span<Return> returns) const;
+  /// The same of beams that are lines.
+  void measure(std::span<const Hit> hits,
+               const BeamChances& chances,
+               std::span<Return> returns) const;
 
  private:
-  [[nodiscard]] Return from_surface(const Echo& echo, const BeamChance& chance) const;
-  [[nodiscard]] Return from_air(double range, const BeamChance& chance) const;
+  struct Block;
+  template <class EchoesOf>
+  void measure_all(std::size_t count,
+                   const EchoesOf& echoes_of,
+                   const BeamChances& chances,
+                   std::span<Return> returns) const;
+  void report(Block& block, const BeamChances& chances, std::span<Return> returns) const;
+  [[nodiscard]] double left_of(const Echo& echo) const;
+  [[nodiscard]] Return from_surface(const Echo& echo, double reflectivity, float measured) const;
+  [[nodiscard]] Return from_air(double range, const EchoChance& chance) const;
+  [[nodiscard]] Return from_nothing(double place) const;
+  void choose(std::span<Return> seen, std::span<Return> returns) const;
   [[nodiscard]] float rounded(double range) const;
 
   RangeNoiseSettings noise_;

@@ -87,6 +87,26 @@ TEST(RandomStream, NormalsHaveTheMomentsOfANormal) {
   EXPECT_NEAR(m4 / kCount, 3.0, 5.0 * std::sqrt(96.0 / kCount));
 }
 
+TEST(RandomStream, ManyDrawsAreTheBitsOfSingleOnes) {
+  const RandomStream random(0x123456789abcdefu, StreamId::kTest, 77);
+  for (const std::uint64_t first : {0ull, 5ull, 0xfffffff0ull, (41ull << 32) - 7}) {
+    for (const std::size_t count : {std::size_t{0},
+                                    std::size_t{1},
+                                    std::size_t{7},
+                                    std::size_t{8},
+                                    std::size_t{1000},
+                                    testing::repeats(std::size_t{100000})}) {
+      std::vector<double> u(count), v(count), a(count), b(count);
+      random.uniform2(first, u, v);
+      random.normal2(first, a, b);
+      for (std::size_t i = 0; i < count; ++i) {
+        ASSERT_EQ(random.uniform2(first + i), (std::array{u[i], v[i]})) << first << ' ' << i;
+        ASSERT_EQ(random.normal2(first + i), (std::array{a[i], b[i]})) << first << ' ' << i;
+      }
+    }
+  }
+}
+
 TEST(RandomStream, AddressesAreIndependent) {
   const RandomStream a(1, StreamId::kLidarRangeNoise, 0);
   const RandomStream other_seed(2, StreamId::kLidarRangeNoise, 0);

@@ -4,12 +4,17 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/math.hpp"
 #include "pointflight/core/random.hpp"
+#include "pointflight/core/resources.hpp"
 #include "pointflight/lidar/lidar.hpp"
+#include "pointflight/render/internal/beam_kernel.hpp"
+#include "tests/lidar/one_beam.hpp"
 #include "tests/support.hpp"
 
 namespace pointflight {
@@ -31,10 +36,19 @@ Hit hit_at(double range, double incidence_deg) {
   return hit;
 }
 
+using testing::BeamChance;
+using testing::measured;
+
 BeamChance chance_of(std::uint64_t i) {
   const RandomStream random(3, StreamId::kTest, 0);
   const auto [detection, place] = random.uniform2(2 * i);
   return {random.normal(2 * i + 1), detection, place};
+}
+
+std::vector<BeamChance> chances_from(std::uint64_t first, std::size_t count) {
+  std::vector<BeamChance> all;
+  for (std::uint64_t i = 0; i < count; ++i) all.push_back(chance_of(first + i));
+  return all;
 }
 
 /// Greatest distance between the distribution of `samples` and the standard normal's, times the
@@ -69,8 +83,8 @@ TEST(ReturnModel, RangeNoiseIsAsTheFormulaSaysAtFiveRangesAndFourIncidences) {
       const double sigma = std::hypot(0.01, 0.06 / margin);
       EXPECT_NEAR(model.range_sigma(range, margin), sigma, 1e-12);
       std::vector<double> samples;
-      for (std::uint64_t i = 0; i < kBeams; ++i) {
-        const Return made = model.measure(hit, chance_of(draw++));
+      const auto chances = chances_from(std::exchange(draw, draw + kBeams), kBeams);
+      for (const Return& made : measured(model, hit, chances)) {
         if (made.range < 0.0f || made.label == kFalseReturn) continue;
         samples.push_back((static_cast<double>(made.range) - range) / sigma);
       }
@@ -88,8 +102,8 @@ TEST(ReturnModel, AsManyComeBackAsTheProbabilitySays) {
   for (const double range : {40.0, 45.0, 50.0, 60.0}) {
     const Hit hit = hit_at(range, 0.0);
     std::uint64_t back = 0;
-    for (std::uint64_t i = 0; i < kBeams; ++i) {
-      back += model.measure(hit, chance_of(i)).range >= 0.0f ? 1 : 0;
+    for (const Return& made : measured(model, hit, chances_from(0, kBeams))) {
+      back += made.range >= 0.0f ? 1 : 0;
     }
     const double expected = detection.probability(detection.margin(0.1, range));
     const double sigma = std::sqrt(expected * (1.0 - expected) / kBeams);
@@ -101,8 +115,7 @@ TEST(ReturnModel, EmptyBeamsReportFalseRangesAnywhere) {
   const ReturnModel model(load_lidar("mid360"), Surroundings{});
   std::vector<double> ranges;
   constexpr std::uint64_t kBeams = 1000000;
-  for (std::uint64_t i = 0; i < kBeams; ++i) {
-    const Return made = model.measure(Hit{}, chance_of(i));
+  for (const Return& made : measured(model, Hit{}, chances_from(0, kBeams))) {
     if (made.range < 0.0f) continue;
     EXPECT_EQ(made.label, kFalseReturn);
     ranges.push_back(static_cast<double>(made.range));
@@ -118,24 +131,88 @@ TEST(ReturnModel, RangesAreWholeSteps) {
   const ReturnModel model(vlp, Surroundings{});
   for (std::uint64_t i = 0; i < 100; ++i) {
     const double steps =
-        static_cast<double>(model.measure(hit_at(17.3, 0.0), chance_of(i)).range) / 0.004;
+        static_cast<double>(measured(model, hit_at(17.3, 0.0), chance_of(i)).range) / 0.004;
     EXPECT_NEAR(steps, std::round(steps), 1e-3);
   }
+}
+
+/// A return by the formulas of the public functions, one by one.
+float range_by_formula(const ReturnModel& model,
+                       const LidarSettings& lidar,
+                       const DetectionModel& detection,
+                       const Hit& hit,
+                       const BeamChance& chance) {
+  const auto range = static_cast<double>(hit.range);
+  const double margin = detection.margin(
+      static_cast<double>(static_cast<float>(model.reflectivity(hit))), std::max(range, 0.01));
+  if (chance.detection >= detection.probability(margin)) return -1.0f;
+  double made = range + model.range_sigma(range, margin) * chance.normal;
+  const double step = lidar.noise.range_step;
+  if (step > 0.0) made = step * std::floor(made / step + 0.5);
+  const auto rounded = static_cast<float>(made);
+  return static_cast<double>(rounded) < lidar.range_min ? -1.0f : rounded;
+}
+
+TEST(ReturnModel, ManyBeamsAreTheBitsOfTheFormulasWithEveryInstructionSet) {
+  const std::size_t beams = testing::repeats(std::size_t{10001});
+  const RandomStream random(8, StreamId::kTest, 0);
+  std::vector<Hit> hits(beams);
+  std::vector<double> normal(beams), detected(beams), place(beams, 0.5);
+  random.uniform2(1u << 20u, detected, place);
+  std::vector<double> unused(beams);
+  random.normal2(1u << 21u, normal, unused);
+  for (std::size_t i = 0; i < beams; ++i) {
+    const auto [near, cosine] = random.uniform2(i);
+    if (i % 7 == 3) continue;  // hits nothing
+    // from 1 mm to 300 m, by decades
+    hits[i].range = static_cast<float>(0.001 * std::pow(3e5, near));
+    hits[i].cos_incidence = static_cast<float>(cosine);
+    hits[i].surfel = static_cast<std::uint32_t>(i);
+  }
+  std::size_t back = 0;
+  for (const std::string& name : model_names("lidars")) {
+    const LidarSettings lidar = load_lidar(name);
+    if (lidar.detection.rated.empty()) continue;
+    const ReturnModel model(lidar, Surroundings{});
+    const DetectionModel detection(lidar.detection, Surroundings{}.sun_klx);
+    for (const std::string& kernel : kernel_names()) {
+      use_kernel(kernel);
+      const std::size_t most = most_returns(lidar.detection.returns);
+      std::vector<Return> made(beams * most);
+      model.measure(hits, {normal, detected, place, {}}, made);
+      for (std::size_t i = 0; i < beams; ++i) {
+        const Return& one = made[i * most];
+        if (detected[i] < lidar.detection.false_alarm) {
+          EXPECT_EQ(one.label, kFalseReturn);
+          continue;
+        }
+        const float expected =
+            hits[i].is_return()
+                ? range_by_formula(model, lidar, detection, hits[i], {normal[i], detected[i]})
+                : -1.0f;
+        ASSERT_EQ(one.range, expected) << name << ' ' << kernel << ' ' << i;
+        back += one.is_return() ? 1 : 0;
+      }
+    }
+  }
+  use_kernel("");
+  EXPECT_GT(back, beams);
 }
 
 TEST(ReturnModel, ReportsTheIntensityInTheSensorsUnit) {
   Surroundings where = reflecting(0.4);
   const Hit slanted = hit_at(10.0, 60.0);
-  EXPECT_NEAR(ReturnModel(load_lidar("mid360"), where).measure(slanted, {0, 0.5, 0}).intensity,
+  EXPECT_NEAR(measured(ReturnModel(load_lidar("mid360"), where), slanted, {0, 0.5, 0}).intensity,
               150.0 * 0.4 * 0.5,
               1e-3);
   where.reflectivity_per_intensity = 0.01;
   Hit bright = hit_at(10.0, 0.0);
   bright.intensity = 90.0f;
-  EXPECT_NEAR(
-      ReturnModel(load_lidar("os1_32"), where).measure(bright, {0, 0.5, 0}).intensity, 90.0, 1e-3);
+  EXPECT_NEAR(measured(ReturnModel(load_lidar("os1_32"), where), bright, {0, 0.5, 0}).intensity,
+              90.0,
+              1e-3);
   bright.intensity = 1e6f;  // a reflector
-  EXPECT_EQ(ReturnModel(load_lidar("os1_32"), where).measure(bright, {0, 0.5, 0}).intensity,
+  EXPECT_EQ(measured(ReturnModel(load_lidar("os1_32"), where), bright, {0, 0.5, 0}).intensity,
             255.0f);
 }
 

@@ -9,6 +9,7 @@
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/random.hpp"
 #include "pointflight/lidar/return_model.hpp"
+#include "tests/lidar/one_beam.hpp"
 #include "tests/support.hpp"
 
 namespace pointflight {
@@ -159,7 +160,8 @@ std::pair<double, double> shares(const Surroundings& around, double range) {
     const auto [normal, unused] = random.normal2(3 * i);
     const auto [detection, place] = random.uniform2(3 * i + 1);
     const auto [drop, drop_position] = random.uniform2(3 * i + 2);
-    const Return made = model.measure(wall, {normal, detection, place, drop, drop_position});
+    const Return made =
+        testing::measured(model, wall, {normal, detection, place, drop, drop_position});
     if (made.range < 0.0f) continue;
     (made.label == kFalseReturn ? of_air : of_wall)++;
   }
