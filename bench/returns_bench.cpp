@@ -70,7 +70,10 @@ Times times_of(const char* name, const Renderer& renderer, const PoseTrack& trac
   return times;
 }
 
-void bench(const std::string& path, const std::vector<double>& place, int repeats) {
+void bench(const std::string& path,
+           const std::vector<double>& place,
+           const std::string& only,
+           int repeats) {
   const auto renderer = make_renderer("beam", Scene{SurfelMap::open(path)});
   const PoseTrack still(Pose{Quaterniond::Identity(), {place[0], place[1], place[2]}});
   fmt::print("{:<10} {:<6} {:>8} {:>14} {:>12} {:>14} {:>10}\n",
@@ -83,6 +86,7 @@ void bench(const std::string& path, const std::vector<double>& place, int repeat
              "share");
   for (const char* name : {"os1_128", "vlp32c", "mid360", "avia"}) {
     for (const std::string& kernel : kernel_names()) {
+      if (!only.empty() && kernel != only) continue;
       use_kernel(kernel);
       const Times t = times_of(name, *renderer, still, repeats);
       const double beams = 1e-9 * static_cast<double>(t.beams);
@@ -108,13 +112,15 @@ int main(int argc, char** argv) {
   CLI::App app("What returns cost");
   std::string map;
   std::vector<double> place = {0.0, 0.0, 1.0};
+  std::string only;
   int repeats = 15;
   app.add_option("map", map, "A .pfmap")->required();
   app.add_option("place", place, "x,y,z of the sensor")->delimiter(',')->expected(3);
+  app.add_option("--cpu", only, "This instruction set alone: AVX2");
   app.add_option("--repeats", repeats, "Of each")->check(CLI::Range(1, 1000));
   CLI11_PARSE(app, argc, argv);
   try {
-    pointflight::bench(map, place, repeats);
+    pointflight::bench(map, place, only, repeats);
   } catch (const pointflight::InputError& e) {
     fmt::print(stderr, "returns_bench: {}\n", e.what());
     return 2;

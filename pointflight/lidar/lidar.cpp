@@ -10,6 +10,7 @@
 #include "pointflight/core/math.hpp"
 #include "pointflight/core/random.hpp"
 #include "pointflight/lidar/internal/aimed.hpp"
+#include "pointflight/lidar/internal/direction_kernel.hpp"
 
 namespace pointflight {
 namespace {
@@ -143,17 +144,7 @@ void Lidar::add_direction_noise(Aimed& aimed, const Executor& executor) const {
     random.normal2(request.index << 32 | begin,
                    std::span(us).first(end - begin),
                    std::span(vs).first(end - begin));
-    for (std::size_t i = begin; i < end; ++i) {
-      const double u = us[i - begin];
-      const double v = vs[i - begin];
-      const Vector3d d = rays[i].direction_world.cast<double>();
-      // any two axes across will do: the noise has none
-      const Vector3d across =
-          (std::abs(d.z()) < 0.9 ? d.cross(Vector3d::UnitZ()) : d.cross(Vector3d::UnitX()))
-              .normalized();
-      rays[i].direction_world =
-          (d + sigma * (u * across + v * d.cross(across))).normalized().cast<float>();
-    }
+    turn_rays(rays.data() + begin, end - begin, us.data(), vs.data(), sigma);
   });
 }
 

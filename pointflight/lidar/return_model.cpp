@@ -38,6 +38,16 @@ double usual_reflectivity(std::uint32_t surfel) {
   return static_cast<double>(all[(surfel * 2654435769u) >> 20]);
 }
 
+/// Of a hit of a beam that is a line.
+Echo echo_with(const Hit& hit, float reflectivity) {
+  return {.range = hit.range,
+          .reflectivity = reflectivity,
+          .intensity = hit.intensity,
+          .label = hit.label,
+          .parts = 1,
+          .origin = {hit.cos_incidence, hit.surfel}};
+}
+
 /// Mean full angle of the beam, rad.
 double divergence_of(const OpticsSettings& optics) {
   const double mean =
@@ -100,12 +110,7 @@ double ReturnModel::reflectivity(const Hit& hit) const {
 
 Echo ReturnModel::echo_of(const Hit& hit) const {
   if (!hit.is_return()) return {};
-  return {.range = hit.range,
-          .reflectivity = static_cast<float>(reflectivity(hit)),
-          .intensity = hit.intensity,
-          .label = hit.label,
-          .parts = 1,
-          .origin = {hit.cos_incidence, hit.surfel}};
+  return echo_with(hit, static_cast<float>(reflectivity(hit)));
 }
 
 bool ReturnModel::is_marginal(const Echo& echo, double less, double more) const {
@@ -129,16 +134,12 @@ float ReturnModel::rounded(double range) const {
   return static_cast<float>(range);
 }
 
-/// Reflectivity of a target in clear air that would be as bright.
-double ReturnModel::left_of(const Echo& echo) const {
-  const auto reflectivity = static_cast<double>(echo.reflectivity);
-  if (weather_.is_clear()) return reflectivity;
-  return reflectivity * weather_.left_after(static_cast<double>(echo.range));
-}
-
-Return ReturnModel::from_surface(const Echo& echo, double reflectivity, float measured) const {
+/// What `echo` reports that is measured at `measured`; of `reflectivity`, what the air has left.
+void ReturnModel::take_surface(const Echo& echo,
+                               double reflectivity,
+                               float measured,
+                               Return& made) const {
   const double near = std::max(static_cast<double>(echo.range), kNearestSignal);
-  Return made;
   made.range = measured;
   made.intensity = intensity_scale_ > 0.0
                        ? static_cast<float>(std::min(kBrightest, intensity_scale_ * reflectivity))
@@ -149,7 +150,6 @@ Return ReturnModel::from_surface(const Echo& echo, double reflectivity, float me
   made.origin = echo.origin;
   made.parts = echo.parts;
   made.depth = echo.depth;
-  return made;
 }
 
 /// What fog or a drop within `range` gives. Its margin is by the pure link budget from the darkest
@@ -214,40 +214,35 @@ void ReturnModel::choose(std::span<Return> seen, std::span<Return> returns) cons
 /// The signals of some beams that follow each other.
 struct ReturnModel::Block {
   SignalBlock signals;
-  std::array<Echo, SignalBlock::kMost> echoes;
-  std::size_t first = 0;                                  ///< Beam
-  std::size_t beams = 0;                                  ///< How many.
-  std::array<std::uint8_t, SignalBlock::kMost> counts{};  ///< Echoes of each.
+  std::size_t first = 0;                                ///< Beam
+  std::size_t beams = 0;                                ///< How many.
+  std::array<std::uint8_t, SignalBlock::kMost> counts;  ///< Signals of each.
 };
 
-/// Measures a block's signals and reports what its beams see, but for false alarms, which have no
-/// echoes.
-void ReturnModel::report(Block& block,
+/// Reports what the beams of a block see by its measured signals. False alarms have none.
+template <class Seen>
+void ReturnModel::report(const Block& block,
+                         const Seen& seen_by,
                          const BeamChances& chances,
                          std::span<Return> returns) const {
-  SignalFigures figures = detection_.figures();
-  figures.range_sigma = noise_.range_sigma;
-  figures.range_sigma_per_m2 = noise_.range_sigma_per_m2;
-  figures.range_sigma_at_limit = noise_.range_sigma_at_limit;
-  figures.range_step = noise_.range_step;
-  measure_signals(figures, block.signals);
   const std::size_t most = most_returns(mode_);
+  const bool is_clear = weather_.is_clear();
   std::array<Return, Echoes::kMost + 1> seen;
   std::size_t signal = 0;
   for (std::size_t i = 0; i < block.beams; ++i) {
     const std::size_t beam = block.first + i;
-    if (chances.detection[beam] < false_alarm_) continue;
     std::size_t count = 0;
-    const std::size_t end = signal + block.counts[i];
-    for (; signal < end; ++signal) {
+    for (std::size_t k = 0; k < block.counts[i]; ++k, ++signal) {
       const float measured = block.signals.measured[signal];
-      if (static_cast<double>(measured) < range_min_ || measured < 0.0f) continue;
-      seen[count++] =
-          from_surface(block.echoes[signal], block.signals.reflectivity[signal], measured);
+      if (measured < 0.0f || static_cast<double>(measured) < range_min_) continue;
+      // of one echo in clear air there is nothing to choose
+      Return& made = is_clear && block.counts[i] == 1 ? returns[beam * most] : seen[count++];
+      take_surface(seen_by.echo(beam, k), block.signals.reflectivity[signal], measured, made);
     }
-    if (!weather_.is_clear()) {
+    if (!is_clear && !(chances.detection[beam] < false_alarm_)) {
       const double before =
-          block.counts[i] == 0 ? reach_ : static_cast<double>(block.echoes[end - 1].range);
+          block.counts[i] == 0 ? reach_
+                               : static_cast<double>(seen_by.echo(beam, block.counts[i] - 1).range);
       seen[count] = from_air(before, chances.more(beam, Echoes::kMost));
       count += seen[count].is_return() ? 1 : 0;
     }
@@ -255,65 +250,92 @@ void ReturnModel::report(Block& block,
   }
 }
 
-template <class EchoesOf>
+template <class Seen>
 void ReturnModel::measure_all(std::size_t count,
-                              const EchoesOf& echoes_of,
+                              const Seen& seen_by,
                               const BeamChances& chances,
                               std::span<Return> returns) const {
-  std::ranges::fill(returns, Return{});
+  SignalFigures figures = detection_.figures();
+  figures.range_sigma = noise_.range_sigma;
+  figures.range_sigma_per_m2 = noise_.range_sigma_per_m2;
+  figures.range_sigma_at_limit = noise_.range_sigma_at_limit;
+  figures.range_step = noise_.range_step;
   const std::size_t most = most_returns(mode_);
+  const bool is_clear = weather_.is_clear();
   Block block;
-  for (std::size_t i = 0; i < count; ++i) {
-    const bool is_full = block.beams == block.counts.size() ||
-                         block.signals.count + Echoes::kMost > SignalBlock::kMost;
-    if (is_full) {
-      report(block, chances, returns);
-      block.first = i;
-      block.beams = 0;
-      block.signals.count = 0;
-    }
-    std::uint8_t& echoes = block.counts[block.beams++];
-    echoes = 0;
-    if (chances.detection[i] < false_alarm_) {
-      returns[i * most] = from_nothing(chances.place[i]);
-      continue;
-    }
-    echoes_of(i, [&](const Echo& echo) {
-      SignalBlock& signals = block.signals;
-      const std::size_t at = signals.count++;
-      block.echoes[at] = echo;
-      signals.range[at] = static_cast<double>(echo.range);
-      signals.reflectivity[at] = left_of(echo);
-      if (echoes == 0) {
-        signals.normal[at] = chances.normal[i];
-        signals.detection[at] = chances.detection[i];
-      } else {
-        const EchoChance chance = chances.more(i, echoes);
-        signals.normal[at] = chance.normal;
-        signals.detection[at] = chance.detection;
+  SignalBlock& signals = block.signals;
+  for (std::size_t i = 0; i < count;) {
+    block.first = i;
+    block.beams = 0;
+    signals.count = 0;
+    for (; i < count && block.beams < block.counts.size() &&
+           signals.count + Echoes::kMost <= SignalBlock::kMost;
+         ++i) {
+      std::uint8_t& echoes = block.counts[block.beams++];
+      echoes = 0;
+      if (chances.detection[i] < false_alarm_) {
+        returns[i * most] = from_nothing(chances.place[i]);
+        continue;
       }
-      ++echoes;
-    });
+      seen_by.signals(i, [&](float range, float reflectivity) {
+        const std::size_t at = signals.count++;
+        signals.range[at] = static_cast<double>(range);
+        const double left = is_clear ? 1.0 : weather_.left_after(signals.range[at]);
+        signals.reflectivity[at] = static_cast<double>(reflectivity) * left;
+        if (echoes == 0) {
+          signals.normal[at] = chances.normal[i];
+          signals.detection[at] = chances.detection[i];
+        } else {
+          const EchoChance chance = chances.more(i, echoes);
+          signals.normal[at] = chance.normal;
+          signals.detection[at] = chance.detection;
+        }
+        ++echoes;
+      });
+    }
+    measure_signals(figures, signals);
+    report(block, seen_by, chances, returns);
   }
-  report(block, chances, returns);
 }
+
+namespace {
+
+/// Beams that were traced to their echoes.
+struct SeenEchoes {
+  std::span<const Echoes> all;
+  template <class Take>
+  void signals(std::size_t beam, const Take& take) const {
+    for (const Echo& echo : all[beam].span()) take(echo.range, echo.reflectivity);
+  }
+  [[nodiscard]] const Echo& echo(std::size_t beam, std::size_t k) const { return all[beam].all[k]; }
+};
+
+/// Beams that are lines.
+struct SeenHits {
+  std::span<const Hit> all;
+  const ReturnModel& model;
+  template <class Take>
+  void signals(std::size_t beam, const Take& take) const {
+    const Hit& hit = all[beam];
+    if (hit.is_return()) take(hit.range, static_cast<float>(model.reflectivity(hit)));
+  }
+  [[nodiscard]] Echo echo(std::size_t beam, std::size_t /*k*/) const {
+    return echo_with(all[beam], 0.0f);
+  }
+};
+
+}  // namespace
 
 void ReturnModel::measure(std::span<const Echoes> echoes,
                           const BeamChances& chances,
                           std::span<Return> returns) const {
-  const auto echoes_of = [&](std::size_t i, const auto& take) {
-    for (const Echo& echo : echoes[i].span()) take(echo);
-  };
-  measure_all(echoes.size(), echoes_of, chances, returns);
+  measure_all(echoes.size(), SeenEchoes{echoes}, chances, returns);
 }
 
 void ReturnModel::measure(std::span<const Hit> hits,
                           const BeamChances& chances,
                           std::span<Return> returns) const {
-  const auto echoes_of = [&](std::size_t i, const auto& take) {
-    if (hits[i].is_return()) take(echo_of(hits[i]));
-  };
-  measure_all(hits.size(), echoes_of, chances, returns);
+  measure_all(hits.size(), SeenHits{hits, *this}, chances, returns);
 }
 
 }  // namespace pointflight

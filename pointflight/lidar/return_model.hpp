@@ -93,8 +93,8 @@ class ReturnModel {
   /// more than 0.05.
   [[nodiscard]] bool is_marginal(const Echo& echo, double less, double more) const;
   /// What the sensor reports of each beam's echoes, the nearest first, whose ranges are what it
-  /// measures: at most `most_returns`, the strongest first, the others none; all in `returns`, beam
-  /// by beam. None if nothing comes back, or from nearer than the sensor's least range. A beam
+  /// measures: at most `most_returns`, the strongest first, into `returns`, beam by beam, which are
+  /// none as yet. None if nothing comes back, or from nearer than the sensor's least range. A beam
   /// whose draw lies below the false alarms' share reports a range anywhere. What is in the air
   /// before the last echo counts as one more, if it is stronger than the surface behind it.
   void measure(std::span<const Echoes> echoes,
@@ -107,14 +107,17 @@ class ReturnModel {
 
  private:
   struct Block;
-  template <class EchoesOf>
+  template <class Seen>
   void measure_all(std::size_t count,
-                   const EchoesOf& echoes_of,
+                   const Seen& seen_by,
                    const BeamChances& chances,
                    std::span<Return> returns) const;
-  void report(Block& block, const BeamChances& chances, std::span<Return> returns) const;
-  [[nodiscard]] double left_of(const Echo& echo) const;
-  [[nodiscard]] Return from_surface(const Echo& echo, double reflectivity, float measured) const;
+  template <class Seen>
+  void report(const Block& block,
+              const Seen& seen_by,
+              const BeamChances& chances,
+              std::span<Return> returns) const;
+  void take_surface(const Echo& echo, double reflectivity, float measured, Return& made) const;
   [[nodiscard]] Return from_air(double range, const EchoChance& chance) const;
   [[nodiscard]] Return from_nothing(double place) const;
   void choose(std::span<Return> seen, std::span<Return> returns) const;

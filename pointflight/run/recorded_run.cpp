@@ -28,6 +28,12 @@ constexpr std::size_t kStateColumns = 19;  // of trajectory.csv, before the roto
 
 }  // namespace
 
+std::shared_ptr<const Simulation> simulation_of_run(const std::string& folder,
+                                                    const Executor& executor) {
+  const Scenario scenario = load_scenario((fs::path(folder) / "scenario.yaml").string());
+  return std::make_shared<const Simulation>(scenario, scenario.open_map(), executor);
+}
+
 struct RecordedRun::Files {
   /// What comes after what in a step.
   enum class Phase { kSamples, kObstacles, kArrears };
@@ -41,10 +47,11 @@ struct RecordedRun::Files {
     std::function<Sample()> make;
   };
 
-  Files(const std::string& folder, const Executor& with)
+  Files(const std::string& folder, std::shared_ptr<const Simulation> of, const Executor& with)
       : executor(with),
-        scenario(load_scenario((fs::path(folder) / "scenario.yaml").string())),
-        simulation(scenario, scenario.open_map(), executor),
+        owned(std::move(of)),
+        simulation(*owned),
+        scenario(simulation.scenario()),
         description(describe_run(simulation)),
         step(from_seconds(scenario.physics_step)),
         end(ended_at(fs::path(folder) / "summary.json")) {
@@ -318,8 +325,9 @@ struct RecordedRun::Files {
   }
 
   const Executor& executor;
-  Scenario scenario;
-  Simulation simulation;  ///< Never stepped: models, shapes, patterns.
+  std::shared_ptr<const Simulation> owned;
+  const Simulation& simulation;  ///< Never stepped: models, shapes, patterns.
+  const Scenario& scenario;
   RunDescription description;
   Duration step;
   SimTime end;
@@ -330,7 +338,12 @@ struct RecordedRun::Files {
 };
 
 RecordedRun::RecordedRun(const std::string& folder, const Executor& executor)
-    : files_(std::make_unique<Files>(folder, executor)) {}
+    : RecordedRun(folder, simulation_of_run(folder, executor), executor) {}
+
+RecordedRun::RecordedRun(const std::string& folder,
+                         std::shared_ptr<const Simulation> simulation,
+                         const Executor& executor)
+    : files_(std::make_unique<Files>(folder, std::move(simulation), executor)) {}
 
 RecordedRun::~RecordedRun() = default;
 

@@ -6,8 +6,14 @@
 
 #include "pointflight/core/parallel.hpp"
 #include "pointflight/sim/run_description.hpp"
+#include "pointflight/sim/simulation.hpp"
 
 namespace pointflight {
+
+/// What a run's folder was written by, for `RecordedRun`: its scenario and map are opened. Throws
+/// InputError. The executor must outlive it.
+std::shared_ptr<const Simulation> simulation_of_run(const std::string& folder,
+                                                    const Executor& executor);
 
 /// A run as its folder has it: states, odometry, IMU and own sensors from their CSV files, scans
 /// from their PCDs, collisions and obstacles. What the scenario did not write is not there.
@@ -16,6 +22,10 @@ class RecordedRun {
   /// Opens the folder's scenario and map. Throws InputError with file and line where something is
   /// missing or cannot be read. The executor must outlive it.
   RecordedRun(const std::string& folder, const Executor& executor);
+  /// The same of a run whose simulation has been made: several runs of one scenario share it.
+  RecordedRun(const std::string& folder,
+              std::shared_ptr<const Simulation> simulation,
+              const Executor& executor);
   ~RecordedRun();
   RecordedRun(const RecordedRun&) = delete;
   RecordedRun& operator=(const RecordedRun&) = delete;

@@ -122,6 +122,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   using namespace pointflight;
   static const FolderOnDisk folder;
   static const Executor executor(1);
+  // made anew for each input they would take most of the time
+  static const std::array simulations = {simulation_of_run(folder.run(false).string(), executor),
+                                         simulation_of_run(folder.run(true).string(), executor)};
   std::string_view text(reinterpret_cast<const char*>(data), size);
   const bool shared = text.starts_with('!');
   if (shared) text.remove_prefix(1);
@@ -132,7 +135,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     write(file, text.substr(std::min(line + 1, text.size())));
     const std::string run_folder = folder.run(shared).string();
     expect_one_line([&] {
-      RecordedRun run(run_folder, executor);
+      RecordedRun run(run_folder, simulations[shared ? 1 : 0], executor);
       play(run, {}, {});
     });
     expect_one_line([&] {
