@@ -139,8 +139,10 @@ void Lidar::add_direction_noise(Aimed& aimed, const Executor& executor) const {
   if (sigma <= 0.0) return;
   const RandomStream random(request.seed, StreamId::kLidarAngle, sensor_);
   executor.parallel_for(rays.size(), kChunk, [&](std::size_t begin, std::size_t end) {
+    // NOLINTBEGIN(cppcoreguidelines-pro-type-member-init): written on the next lines
     std::array<double, kChunk> us;
     std::array<double, kChunk> vs;
+    // NOLINTEND(cppcoreguidelines-pro-type-member-init)
     random.normal2(request.index << 32 | begin,
                    std::span(us).first(end - begin),
                    std::span(vs).first(end - begin));

@@ -214,9 +214,9 @@ void ReturnModel::choose(std::span<Return> seen, std::span<Return> returns) cons
 /// The signals of some beams that follow each other.
 struct ReturnModel::Block {
   SignalBlock signals;
-  std::size_t first = 0;                                ///< Beam
-  std::size_t beams = 0;                                ///< How many.
-  std::array<std::uint8_t, SignalBlock::kMost> counts;  ///< Signals of each.
+  std::size_t first = 0;                                  ///< Beam
+  std::size_t beams = 0;                                  ///< How many.
+  std::array<std::uint8_t, SignalBlock::kMost> counts{};  ///< Signals of each.
 };
 
 /// Reports what the beams of a block see by its measured signals. False alarms have none.

@@ -24,6 +24,7 @@ struct SignalFigures {
 inline constexpr double kNearestSignal = 0.01;  ///< m: those from nearer are as strong.
 
 /// Some signals, each an entry of every array. Large, and set where it is used: not cleared.
+// NOLINTNEXTLINE(cppcoreguidelines-pro-type-member-init): written before it is read
 struct SignalBlock {
   static constexpr std::size_t kMost = 256;
   std::size_t count = 0;
