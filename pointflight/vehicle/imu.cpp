@@ -1,6 +1,7 @@
 #include "pointflight/vehicle/imu.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -107,9 +108,10 @@ Imu::Imu(const VehicleSettings& vehicle, std::uint64_t seed, std::uint32_t numbe
 
 /// Three draws, number `which`.
 Vector3d Imu::normals(StreamId stream, std::uint64_t which) const {
-  const RandomStream random(seed_, stream, vehicle_);
-  const std::uint64_t base = which * 3;
-  return {random.normal(base), random.normal(base + 1), random.normal(base + 2)};
+  std::array<double, 3> draws{};
+  std::array<double, 3> unused{};
+  RandomStream(seed_, stream, vehicle_).normal2(which * 3, draws, unused);
+  return {draws[0], draws[1], draws[2]};
 }
 
 /// Rotors out of balance shake the body across their axes, once per turn; blades along them, once
@@ -194,9 +196,13 @@ void Imu::add_steady_errors(std::uint64_t number,
   const Matrix3d one = Matrix3d::Identity();
   sample.gyro += (gyro_scale_ - one) * rates + gyro_turn_on_ + g_sensitivity_ * force;
   sample.accel += (accel_scale_ - one) * force + accel_turn_on_;
+  constexpr std::size_t kDraws = 3 * FlickerNoise::kProcesses;
+  std::array<double, kDraws> draws{};
+  std::array<double, kDraws> unused{};
   const auto flicker = [&](StreamId stream) {
-    return [this, stream, number](std::size_t k) {
-      return normals(stream, number * FlickerNoise::kProcesses + k);
+    RandomStream(seed_, stream, vehicle_).normal2(number * kDraws, draws, unused);
+    return [&draws](std::size_t k) {
+      return Vector3d(draws[3 * k], draws[3 * k + 1], draws[3 * k + 2]);
     };
   };
   if (gyro_flicker_.deviation() > 0.0) {

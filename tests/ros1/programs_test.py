@@ -132,6 +132,13 @@ class Launch:
             ROS_HOME=f"{folder}/home", ROS_PACKAGE_PATH=f"{SOURCE}/ros_packages/catkin:{folder}/packages",
             STUB_RESULTS=self.results, STUB_HELPERS=HERE, PATH="/usr/bin:/bin",
             STUB_SIM_TIME=str("sim_time:=true" in words))
+        # roslaunch gives up on a master of its own after ten seconds, which a busy machine needs
+        self.master = subprocess.Popen(["/usr/bin/rosmaster", "--core", "-p", str(port)],
+                                       env=environment, stdout=self.log, stderr=self.log)
+        end = time.monotonic() + 120.0
+        while not rosgraph.is_master_online(environment["ROS_MASTER_URI"]):
+            assert self.master.poll() is None and time.monotonic() < end, "rosmaster does not start"
+            time.sleep(0.1)
         self.process = subprocess.Popen(
             ["/usr/bin/roslaunch", "-p", str(port), "pointflight_ros", *words,
              f"program:={PROGRAM}", "rviz:=false"],
@@ -156,6 +163,8 @@ class Launch:
         if self.process.poll() is None:
             self.process.send_signal(signal.SIGINT)
         self.process.wait(timeout=60)
+        self.master.kill()
+        self.master.wait()
         self.log.seek(0)
         return self.log.read()
 
