@@ -81,6 +81,11 @@ found=$(grep -rnE '#include <(fmt|yaml-cpp|nlohmann|tbb|oneapi|nanoflann|xxhash|
         pointflight --include='*.hpp' | grep -vE 'io/byte_cursor.hpp|-inl.hpp|share/dds/|ros/ros[12]/')
 [ -z "$found" ] || { echo "third-party headers in public headers:"; breach "$found"; }
 
+# Pages for users say what is; what was before is in CHANGELOG.md.
+found=$(grep -nE '(an|the) other day|on another day|stood then|used to (be|cost|take)|before this change' README.md docs/*.md |
+        grep -v '^docs/architecture.md:')
+[ -z "$found" ] || { echo "a page for users tells of changes:"; breach "$found"; }
+
 # Each source includes its own header first, so that headers compile alone.
 for source in $(git ls-files 'pointflight/*.cpp' 'apps/*.cpp'); do
   [ -f "${source%.cpp}.hpp" ] || continue
