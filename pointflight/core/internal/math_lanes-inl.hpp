@@ -22,7 +22,10 @@
 #undef POINTFLIGHT_SLEEF_VECTOR
 #undef POINTFLIGHT_SLEEF_PAIR
 #ifdef POINTFLIGHT_HAS_SLEEF_VECTORS
-#if HWY_TARGET == HWY_AVX3
+#if (HWY_TARGET == HWY_AVX3 || HWY_TARGET == HWY_AVX2) && defined(__clang__)
+// clang passes long vectors as the whole source's target does and not as the function's: on the
+// stack, where SLEEF does not look for them
+#elif HWY_TARGET == HWY_AVX3
 #define POINTFLIGHT_SLEEF(name, error) Sleef_cinz_##name##d8_##error##avx512fnofma
 #define POINTFLIGHT_SLEEF_VECTOR __m512d
 #define POINTFLIGHT_SLEEF_PAIR Sleef___m512d_2
