@@ -66,14 +66,14 @@ class RandomStream {
 
   /// Two independent standard normals (Box-Muller; never rejection, which would need state).
   [[nodiscard]] std::array<double, 2> normal2(std::uint64_t index) const;
+  /// The first of `normal2`.
+  [[nodiscard]] double normal(std::uint64_t index) const { return normal2(index)[0]; }
+
   /// `uniform2` of the indices from `first` on, the same bits in a fraction of the time: the first
   /// of each pair to `u`, the second to `v`, which are as long.
   void uniform2(std::uint64_t first, std::span<double> u, std::span<double> v) const;
   /// `normal2`, likewise.
   void normal2(std::uint64_t first, std::span<double> u, std::span<double> v) const;
-
-  /// The first of `normal2`.
-  [[nodiscard]] double normal(std::uint64_t index) const { return normal2(index)[0]; }
 
  private:
   std::uint64_t seed_;

@@ -22,7 +22,8 @@ class RecordedRun {
   /// Opens the folder's scenario and map. Throws InputError with file and line where something is
   /// missing or cannot be read. The executor must outlive it.
   RecordedRun(const std::string& folder, const Executor& executor);
-  /// The same of a run whose simulation has been made: several runs of one scenario share it.
+  /// The same by a simulation that has been made already, of the folder's own scenario: runs of one
+  /// scenario may share it.
   RecordedRun(const std::string& folder,
               std::shared_ptr<const Simulation> simulation,
               const Executor& executor);
