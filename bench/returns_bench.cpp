@@ -55,14 +55,16 @@ Times times_of(const char* name, const Renderer& renderer, const PoseTrack& trac
     static_cast<void>(modelled.aim(request, track, renderer, executor));
     keep_least(times.aim, since);
     const auto plain = ideal.aim(request, track, renderer, executor);
-    while (const auto job = plain->next(executor)) renderer.render({&*job, 1}, executor);
+    const RenderJob job = plain->job();
+    renderer.render({&job, 1}, executor);
     since = cpu_time();
     times.beams = plain->finish(executor).beams;
     keep_least(times.ideal, since);
     request.noise = true;
     const auto scan = modelled.aim(request, track, renderer, executor);
     keep_least(times.aim_noise, since);
-    while (const auto job = scan->next(executor)) renderer.render({&*job, 1}, executor);
+    const RenderJob job = scan->job();
+    renderer.render({&job, 1}, executor);
     keep_least(times.render, since);
     static_cast<void>(scan->finish(executor));
     keep_least(times.finish, since);

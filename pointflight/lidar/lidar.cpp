@@ -165,38 +165,27 @@ RayBatch Lidar::batch_of(const Aimed& aimed) const {
   return batch;
 }
 
-/// A scan under way: beams that are lines are rendered once, wide ones by their sub-rays as long as
-/// these leave doubt.
+/// A scan under way.
 class Lidar::OneScan : public Exposure {
  public:
   OneScan(const Lidar& lidar, Aimed aimed, const PoseTrack& T_world_sensor, bool is_wide)
       : lidar_(lidar),
         aimed_(std::move(aimed)),
         T_world_sensor_(T_world_sensor),
-        batch_(lidar.batch_of(aimed_)) {
-    if (is_wide) {
-      echoes_.resize(aimed_.rays.size());
-      const WideBeams beams{batch_, aimed_.across};
-      rounds_.emplace(lidar.footprint_, beams, *lidar.returns_, echoes_);
-    } else {
-      hits_.resize(aimed_.rays.size());
-    }
-  }
-  OneScan(const OneScan&) = delete;  // the batch refers to the rays
+        is_wide_(is_wide),
+        hits_(is_wide ? 0 : aimed_.rays.size()),
+        echoes_(is_wide ? aimed_.rays.size() : 0) {}
+  OneScan(const OneScan&) = delete;  // the job refers to the rays
   OneScan& operator=(const OneScan&) = delete;
 
-  std::optional<RenderJob> next(const Executor& executor) override {
-    if (rounds_) return rounds_->next(executor);
-    if (std::exchange(is_rendered_, true)) return std::nullopt;
-    return RenderJob{batch_, hits_, {}};
-  }
-
-  void receive(const Executor& executor) override {
-    if (rounds_) rounds_->receive(executor);
+  RenderJob job() override {
+    RenderJob job{lidar_.batch_of(aimed_), hits_, std::nullopt};
+    if (is_wide_) job.wide = lidar_.footprint_.beams(aimed_.across, *lidar_.returns_, echoes_);
+    return job;
   }
 
   Scan finish(const Executor& executor) override {
-    Received received = rounds_
+    Received received = is_wide_
                             ? lidar_.received(aimed_, std::span<const Echoes>(echoes_), executor)
                             : lidar_.received(aimed_, std::span<const Hit>(hits_), executor);
     return lidar_.written(aimed_, T_world_sensor_, std::move(received), executor);
@@ -206,11 +195,9 @@ class Lidar::OneScan : public Exposure {
   const Lidar& lidar_;
   Aimed aimed_;
   PoseTrack T_world_sensor_;
-  RayBatch batch_;
+  bool is_wide_;
   std::vector<Hit> hits_;
-  bool is_rendered_ = false;
   std::vector<Echoes> echoes_;
-  std::optional<FootprintRounds> rounds_;
 };
 
 std::unique_ptr<Exposure> Lidar::aim(const ScanRequest& request,
@@ -234,10 +221,8 @@ Scan Lidar::take(const ScanRequest& request,
                  const Renderer& renderer,
                  const Executor& executor) const {
   const std::unique_ptr<Exposure> scan = aim(request, T_world_sensor, renderer, executor);
-  while (const std::optional<RenderJob> job = scan->next(executor)) {
-    renderer.render({&*job, 1}, executor);
-    scan->receive(executor);
-  }
+  const RenderJob job = scan->job();
+  renderer.render({&job, 1}, executor);
   return scan->finish(executor);
 }
 

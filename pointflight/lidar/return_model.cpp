@@ -21,7 +21,7 @@ constexpr double kUsualDivergence = 0.2 * kDegree;  // rad, if a sensor file giv
 constexpr std::size_t kTexture = 4096;  // reflectivities that unknown surfels have
 
 /// Quantiles of the usual distribution.
-std::vector<float> usual_reflectivities() {
+std::vector<float> usual_quantiles() {
   std::vector<float> all(kTexture);
   for (std::size_t i = 0; i < kTexture; ++i) {
     const double share = (static_cast<double>(i) + 0.5) / static_cast<double>(kTexture);
@@ -31,11 +31,9 @@ std::vector<float> usual_reflectivities() {
   return all;
 }
 
-/// One of them, always the same for a surfel: twelve bits of a multiplicative hash (Knuth, The Art
-/// of Computer Programming, vol. 3, 6.4).
-double usual_reflectivity(std::uint32_t surfel) {
-  static const std::vector<float> all = usual_reflectivities();
-  return static_cast<double>(all[(surfel * 2654435769u) >> 20]);
+const std::vector<float>& usual_reflectivities() {
+  static const std::vector<float> all = usual_quantiles();
+  return all;
 }
 
 /// Of a hit of a beam that is a line.
@@ -103,7 +101,9 @@ double ReturnModel::reflectivity(const Hit& hit) const {
   if (hit.label == kMapLabel && surroundings_.reflectivity_per_intensity > 0.0) {
     reflectivity = static_cast<double>(hit.intensity) * surroundings_.reflectivity_per_intensity;
   } else if (reflectivity <= 0.0) {
-    reflectivity = hit.surfel == kNoSurfel ? kUsualReflectivity : usual_reflectivity(hit.surfel);
+    reflectivity = hit.surfel == kNoSurfel
+                       ? kUsualReflectivity
+                       : static_cast<double>(usual_reflectivities()[usual_number(hit.surfel)]);
   }
   return std::max(kDarkest, reflectivity * static_cast<double>(hit.cos_incidence));
 }
@@ -111,6 +111,13 @@ double ReturnModel::reflectivity(const Hit& hit) const {
 Echo ReturnModel::echo_of(const Hit& hit) const {
   if (!hit.is_return()) return {};
   return echo_with(hit, static_cast<float>(reflectivity(hit)));
+}
+
+Reflectances ReturnModel::reflectances() const {
+  return {.per_intensity = static_cast<float>(surroundings_.reflectivity_per_intensity),
+          .same = static_cast<float>(surroundings_.reflectivity),
+          .usual = usual_reflectivities().data(),
+          .least = static_cast<float>(kDarkest)};
 }
 
 bool ReturnModel::is_marginal(const Echo& echo, double less, double more) const {

@@ -5,10 +5,11 @@
 #include <span>
 
 #include "pointflight/lidar/detection.hpp"
-#include "pointflight/lidar/echoes.hpp"
 #include "pointflight/lidar/lidar_settings.hpp"
 #include "pointflight/lidar/weather.hpp"
+#include "pointflight/render/echoes.hpp"
 #include "pointflight/render/renderer.hpp"
+#include "pointflight/render/wide_beams.hpp"
 
 namespace pointflight {
 
@@ -68,7 +69,7 @@ struct Return {
 };
 
 /// A sensor's detection, noise and rounding.
-class ReturnModel {
+class ReturnModel : public EchoReceiver {
  public:
   /// Of a sensor file.
   ReturnModel(const LidarSettings& lidar, const Surroundings& surroundings);
@@ -86,12 +87,15 @@ class ReturnModel {
   [[nodiscard]] double range_sigma(double range, double margin) const;
   /// Of a surface that a beam hit: what the map or the surroundings say, times the cosine
   /// of the incidence.
-  [[nodiscard]] double reflectivity(const Hit& hit) const;
+  [[nodiscard]] double reflectivity(const Hit& hit) const override;
   /// The one echo of a beam that is a line.
   [[nodiscard]] Echo echo_of(const Hit& hit) const;
+  /// Of the map's surfaces.
+  [[nodiscard]] Reflectances reflectances() const override;
   /// True if scaling the echo's energy by `less` or `more` changes its probability of detection by
   /// more than 0.05.
-  [[nodiscard]] bool is_marginal(const Echo& echo, double less, double more) const;
+  [[nodiscard]] bool is_marginal(const Echo& echo, double less, double more) const override;
+  [[nodiscard]] bool takes_strongest() const override { return mode_ == ReturnMode::kStrongest; }
   /// What the sensor reports of each beam's echoes, the nearest first, whose ranges are what it
   /// measures: at most `most_returns`, the strongest first, into `returns`, beam by beam, which are
   /// none as yet. None if nothing comes back, or from nearer than the sensor's least range. A beam

@@ -3,17 +3,18 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
-#include <limits>
 #include <variant>
 
 #include "pointflight/core/argument.hpp"
 #include "pointflight/render/internal/beam_renderer.hpp"
+#include "pointflight/render/internal/direction_order.hpp"
 #include "pointflight/render/internal/paper_renderer.hpp"
+#include "pointflight/render/internal/sub_ray_renderer.hpp"
 
 namespace pointflight {
 namespace {
 
-constexpr float kInfinity = std::numeric_limits<float>::infinity();
+constexpr std::size_t kSubRays = 32;  // of a wide beam, by renderers that trace single rays
 
 /// All is there already.
 class Rendered : public Rendering {
@@ -23,9 +24,16 @@ class Rendered : public Rendering {
 
 void check(const RenderJob& job) {
   const RayBatch& batch = job.batch;
-  require_argument(job.hits.size() == batch.rays.size(), "render: as many hits as rays are wanted");
-  require_argument(job.nearest.empty() || batch.rays.size() == kSubRays * job.nearest.size(),
-                   "render: eight rays for each beam are wanted");
+  if (job.wide) {
+    require_argument(job.wide->across.size() == batch.rays.size() &&
+                         job.wide->echoes.size() == batch.rays.size() &&
+                         job.wide->receiver != nullptr,
+                     "render: of wide beams a direction across each, as many echoes and a receiver "
+                     "are wanted");
+  } else {
+    require_argument(job.hits.size() == batch.rays.size(),
+                     "render: as many hits as rays are wanted");
+  }
   require_argument(batch.order.empty() || batch.order.size() == batch.rays.size(),
                    "render: an order of all rays is wanted, or none");
   require_argument(batch.time_offsets.empty() || batch.time_offsets.size() == batch.rays.size(),
@@ -68,7 +76,7 @@ void Renderer::render(std::span<const RenderJob> jobs, const Executor& executor)
 }
 
 void Renderer::render(const RayBatch& batch, std::span<Hit> hits, const Executor& executor) const {
-  const RenderJob job{batch, hits, {}};
+  const RenderJob job{batch, hits, std::nullopt};
   render({&job, 1}, executor);
 }
 
@@ -76,10 +84,21 @@ std::unique_ptr<Rendering> Renderer::submit(std::span<const RenderJob> jobs,
                                             const Executor& executor) const {
   for (const RenderJob& job : jobs) check(job);
   executor.parallel_for(jobs.size(), 1, [&](std::size_t k, std::size_t) {
-    std::fill(jobs[k].nearest.begin(), jobs[k].nearest.end(), kInfinity);
-    render_one(jobs[k], executor);
+    if (jobs[k].wide) {
+      render_wide(jobs[k], executor);
+    } else {
+      render_one(jobs[k], executor);
+    }
   });
   return std::make_unique<Rendered>();
+}
+
+void Renderer::render_wide(const RenderJob& job, const Executor& executor) const {
+  std::vector<std::uint32_t> beams(job.batch.order.begin(), job.batch.order.end());
+  if (beams.size() != job.batch.rays.size()) beams = direction_order(job.batch.rays, executor);
+  const std::size_t count = job.wide->sub_rays > 0 ? job.wide->sub_rays : kSubRays;
+  const auto render_lines = [&](const RenderJob& lines) { render_one(lines, executor); };
+  render_sub_rays(job, beams, count, render_lines, executor);
 }
 
 Hit Renderer::trace(const Ray& ray) const {

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -12,6 +13,8 @@
 #include "pointflight/geometry/types.hpp"
 #include "pointflight/map/body.hpp"
 #include "pointflight/map/surfel_map.hpp"
+#include "pointflight/render/hit.hpp"
+#include "pointflight/render/wide_beams.hpp"
 
 namespace pointflight {
 
@@ -44,35 +47,13 @@ struct RayBatch {
   }
 };
 
-/// Rays that stand for one beam if `RenderJob::nearest` is asked for.
-inline constexpr std::size_t kSubRays = 8;
-
-/// No surfel of the map.
-inline constexpr std::uint32_t kNoSurfel = 0xffffffffu;
-
-/// What a ray hit.
-struct Hit {
-  float range = -1.0f;         ///< Metres along the ray; negative if it hit nothing.
-  float cos_incidence = 0.0f;  ///< |cos| of the angle between the ray and the surface normal.
-  float intensity = 0.0f;      ///< The cloud's own scale; 0 if it had none.
-  Label label = kMapLabel;     ///< What it is of.
-  /// Of the map, which gave most of the return: its index in `SurfelMap::words()`; `kNoSurfel` of
-  /// bodies and where the renderer does not say.
-  std::uint32_t surfel = kNoSurfel;
-  /// False: it hit nothing within its range.
-  [[nodiscard]] bool is_return() const { return range >= 0.0f; }
-};
-
 /// What a renderer is asked for. What it refers to must stay as it is until the hits are there.
 struct RenderJob {
   RayBatch batch;       ///< Of one scan.
-  std::span<Hit> hits;  ///< Of `batch.rays[i]`, written.
-  /// For beams of eight sub-rays each: rays 8 k to 8 k + 7 are beam k's and leave from one
-  /// position; beams that follow each other should point the same way, `batch.order` is not used.
-  /// Written: how far the nearest surface of the map is that reaches between beam k's sub-rays, m;
-  /// infinity if the renderer does not look. A beam with something there that none of its sub-rays
-  /// hit needs more of them. Empty: each ray is a beam.
-  std::span<float> nearest;
+  std::span<Hit> hits;  ///< Of `batch.rays[i]`, written; none of wide beams.
+  /// The beams' cross-sections, if they have any: then rays are their axes, and what is written are
+  /// `WideBeams::echoes`, no hits.
+  std::optional<WideBeams> wide;
 };
 
 /// Jobs that a renderer has been given (`Renderer::submit`).
@@ -110,8 +91,10 @@ class Renderer {
   [[nodiscard]] virtual bool is_snapshot() const { return false; }
 
  protected:
-  /// One job, which is valid; `nearest` is infinity everywhere.
+  /// One job of beams that are lines, which is valid.
   virtual void render_one(const RenderJob& job, const Executor& executor) const = 0;
+  /// One job of wide beams, which is valid. Here: by rays over each, 32 unless it says how many.
+  virtual void render_wide(const RenderJob& job, const Executor& executor) const;
 };
 
 /// A row of the table of renderers.

@@ -54,10 +54,7 @@ class ScanUnderWay : public IntervalMeasurement {
   ScanUnderWay(std::unique_ptr<Exposure> exposure, PoseTrack track, const SensorSite& site)
       : exposure_(std::move(exposure)), T_world_sensor_(std::move(track)), site_(site) {}
 
-  std::optional<RenderJob> next(const Executor& executor) override {
-    return exposure_->next(executor);
-  }
-  void receive(const Executor& executor) override { exposure_->receive(executor); }
+  std::optional<RenderJob> job() override { return exposure_->job(); }
   Sample finish(const Executor& executor) override {
     auto scan = std::make_shared<Scan>(exposure_->finish(executor));
     scan->vehicle = site_.vehicle;

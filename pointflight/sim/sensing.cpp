@@ -108,8 +108,7 @@ class Together {
 
   /// By number of `due`; nothing of those that were lost.
   std::vector<std::optional<Sample>> take() {
-    while (render_next()) {
-    }
+    render();
     std::vector<std::optional<Sample>> samples(due_.size());
     executor_.parallel_for(due_.size(), 1, [&](std::size_t k, std::size_t) {
       if (measurements_[k]) samples[k] = measurements_[k]->finish(executor_);
@@ -119,25 +118,18 @@ class Together {
   }
 
  private:
-  /// False if nobody wants rays any more.
-  bool render_next() {
-    std::vector<std::optional<RenderJob>> wanted(due_.size());
-    executor_.parallel_for(due_.size(), 1, [&](std::size_t k, std::size_t) {
-      if (measurements_[k]) wanted[k] = measurements_[k]->next(executor_);
-    });
+  /// What all measurements want to see.
+  void render() {
     std::map<const Renderer*, std::vector<RenderJob>> jobs;
     for (std::size_t k = 0; k < due_.size(); ++k) {
-      if (wanted[k]) jobs[due_[k].sensor->renderer()].push_back(*wanted[k]);
+      if (!measurements_[k]) continue;
+      if (auto job = measurements_[k]->job()) jobs[due_[k].sensor->renderer()].push_back(*job);
     }
     std::vector<std::unique_ptr<Rendering>> renderings;
     for (const auto& [renderer, its_jobs] : jobs) {
       renderings.push_back(renderer->submit(its_jobs, executor_));
     }
     for (const auto& rendering : renderings) rendering->collect();
-    executor_.parallel_for(due_.size(), 1, [&](std::size_t k, std::size_t) {
-      if (wanted[k]) measurements_[k]->receive(executor_);
-    });
-    return !jobs.empty();
   }
 
   std::span<const DueInterval> due_;

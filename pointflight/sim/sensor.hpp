@@ -77,18 +77,14 @@ struct IntervalInput {
   const Executor& executor;       ///< The result must not depend on its threads.
 };
 
-/// A measurement that takes time, under way: `next` and `receive` in turn until nothing is to be
-/// rendered any more, then `finish`, once. Called from any thread, one at a time.
+/// A measurement that takes time, under way: `job` is rendered, if it has one, then `finish`, once.
+/// Called from any thread, one at a time.
 class IntervalMeasurement {
  public:
   virtual ~IntervalMeasurement() = default;
-  /// The rays to be rendered next by the sensor's renderer; what the job refers to is valid until
-  /// `receive` has returned.
-  [[nodiscard]] virtual std::optional<RenderJob> next(const Executor& /*executor*/) {
-    return std::nullopt;
-  }
-  /// The hits of the last job are there.
-  virtual void receive(const Executor& /*executor*/) {}
+  /// The beams to be rendered by the sensor's renderer; what the job refers to is valid as long as
+  /// this is.
+  [[nodiscard]] virtual std::optional<RenderJob> job() { return std::nullopt; }
   /// What was measured.
   [[nodiscard]] virtual Sample finish(const Executor& executor) = 0;
 };

@@ -54,6 +54,16 @@ std::vector<std::byte> edited(std::vector<std::byte> bytes,
   return bytes;
 }
 
+class Blind : public EchoReceiver {
+ public:
+  [[nodiscard]] double reflectivity(const Hit& /*hit*/) const override { return 0.3; }
+  [[nodiscard]] Reflectances reflectances() const override { return {.same = 0.3f}; }
+  [[nodiscard]] bool is_marginal(const Echo& /*e*/, double /*l*/, double /*m*/) const override {
+    return true;
+  }
+  [[nodiscard]] bool takes_strongest() const override { return false; }
+};
+
 void ask_everything(const SurfelMap& map, const std::shared_ptr<const SurfelMap>& shared) {
   std::vector<Ray> rays;
   for (int i = 0; i < 24; ++i) {
@@ -66,7 +76,21 @@ void ask_everything(const SurfelMap& map, const std::shared_ptr<const SurfelMap>
   batch.rays = rays;
   batch.range_max = 30.0f;
   std::vector<Hit> hits(rays.size());
-  make_renderer("beam", Scene{shared})->render(batch, hits, Executor(1));
+  const auto renderer = make_renderer("beam", Scene{shared});
+  renderer->render(batch, hits, Executor(1));
+  const Blind receiver;
+  std::vector<Echoes> echoes(rays.size());
+  const std::vector<Vector3f> across(rays.size(), Vector3f::UnitY());
+  const RenderJob wide{batch,
+                       {},
+                       WideBeams{.across = across,
+                                 .sigma_across = 0.01f,
+                                 .sigma_up = 0.01f,
+                                 .merge = 0.5f,
+                                 .sub_rays = 0,
+                                 .receiver = &receiver,
+                                 .echoes = echoes}};
+  renderer->render({&wide, 1}, Executor(1));
   std::size_t surfels = map.reflectivity_per_intensity() > 0.0 ? 1 : 0;
   for (const Ray& ray : rays) surfels += map.nearest(ray.origin_world, 3.0) ? 1 : 0;
   const Solid box = Box{{0.3, 0.2, 0.1}};

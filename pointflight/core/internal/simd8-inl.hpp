@@ -72,6 +72,14 @@ POINTFLIGHT_INLINE void store(const F8& a, float* x) {
 POINTFLIGHT_INLINE void store_unaligned(const F8& a, float* x) {
   for (std::size_t p = 0; p < kParts; ++p) hn::StoreU(a.v[p], kF, x + p * kWidth);
 }
+/// The lanes of `a` for which `which` holds, one after the other, to x[0..]: eight floats are
+/// written, those behind the last are anything.
+POINTFLIGHT_INLINE void store_chosen(const F8& a, const M8& which, float* x) {
+  for (std::size_t p = 0; p < kParts; ++p) {
+    hn::StoreU(hn::Compress(a.v[p], which.v[p]), kF, x);
+    x += hn::CountTrue(kF, which.v[p]);
+  }
+}
 /// Eight bytes as floats.
 POINTFLIGHT_INLINE F8 load_bytes(const std::uint8_t* x) {
   F8 out;
@@ -224,6 +232,13 @@ POINTFLIGHT_INLINE F8 look_up_each(const float* table, const U8& index) {
   for (std::size_t i = 0; i < 8; ++i) values[i] = table[places[i]];
   return load_unaligned(values);
 }
+/// table[index]
+POINTFLIGHT_INLINE F8 look_up(const float* table, const U8& index) {
+  if constexpr (kWidth < 8) return look_up_each(table, index);
+  F8 out;
+  POINTFLIGHT_EACH(hn::GatherIndex(kF, table, hn::BitCast(kI, index.v[p])))
+  return out;
+}
 /// table[index] for indices below four.
 POINTFLIGHT_INLINE F8 look_up4(const float* table, const U8& index) {
   if constexpr (kWidth < 4) return look_up_each(table, index);
@@ -272,6 +287,16 @@ POINTFLIGHT_INLINE I8 load_unaligned(const std::int32_t* x) {
 POINTFLIGHT_INLINE I8 count_from(std::int32_t first) {
   I8 out;
   POINTFLIGHT_EACH(hn::Iota(kI, first + static_cast<std::int32_t>(p * kWidth)))
+  return out;
+}
+POINTFLIGHT_INLINE U8 count_bits_from(std::uint32_t first) {
+  U8 out;
+  POINTFLIGHT_EACH(hn::Iota(kU, first + static_cast<std::uint32_t>(p * kWidth)))
+  return out;
+}
+POINTFLIGHT_INLINE U8 as_bits(const I8& a) {
+  U8 out;
+  POINTFLIGHT_EACH(hn::BitCast(kU, a.v[p]))
   return out;
 }
 POINTFLIGHT_INLINE I8 splat_int(std::int32_t x) {

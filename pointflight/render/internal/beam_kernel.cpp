@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <limits>
 
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/input_error.hpp"
@@ -22,7 +21,6 @@ namespace pointflight {
 namespace {
 
 HWY_EXPORT(trace);
-HWY_EXPORT(trace_sub_rays);
 
 }  // namespace
 
@@ -35,6 +33,7 @@ KernelMap kernel_map_of(const SurfelMap& map) {
   k.word_count = map.words().size();
   for (int axis = 0; axis < 3; ++axis) k.origin[axis] = map.origin_world()[axis];
   k.resolution = map.resolution();
+  k.support = m.support;
   k.support_squared = m.support * m.support;
   k.inverse_support = 1.0f / k.support_squared;
   // c = 36 / (pi M^2): the weights of a covered plane average 1
@@ -53,22 +52,6 @@ std::uint64_t trace_beams(const KernelMap& map,
                           BeamGrouping grouping) {
   return HWY_DYNAMIC_DISPATCH(trace)(
       map, rays.data(), order.data(), order.size(), grouping, hits.data());
-}
-
-std::uint64_t trace_footprints(const KernelMap& map,
-                               std::span<const Ray> rays,
-                               std::span<const std::uint32_t> order,
-                               std::span<KernelHit> hits,
-                               std::span<float> nearest) {
-  if (map.node_count == 0) {
-    for (const std::uint32_t i : order) {
-      hits[i] = {};
-      nearest[i / 8] = std::numeric_limits<float>::infinity();
-    }
-    return 0;
-  }
-  return HWY_DYNAMIC_DISPATCH(trace_sub_rays)(
-      map, rays.data(), order.data(), order.size(), hits.data(), nearest.data());
 }
 
 std::vector<std::string> kernel_names() {

@@ -20,6 +20,7 @@ struct KernelMap {
   std::size_t word_count = 0;
   double origin[3] = {0, 0, 0};  ///< World position of voxel (0, 0, 0), m.
   double resolution = 0.0;
+  float support = 0.0f;          ///< M
   float support_squared = 0.0f;  ///< M^2
   float inverse_support = 0.0f;  ///< 1 / M^2
   float weight_scale = 0.0f;     ///< Weight of a hit in the middle, in steps of kWeightOne.
@@ -60,18 +61,6 @@ std::uint64_t trace_beams(const KernelMap& map,
                           std::span<const std::uint32_t> order,
                           std::span<KernelHit> hits,
                           BeamGrouping grouping = BeamGrouping::kAutomatic);
-
-/// The same for beams of eight sub-rays each: rays 8 k to 8 k + 7 are beam k's, leave from one
-/// point, and follow each other in `order`, whose length is a multiple of eight. Besides
-/// `nearest[k]`: how far the centre of the nearest surfel is that reaches into the rectangle around
-/// beam k's sub-rays by more than its fringe (m, along the beam; very large or infinite if there
-/// is none, and where the sub-rays are farther than 0.1 rad apart). It tells whether anything lies
-/// between them; which beams share a call may change it, but not the hits.
-std::uint64_t trace_footprints(const KernelMap& map,
-                               std::span<const Ray> rays,
-                               std::span<const std::uint32_t> order,
-                               std::span<KernelHit> hits,
-                               std::span<float> nearest);
 
 /// Names of the kernels that this processor can run, the best first.
 std::vector<std::string> kernel_names();

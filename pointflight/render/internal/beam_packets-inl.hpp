@@ -90,10 +90,6 @@ POINTFLIGHT_INLINE void meet_group(
   if constexpr (!kOneOrigin) {
     for (int axis = 0; axis < 3; ++axis) {
       for (std::size_t i = 0; i < 8; ++i) {
-        if (i > 0 && p.of_sub_rays) {
-          from[axis][i] = from[axis][0];  // they leave from one place
-          continue;
-        }
         from[axis][i] = static_cast<float>(leaf.corner[axis] - group.origin[axis][i]);
       }
     }
@@ -159,10 +155,8 @@ POINTFLIGHT_INLINE void visit_leaf(const KernelMap& map, Packet& p, const Entry&
   const InFrustum in = in_frustum(map, p, leaf, center);
   if (in.surfels == 0) return;
   const Shapes e = decode_shapes(map.scale, leaf.lanes);
-  Reach reach;  // NOLINT(cppcoreguidelines-pro-type-member-init): written below
-  const std::uint64_t pairs = pairs_of(map, p, leaf, e, in, reach);
+  const std::uint64_t pairs = pairs_of(map, p, leaf, e, in);
   if (pairs == 0) return;
-  if (p.of_sub_rays) note_nearest(p, in, reach, pairs);
   const F8* const shape[10] = {
       &e.m0x, &e.m0y, &e.m0z, &e.m1x, &e.m1y, &e.m1z, &e.m2x, &e.m2y, &e.m2z, &e.s0};
   for (int k = 0; k < 10; ++k) store(*shape[k], leaf.shape[k]);

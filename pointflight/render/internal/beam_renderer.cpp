@@ -1,22 +1,62 @@
 #include "pointflight/render/internal/beam_renderer.hpp"
 
+#include <algorithm>
 #include <array>
-#include <numeric>
+#include <limits>
 #include <vector>
 
 #include "pointflight/core/argument.hpp"
 #include "pointflight/render/internal/body_renderer.hpp"
+#include "pointflight/render/internal/cone_kernel.hpp"
 #include "pointflight/render/internal/direction_order.hpp"
+#include "pointflight/render/internal/sub_ray_renderer.hpp"
 
 namespace pointflight {
 namespace {
 
 constexpr std::size_t kChunk = 1024;  // rays
-static_assert(kChunk % kSubRays == 0);
+constexpr std::size_t kSubRaysAtBodies = 32;
+constexpr float kBeamRadius = 2.22f;  // sigmas
 
 const SurfelMap& map_of(const Scene& scene) {
   require_argument(scene.map != nullptr, "BeamRenderer: the scene has no map");
   return *scene.map;
+}
+
+/// The order in which a batch's rays are traced; into `room` if it has none of its own.
+std::span<const std::uint32_t> order_of(const RayBatch& batch,
+                                        std::vector<std::uint32_t>& room,
+                                        const Executor& executor) {
+  if (batch.order.size() == batch.rays.size()) return batch.order;
+  room = direction_order(batch.rays, executor);
+  return room;
+}
+
+/// The echoes of beams that bodies cover, by eight rays against bodies alone. `beams` are numbers
+/// of the job's rays; those that a body covers in part, or is behind something, are returned.
+std::vector<std::uint32_t> hide_behind_bodies(const RenderJob& job,
+                                              std::span<const std::uint32_t> beams,
+                                              const Executor& executor) {
+  const WideBeams& wide = *job.wide;
+  const std::vector<SubRay> eight = rim_of_eight();
+  SubRayBatch batch(job, beams, eight, executor);
+  render_bodies(batch.lines().batch, batch.hits, executor);
+  std::vector<std::uint32_t> mixed;
+  for (std::size_t b = 0; b < beams.size(); ++b) {
+    const std::span hits = std::span(batch.hits).subspan(b * eight.size(), eight.size());
+    const auto met = [](const Hit& hit) { return hit.is_return(); };
+    if (std::none_of(hits.begin(), hits.end(), met)) continue;
+    Echoes& echoes = wide.echoes[beams[b]];
+    float nearest = std::numeric_limits<float>::infinity();  // of the map
+    for (const Echo& echo : echoes.span()) nearest = std::min(nearest, echo.range - echo.depth);
+    const auto in_front = [&](const Hit& hit) { return met(hit) && hit.range < nearest; };
+    if (std::all_of(hits.begin(), hits.end(), in_front)) {
+      echoes = echoes_of_hits(wide, eight, hits);
+    } else {
+      mixed.push_back(beams[b]);
+    }
+  }
+  return mixed;
 }
 
 }  // namespace
@@ -24,35 +64,38 @@ const SurfelMap& map_of(const Scene& scene) {
 BeamRenderer::BeamRenderer(const Scene& scene, BeamGrouping grouping)
     : map_(scene.map), kernel_map_(kernel_map_of(map_of(scene))), grouping_(grouping) {}
 
-/// Traces the rays of `part`; how many lists of hits overflowed.
-std::uint64_t BeamRenderer::trace_part(const RenderJob& job,
-                                       std::span<const std::uint32_t> part,
-                                       std::span<KernelHit> found) const {
-  const std::span<const Ray> rays = job.batch.rays;
-  return job.nearest.empty() ? trace_beams(kernel_map_, rays, part, found, grouping_)
-                             : trace_footprints(kernel_map_, rays, part, found, job.nearest);
-}
-
 void BeamRenderer::render_one(const RenderJob& job, const Executor& executor) const {
   const RayBatch& batch = job.batch;
-  std::vector<std::uint32_t> own_order;
-  std::span<const std::uint32_t> order = batch.order;
-  if (!job.nearest.empty()) {  // a beam's sub-rays follow each other
-    own_order.resize(batch.rays.size());
-    std::iota(own_order.begin(), own_order.end(), 0u);
-    order = own_order;
-  } else if (order.size() != batch.rays.size()) {
-    own_order = direction_order(batch.rays, executor);
-    order = own_order;
-  }
+  std::vector<std::uint32_t> room;
+  const std::span<const std::uint32_t> order = order_of(batch, room, executor);
   std::vector<KernelHit> found(batch.rays.size());
   executor.parallel_for(order.size(), kChunk, [&](std::size_t begin, std::size_t end) {
-    const std::span part(order.data() + begin, end - begin);
-    const std::uint64_t overflows = trace_part(job, part, found);
+    const std::span part = order.subspan(begin, end - begin);
+    const std::uint64_t overflows = trace_beams(kernel_map_, batch.rays, part, found, grouping_);
     if (overflows > 0) overflows_ += overflows;
     for (const std::uint32_t i : part) job.hits[i] = hit_of(found[i]);
   });
   render_bodies(batch, job.hits, executor);
+}
+
+/// Through the map as cones; those that bodies may touch by sub-rays.
+void BeamRenderer::render_wide(const RenderJob& job, const Executor& executor) const {
+  const WideBeams& wide = *job.wide;
+  const float widest = kBeamRadius * std::max(wide.sigma_across, wide.sigma_up);
+  if (wide.sub_rays != 0 || widest > kWidestCone) {
+    Renderer::render_wide(job, executor);
+    return;
+  }
+  const RayBatch& batch = job.batch;
+  std::vector<std::uint32_t> room;
+  const std::span<const std::uint32_t> order = order_of(batch, room, executor);
+  executor.parallel_for(order.size(), kChunk, [&](std::size_t begin, std::size_t end) {
+    trace_cones(*map_, kernel_map_, batch.rays, order.subspan(begin, end - begin), wide);
+  });
+  const std::vector<std::uint32_t> near = rays_near_bodies(batch, widest, executor);
+  const std::vector<std::uint32_t> mixed = hide_behind_bodies(job, near, executor);
+  const auto render_lines = [&](const RenderJob& lines) { render_one(lines, executor); };
+  render_sub_rays(job, mixed, kSubRaysAtBodies, render_lines, executor);
 }
 
 Hit BeamRenderer::trace(const Ray& ray) const {

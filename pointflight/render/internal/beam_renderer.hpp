@@ -27,11 +27,9 @@ class BeamRenderer : public Renderer {
 
  protected:
   void render_one(const RenderJob& job, const Executor& executor) const override;
+  void render_wide(const RenderJob& job, const Executor& executor) const override;
 
  private:
-  [[nodiscard]] std::uint64_t trace_part(const RenderJob& job,
-                                         std::span<const std::uint32_t> part,
-                                         std::span<KernelHit> found) const;
   [[nodiscard]] Hit hit_of(const KernelHit& found) const;
 
   std::shared_ptr<const SurfelMap> map_;

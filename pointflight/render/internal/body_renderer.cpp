@@ -51,8 +51,8 @@ Start start_of(const RayBatch& batch) {
   return start;
 }
 
-/// Bodies that some ray may hit.
-std::vector<Cone> cones_of(const RayBatch& batch) {
+/// Bodies that some ray may hit; of wide beams `widest` is the radius, rad.
+std::vector<Cone> cones_of(const RayBatch& batch, double widest) {
   const Start start = start_of(batch);
   std::vector<Cone> cones;
   for (const Body& body : batch.bodies) {
@@ -70,7 +70,10 @@ std::vector<Cone> cones_of(const RayBatch& batch) {
     if (distance > 1.001 * radius) {
       cone.axis = (way / distance).cast<float>();
       const double sine = radius / distance;
-      cone.cos_limit = static_cast<float>(std::sqrt(1.0 - sine * sine) - kCosSlack);
+      const double cosine = std::sqrt(1.0 - sine * sine);
+      // cos(a + w) and a little less
+      const double wider = cosine * (1.0 - 0.5 * widest * widest) - sine * widest;
+      cone.cos_limit = static_cast<float>(wider - kCosSlack);
     }
     cones.push_back(cone);
   }
@@ -238,9 +241,30 @@ void meet_points(const RayBatch& batch,
 
 }  // namespace
 
+std::vector<std::uint32_t> rays_near_bodies(const RayBatch& batch,
+                                            float widest,
+                                            const Executor& executor) {
+  if (batch.bodies.empty() || batch.rays.empty()) return {};
+  const std::vector<Cone> cones = cones_of(batch, static_cast<double>(widest));
+  if (cones.empty()) return {};
+  const std::vector<std::uint32_t> order = ray_order(batch, cones.size(), executor);
+  std::vector<std::uint8_t> is_near(batch.rays.size(), 0);
+  executor.parallel_for(order.size(), kRaysPerChunk, [&](std::size_t begin, std::size_t end) {
+    const Directions directions(batch.rays, std::span(order).subspan(begin, end - begin));
+    std::vector<std::uint32_t> candidates;
+    for (const Cone& cone : cones) directions.within(cone, candidates);
+    for (const std::uint32_t i : candidates) is_near[i] = 1;
+  });
+  std::vector<std::uint32_t> near;
+  for (const std::uint32_t i : order) {
+    if (is_near[i] != 0) near.push_back(i);
+  }
+  return near;
+}
+
 void render_bodies(const RayBatch& batch, std::span<Hit> hits, const Executor& executor) {
   if (batch.bodies.empty() || batch.rays.empty()) return;
-  const std::vector<Cone> cones = cones_of(batch);
+  const std::vector<Cone> cones = cones_of(batch, 0.0);
   if (cones.empty()) return;
   const std::vector<std::uint32_t> order = ray_order(batch, cones.size(), executor);
   executor.parallel_for(order.size(), kRaysPerChunk, [&](std::size_t begin, std::size_t end) {

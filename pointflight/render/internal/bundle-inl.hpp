@@ -23,22 +23,27 @@ struct BundleEntry {
   std::uint64_t beams;  ///< A bit for each that may enter.
 };
 
-struct Bundle : BeamGroups {
+/// Beams on their way down together, and what waits for them.
+struct BundleWay : BeamGroups {
   alignas(32) float at_u[kGroups][8], at_v[kGroups][8];  ///< Of each beam: d.u / d.w, d.v / d.w.
   alignas(32) float group_low[2][8], group_high[2][8];   ///< Around each group, in u and in v.
   float across[3][3];                                    ///< |u|, |v|, |w| by axis.
-  std::uint64_t failed;                                  ///< Beams to be traced singly.
+  float room_u, room_v;                                  ///< By which boxes are widened, rad.
   std::uint32_t visits;                                  ///< Of nodes and leaves.
   std::size_t depth;
   BundleEntry stack[kStack];
+};
+
+struct Bundle : BundleWay {
+  std::uint64_t failed;  ///< Beams to be traced singly.
   BeamState beams[kTogether];
 };
 
 /// Room for rounding, rad: 0.4 mm at 100 m.
 inline constexpr float kBundleRoom = 4e-6f;
 
-/// Sets up a bundle of the first `count` groups.
-POINTFLIGHT_INLINE void set_up_bundle(Bundle& b, std::size_t count) {
+/// Sets up the way of the first `count` groups, whose beams are no wider than lines.
+POINTFLIGHT_INLINE void set_up_way(BundleWay& b, std::size_t count) {
   set_up(b, count);
   for (std::size_t g = 0; g < count; ++g) {
     const Group& group = b.groups[g];
@@ -51,7 +56,6 @@ POINTFLIGHT_INLINE void set_up_bundle(Bundle& b, std::size_t count) {
     const F8 per_ahead = splat(1.0f) / along(b.w);
     store(along(b.u) * per_ahead, b.at_u[g]);
     store(along(b.v) * per_ahead, b.at_v[g]);
-    for (std::size_t i = 0; i < 8; ++i) start_beam(group.end[i], b.beams[8 * g + i]);
   }
   store(load(b.middle_u) - load(b.half_u), b.group_low[0]);
   store(load(b.middle_u) + load(b.half_u), b.group_high[0]);
@@ -62,9 +66,29 @@ POINTFLIGHT_INLINE void set_up_bundle(Bundle& b, std::size_t count) {
     b.across[1][axis] = std::abs(b.v[axis]);
     b.across[2][axis] = std::abs(b.w[axis]);
   }
-  b.failed = 0;
+  b.room_u = kBundleRoom;
+  b.room_v = kBundleRoom;
   b.visits = 0;
   b.depth = 0;
+}
+
+/// Makes all beams wider by so much to each side in u and v, rad.
+POINTFLIGHT_INLINE void widen(BundleWay& b, float wider_u, float wider_v) {
+  b.low_u -= wider_u;
+  b.high_u += wider_u;
+  b.low_v -= wider_v;
+  b.high_v += wider_v;
+  b.room_u += wider_u;
+  b.room_v += wider_v;
+}
+
+/// Sets up a bundle of the first `count` groups.
+POINTFLIGHT_INLINE void set_up_bundle(Bundle& b, std::size_t count) {
+  set_up_way(b, count);
+  for (std::size_t n = 0; n < 8 * count; ++n) {
+    start_beam(b.groups[n / 8].end[n % 8], b.beams[n]);
+  }
+  b.failed = 0;
 }
 
 /// Eight boxes as a bundle sees them from its apex.
@@ -76,7 +100,7 @@ struct SeenBoxes {  // NOLINT(cppcoreguidelines-pro-type-member-init): all is wr
 
 /// The children's boxes: c + e with |e_k| <= h_k. Its points lie (e.(u - c_u w)) / ((c + e).w)
 /// beside its middle c_u = (c.u) / (c.w), and |e.u| <= h.|u|.
-POINTFLIGHT_INLINE SeenBoxes see(const Bundle& b, const Bvh8Node& node) {
+POINTFLIGHT_INLINE SeenBoxes see(const BundleWay& b, const Bvh8Node& node) {
   F8 u = splat(0.0f);
   F8 v = splat(0.0f);
   F8 w = splat(0.0f);
@@ -103,11 +127,10 @@ POINTFLIGHT_INLINE SeenBoxes see(const Bundle& b, const Bvh8Node& node) {
   const M8 ahead = splat(0.0f) < seen.begin;
   const F8 per_depth = splat(1.0f) / w;
   const F8 per_begin = splat(1.0f) / seen.begin;
-  const F8 room = splat(kBundleRoom);
   const F8 c_u = u * per_depth;
   const F8 c_v = v * per_depth;
-  const F8 beside_u = (half_u + abs(c_u) * half_w) * per_begin + room;
-  const F8 beside_v = (half_v + abs(c_v) * half_w) * per_begin + room;
+  const F8 beside_u = (half_u + abs(c_u) * half_w) * per_begin + splat(b.room_u);
+  const F8 beside_v = (half_v + abs(c_v) * half_w) * per_begin + splat(b.room_v);
   const F8 everywhere = splat(1e30f);
   seen.low_u = select(ahead, c_u - beside_u, splat(-1e30f));
   seen.high_u = select(ahead, c_u + beside_u, everywhere);
@@ -127,7 +150,7 @@ POINTFLIGHT_INLINE SeenBoxes see(const Bundle& b, const Bvh8Node& node) {
 
 /// Pushes the children of a node that some of the beams may enter, the nearest on top.
 POINTFLIGHT_INLINE void enter_children(const KernelMap& map,
-                                       Bundle& b,
+                                       BundleWay& b,
                                        const Bvh8Node& node,
                                        std::uint64_t beams) {
   const SeenBoxes seen = see(b, node);

@@ -32,6 +32,30 @@ POINTFLIGHT_INLINE Whitened whiten(const Shapes& e, const F8& x, const F8& y, co
           e.m2x * x + e.m2y * y + e.m2z * z};
 }
 
+/// Of eight surfels along their axes, m^2.
+struct Variances {
+  F8 x, y, z;
+};
+
+POINTFLIGHT_INLINE Variances variances_of(const SurfelScale& scale,
+                                          const SurfelLanes& surfels,
+                                          const Shapes& e) {
+  const F8 ratio = look_up8(scale.ratio, right<24>(surfels.high) & splat_bits(7u));
+  return {e.s0 * e.s0, surfels.variance2 * ratio * ratio, surfels.variance2};
+}
+
+/// How far the supports of eight surfels reach along an axis n, of which `whitened` is S R n, m:
+/// e.n is M |S^-1 R n| at most, and a little for rounding.
+POINTFLIGHT_INLINE F8 reach_along(const KernelMap& map,
+                                  const Variances& variances,
+                                  const Whitened& whitened) {
+  // whitening divides by deviations; times the variances
+  const F8 x = whitened.x * variances.x;
+  const F8 y = whitened.y * variances.y;
+  const F8 z = whitened.z * variances.z;
+  return sqrt((x * x + y * y + z * z) * splat(map.support_squared)) * splat(1.03f);
+}
+
 /// What the model says for eight pairs of a beam and a surfel: t = u.v / v.v, m^2 = |u - t v|^2
 /// with u = S R (p - o) and v = S R d. In float u is exact to 2^-23 |p - o| / s: at 100 m, r = 0.05
 /// m and the least s0 that is 0.05 standard deviations, at most 2 % of M.

@@ -59,39 +59,6 @@ POINTFLIGHT_INLINE InFrustum in_frustum(const KernelMap& map,
   return in;
 }
 
-/// How far a leaf's surfels reach from their centres, seen from the apex: along w, and across at
-/// the centres' depth, m.
-struct Reach {
-  F8 u, v, w;
-  F8 at_u, at_v;  ///< Where the centres are.
-};
-
-/// `pairs_of` for groups that leave from origins of their own, each from one: a sensor moves by
-/// decimetres within a scan, and rectangles wider by that would hold most of the leaf.
-POINTFLIGHT_INLINE std::uint64_t pairs_from_origins(const Packet& p,
-                                                    const InFrustum& in,
-                                                    const Reach& reach) {
-  std::uint64_t pairs = 0;
-  for (std::size_t g = 0; g < p.count; ++g) {
-    const F8 depth = in.depth - splat(p.shift[g][2]);
-    const F8 per_depth = splat(1.0f) / depth;
-    const F8 at_u = (in.u - splat(p.shift[g][0])) * per_depth;
-    const F8 at_v = (in.v - splat(p.shift[g][1])) * per_depth;
-    const F8 begin = depth - reach.w;
-    const F8 per_begin = splat(1.0f) / begin;
-    // the reach across is that for the position seen from the apex
-    const F8 half_u = (reach.u + abs(at_u - reach.at_u) * reach.w) * per_begin;
-    const F8 half_v = (reach.v + abs(at_v - reach.at_v) * reach.w) * per_begin;
-    const M8 beside = (abs(at_u - splat(p.middle_u[g])) <= half_u + splat(p.half_u[g])) &
-                      (abs(at_v - splat(p.middle_v[g])) <= half_v + splat(p.half_v[g]));
-    // around the origin a surfel may be hit in any direction
-    const std::uint32_t around = bits(begin <= splat(0.0f));
-    const std::uint32_t met = (around | bits(beside)) & bits(begin <= splat(p.group_end[g]));
-    pairs |= static_cast<std::uint64_t>(met & in.surfels) << (8 * g);
-  }
-  return pairs;
-}
-
 /// Which surfels of a leaf each group may hit: bit i of byte g. A surfel's support is an
 /// ellipsoid; seen from the apex it lies within a rectangle of the plane across the packet's mean
 /// direction: with its centre at c_u = (c.u) / (c.w), a point c + e of it lies (e.(u - c_u w)) /
@@ -100,35 +67,24 @@ POINTFLIGHT_INLINE std::uint64_t pairs_of(const KernelMap& map,
                                           const Packet& p,
                                           const PacketLeaf& leaf,
                                           const Shapes& e,
-                                          const InFrustum& in,
-                                          Reach& reach) {
+                                          const InFrustum& in) {
   const SurfelLanes& s = leaf.lanes;
   const Whitened eu = whiten(e, splat(p.u[0]), splat(p.u[1]), splat(p.u[2]));
   const Whitened ev = whiten(e, splat(p.v[0]), splat(p.v[1]), splat(p.v[2]));
   const Whitened ew = whiten(e, splat(p.w[0]), splat(p.w[1]), splat(p.w[2]));
-  // whitening divides by deviations; times the variances
-  const F8 ratio = look_up8(map.scale.ratio, right<24>(s.high) & splat_bits(7u));
-  const F8 q0 = e.s0 * e.s0;
-  const F8 q1 = s.variance2 * ratio * ratio;
-  const F8 q2 = s.variance2;
-  const auto reach_along = [&](const F8& a0, const F8& a1, const F8& a2) {
-    const F8 b0 = a0 * q0;
-    const F8 b1 = a1 * q1;
-    const F8 b2 = a2 * q2;
-    return sqrt((b0 * b0 + b1 * b1 + b2 * b2) * splat(map.support_squared)) * splat(1.03f);
+  const Variances variances = variances_of(map.scale, s, e);
+  const auto reach_along = [&](const F8& x, const F8& y, const F8& z) {
+    return pointflight::HWY_NAMESPACE::reach_along(map, variances, {x, y, z});
   };
   const F8 per_depth = splat(1.0f) / in.depth;
   const F8 at_u = in.u * per_depth;
   const F8 at_v = in.v * per_depth;
   const F8 spread = splat(p.spread);
-  reach.at_u = at_u;
-  reach.at_v = at_v;
-  reach.w = reach_along(ew.x, ew.y, ew.z);
-  reach.u = reach_along(eu.x - at_u * ew.x, eu.y - at_u * ew.y, eu.z - at_u * ew.z);
-  reach.v = reach_along(ev.x - at_v * ew.x, ev.y - at_v * ew.y, ev.z - at_v * ew.z);
-  const F8 reach_w = reach.w + spread;
-  const F8 reach_u = reach.u + spread * (splat(1.0f) + abs(at_u));
-  const F8 reach_v = reach.v + spread * (splat(1.0f) + abs(at_v));
+  const F8 reach_w = reach_along(ew.x, ew.y, ew.z) + spread;
+  const F8 reach_u = reach_along(eu.x - at_u * ew.x, eu.y - at_u * ew.y, eu.z - at_u * ew.z) +
+                     spread * (splat(1.0f) + abs(at_u));
+  const F8 reach_v = reach_along(ev.x - at_v * ew.x, ev.y - at_v * ew.y, ev.z - at_v * ew.z) +
+                     spread * (splat(1.0f) + abs(at_v));
   const F8 begin = in.depth - reach_w;
   // around the apex a surfel may be hit in any direction
   const M8 ahead = splat(0.0f) < begin;
@@ -146,31 +102,6 @@ POINTFLIGHT_INLINE std::uint64_t pairs_of(const KernelMap& map,
     pairs |= static_cast<std::uint64_t>(bits(met) & in.surfels) << (8 * g);
   }
   return pairs;
-}
-
-/// Of a surfel's support, so much counts as the surfel in `note_nearest`: by itself it covers
-/// enough for a return up to 0.69 of it, and all the fringe around every edge would be in the way.
-inline constexpr float kSolidShare = 0.5f;
-
-/// Of groups that are one beam's sub-rays, which share an origin: how far the nearest surfel is
-/// that reaches into the group's rectangle, whether a sub-ray hits it or not.
-POINTFLIGHT_INLINE void note_nearest(Packet& p,
-                                     const InFrustum& in,
-                                     const Reach& reach,
-                                     std::uint64_t pairs) {
-  for (std::size_t g = 0; g < p.count; ++g) {
-    const auto which = static_cast<std::uint32_t>(pairs >> (8 * g)) & 0xffu;
-    if (which == 0) continue;
-    // from the group's own origin: the others' rectangle is wider by how far the sensor moved
-    const F8 depth = in.depth - splat(p.shift[g][2]);
-    const F8 beside_u = abs(in.u - splat(p.shift[g][0]) - splat(p.middle_u[g]) * depth);
-    const F8 beside_v = abs(in.v - splat(p.shift[g][1]) - splat(p.middle_v[g]) * depth);
-    const F8 solid = splat(kSolidShare);
-    const M8 inside = (beside_u <= solid * reach.u + splat(p.half_u[g]) * depth) &
-                      (beside_v <= solid * reach.v + splat(p.half_v[g]) * depth) &
-                      (splat(0.0f) <= depth) & lanes_of(which);
-    store(min(load(p.nearest[g]), select(inside, depth, splat(kNever))), p.nearest[g]);
-  }
 }
 
 POINTFLIGHT_INLINE Shapes shape_at(const PacketLeaf& leaf, std::size_t i) {

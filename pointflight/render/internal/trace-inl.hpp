@@ -14,12 +14,11 @@
 
 #include "pointflight/render/internal/beam_packets-inl.hpp"
 #include "pointflight/render/internal/bundle-inl.hpp"
+#include "pointflight/render/internal/grouping-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace pointflight::HWY_NAMESPACE {
 
-/// Beams farther apart than this (rad) do not go together.
-inline constexpr float kWidestBundle = 0.4f;
 /// Where a bundle visits fewer nodes and leaves for each of its beams, it is faster than single
 /// rays anywhere.
 inline constexpr float kFewVisits = 3.5f;
@@ -29,79 +28,6 @@ inline constexpr float kFewVisits = 3.5f;
 /// 0.05 m.
 POINTFLIGHT_INLINE float visits_worth(float nodes_of_single_ray) {
   return 0.38f * nodes_of_single_ray - 1.0f;
-}
-
-/// Beams of one call, and where to write what they hit.
-struct Beams {
-  const KernelMap& map;
-  const Ray* rays;
-  KernelHit* hits;
-};
-
-/// The hits of single rays. Returns how many lists overflowed; adds to the nodes visited.
-static std::uint64_t trace_singly(const Beams& beams,
-                                  const std::uint32_t* order,
-                                  std::size_t count,
-                                  std::size_t& nodes) {
-  const std::size_t steps = most_steps(beams.map);
-  const auto finish = [&](RayState& s) {
-    beams.hits[s.ray] = return_of(beams.map, s.first, s.hits);
-    nodes += steps - s.steps;
-  };
-  return follow_singly<HitMode::kFirst>(beams.map, beams.rays, order, count, finish);
-}
-
-static std::uint64_t trace_singly(const Beams& beams,
-                                  const std::uint32_t* order,
-                                  std::size_t count) {
-  std::size_t nodes = 0;
-  return trace_singly(beams, order, count, nodes);
-}
-
-/// Beams that wait for another way to go.
-struct Waiting {
-  std::uint32_t beams[256] = {};
-  std::size_t count = 0;
-
-  [[nodiscard]] bool has_room() const { return count + 8 <= std::size(beams); }
-  void add(const std::uint32_t* eight) {
-    std::copy(eight, eight + 8, beams + count);
-    count += 8;
-  }
-};
-
-/// How wide groups of eight beams may be, and how far apart those that go together, rad.
-struct Widths {
-  float group, together;
-};
-
-/// Takes groups of eight beams from `at` on, as far as they lie together; `taken` tells where each
-/// begins. Groups that are too wide go to those that wait. Returns the number of groups.
-POINTFLIGHT_INLINE std::size_t fill(const Beams& beams,
-                                    const std::uint32_t* order,
-                                    std::size_t count,
-                                    const Widths& widths,
-                                    std::size_t& at,
-                                    BeamGroups& p,
-                                    std::size_t (&taken)[kGroups],
-                                    Waiting& waiting) {
-  std::size_t groups = 0;
-  while (groups < kGroups && at + 8 <= count && waiting.has_room()) {
-    // beams lie scattered: the next ones are fetched meanwhile
-    for (std::size_t i = at + kTogether; i < std::min(at + kTogether + 8, count); ++i) {
-      hwy::Prefetch(beams.rays + order[i]);
-    }
-    const bool close =
-        take_beams(beams.map, beams.rays, order + at, widths.group, p.groups[groups]);
-    if (close && groups > 0 && !lies_near(p.groups[groups], p.groups[0], widths.together)) break;
-    if (close) {
-      taken[groups++] = at;
-    } else {
-      waiting.add(order + at);
-    }
-    at += 8;
-  }
-  return groups;
 }
 
 static std::uint64_t trace_bundles(const Beams& beams,
@@ -174,7 +100,7 @@ static std::uint64_t trace_packets(const Beams& beams,
     const std::size_t groups = fill(beams, order, count, widths, at, packet, taken, waiting);
     if (!waiting.has_room()) trace_waiting();
     if (groups == 0) continue;
-    set_up_packet(packet, groups, false);
+    set_up_packet(packet, groups);
     walk(beams.map, packet);
     for (std::size_t g = 0; g < groups; ++g) {
       const std::uint32_t* eight = order + taken[g];
@@ -187,49 +113,6 @@ static std::uint64_t trace_packets(const Beams& beams,
   }
   trace_waiting();
   return overflows + trace_singly(beams, order + at, count - at);
-}
-
-/// Footprints wider than this (radius, rad) go down by themselves, a sub-ray at a time.
-inline constexpr float kWidestFootprint = 0.1f;
-
-/// Beams of eight sub-rays, one after the other in `order`: `trace_footprints` of beam_kernel.hpp.
-static std::uint64_t trace_sub_rays(const KernelMap& map,
-                                    const Ray* rays,
-                                    const std::uint32_t* order,
-                                    std::size_t count,
-                                    KernelHit* hits,
-                                    float* nearest) {
-  const Beams beams{map, rays, hits};
-  thread_local const auto room = std::make_unique_for_overwrite<Packet>();
-  Packet& packet = *room;
-  const Widths widths{kWidestFootprint, 8.0f * map.widest_group};
-  std::uint64_t overflows = 0;
-  std::size_t at = 0;
-  Waiting waiting;
-  std::size_t taken[kGroups];
-  const auto trace_waiting = [&] {
-    overflows += trace_singly(beams, waiting.beams, waiting.count);
-    for (std::size_t i = 0; i < waiting.count; i += 8) nearest[waiting.beams[i] / 8] = kNever;
-    waiting.count = 0;
-  };
-  while (at < count) {
-    const std::size_t groups = fill(beams, order, count, widths, at, packet, taken, waiting);
-    if (!waiting.has_room()) trace_waiting();
-    if (groups == 0) continue;
-    set_up_packet(packet, groups, true);
-    walk(map, packet);
-    for (std::size_t g = 0; g < groups; ++g) {
-      const std::uint32_t* eight = order + taken[g];
-      if ((packet.failed >> g & 1u) != 0) {
-        overflows += trace_singly(beams, eight, 8);
-      } else {
-        finish(map, packet.groups[g], packet.rows[g], eight, hits);
-      }
-      nearest[eight[0] / 8] = least(load(packet.nearest[g]));
-    }
-  }
-  trace_waiting();
-  return overflows;
 }
 
 /// True if most groups of eight lie close enough together for packets: a look at a few of them.

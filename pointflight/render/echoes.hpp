@@ -8,7 +8,7 @@
 #include <span>
 
 #include "pointflight/map/body.hpp"
-#include "pointflight/render/renderer.hpp"
+#include "pointflight/render/hit.hpp"
 
 namespace pointflight {
 
@@ -53,12 +53,18 @@ struct Echoes {
   [[nodiscard]] std::span<const Echo> span() const { return {all.data(), count}; }
 };
 
+/// m: energy goes with 1 / range^2 from there on.
+inline constexpr float kNearestEcho = 0.01f;
+
 /// Strength of its signal, in the unit of `Weather::target`.
 double energy_of(const Echo& echo);
 
 /// Parts of a beam as the receiver tells them apart: those that follow within `merge` (m, half a
 /// pulse's length, c tau / 2) of each other in range are one pulse. Sorts `parts`.
 Echoes echoes_of(std::span<BeamPart> parts, float merge);
+
+/// Adds an echo behind the others; of too many the weakest is left out.
+void add_echo(const Echo& echo, Echoes& echoes);
 
 /// All parts as one pulse, however far apart: a surface that the beam grazes stretches it.
 Echo merged(std::span<const BeamPart> parts);

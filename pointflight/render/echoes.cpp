@@ -1,4 +1,4 @@
-#include "pointflight/lidar/echoes.hpp"
+#include "pointflight/render/echoes.hpp"
 
 #include <algorithm>
 #include <tuple>
@@ -6,7 +6,7 @@
 namespace pointflight {
 namespace {
 
-constexpr double kNearest = 0.01;  // m: energy goes with 1 / range^2 from there on
+constexpr double kNearest = kNearestEcho;
 
 double energy_of(const BeamPart& part) {
   const double range = std::max(static_cast<double>(part.range), kNearest);
@@ -53,6 +53,21 @@ Echo merged(std::span<const BeamPart> parts) {
   return echo;
 }
 
+void add_echo(const Echo& echo, Echoes& echoes) {
+  if (echoes.count < Echoes::kMost) {
+    echoes.all[echoes.count++] = echo;
+    return;
+  }
+  // the weakest makes room
+  const auto weakest =
+      std::min_element(echoes.all.begin(), echoes.all.end(), [](const Echo& a, const Echo& b) {
+        return energy_of(a) < energy_of(b);
+      });
+  if (energy_of(*weakest) >= energy_of(echo)) return;
+  std::move(weakest + 1, echoes.all.end(), weakest);
+  echoes.all.back() = echo;
+}
+
 Echoes echoes_of(std::span<BeamPart> parts, float merge) {
   // ties in an order of their own: the sums below are the same bits everywhere
   std::sort(parts.begin(), parts.end(), [](const BeamPart& a, const BeamPart& b) {
@@ -65,20 +80,8 @@ Echoes echoes_of(std::span<BeamPart> parts, float merge) {
   while (begin < parts.size()) {
     std::size_t end = begin + 1;
     while (end < parts.size() && parts[end].range - parts[end - 1].range <= merge) ++end;
-    const Echo echo = merged(parts.subspan(begin, end - begin));
+    add_echo(merged(parts.subspan(begin, end - begin)), echoes);
     begin = end;
-    if (echoes.count < Echoes::kMost) {
-      echoes.all[echoes.count++] = echo;
-      continue;
-    }
-    // the weakest makes room
-    const auto weakest =
-        std::min_element(echoes.all.begin(), echoes.all.end(), [](const Echo& a, const Echo& b) {
-          return energy_of(a) < energy_of(b);
-        });
-    if (energy_of(*weakest) >= energy_of(echo)) continue;
-    std::move(weakest + 1, echoes.all.end(), weakest);
-    echoes.all.back() = echo;
   }
   return echoes;
 }

@@ -1,0 +1,284 @@
+// Wide beams by one way down the tree for up to 64 of them: cones that take the surfels they touch
+// along in lists, look at eight of their sub-rays when these could all have hit something, end
+// where they have, and at the end take more sub-rays over the list if the eight left doubt.
+//
+// Included once a target by Highway's foreach_target; see cone_kernel.cpp.
+#if defined(POINTFLIGHT_RENDER_CONE_INL_HPP) == defined(HWY_TARGET_TOGGLE)
+#ifdef POINTFLIGHT_RENDER_CONE_INL_HPP
+#undef POINTFLIGHT_RENDER_CONE_INL_HPP
+#else
+#define POINTFLIGHT_RENDER_CONE_INL_HPP
+#endif
+
+#include <memory>
+
+#include "pointflight/render/internal/cone_echoes-inl.hpp"
+#include "pointflight/render/internal/cone_kernel.hpp"
+#include "pointflight/render/internal/grouping-inl.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace pointflight::HWY_NAMESPACE {
+
+/// A beam's way is looked at when so much of its axis is covered since the last look.
+inline constexpr float kCoverToLook = 0.6f * kWeightSteps;
+/// In front of what sub-rays hit is what is nearer by so much, m.
+inline constexpr float kBefore = 0.3f;
+
+/// What all beams of a call share, and room for one at a time.
+struct ConeRoom {  // NOLINT(cppcoreguidelines-pro-type-member-init): written before it is read
+  ConeBundle bundle;
+  SubRayRows rows;
+  BeamParts parts;
+};
+struct ConeCall {
+  const KernelMap& map;
+  const SurfelMap& surfels;
+  const Ray* rays;
+  const WideBeams& wide;
+  const Reflectances reflectances;
+  const SubRayLanes& eight;
+  ConeRoom& room;
+};
+
+/// The eight sub-rays of the first level, up to the beam's end. True if all have hit something:
+/// nothing behind the farthest counts, and the beam ends there.
+POINTFLIGHT_INLINE bool look(const ConeCall& call, ConeBeam& beam) {
+  hit_sub_rays(call.map, call.room.bundle, beam, call.eight, beam.end, call.room.rows, beam.eight);
+  beam.looked = beam.list.count;
+  beam.cover = 0.0f;
+  const float farthest = greatest(load(beam.eight.range));
+  if (farthest == kNever) return false;
+  beam.end = std::min(beam.end, farthest + call.map.window);
+  forget_behind(call.room.bundle, beam);
+  beam.looked = beam.list.count;
+  return true;
+}
+
+/// Looks at beams of `which` that are due before `t` (m). Returns those whose way goes on to there.
+POINTFLIGHT_INLINE std::uint64_t look_at_due(const ConeCall& call, std::uint64_t which, float t) {
+  ConeBundle& b = call.room.bundle;
+  const F8 here = splat(t);
+  std::uint64_t going_on = 0;
+  std::uint32_t shorter = 0;  // groups
+  for (std::size_t g = 0; g < b.count; ++g) {
+    const auto mine = static_cast<std::uint32_t>(which >> (8 * g)) & 0xffu;
+    if (mine == 0) continue;
+    std::uint32_t due = bits(load(b.look_behind[g]) < here) & mine;
+    for (; due != 0; due &= due - 1) {
+      const auto i = static_cast<std::size_t>(std::countr_zero(due));
+      ConeBeam& beam = b.beams[8 * g + i];
+      b.look_behind[g][i] = kNever;
+      if (!look(call, beam)) continue;
+      b.groups[g].end[i] = beam.end;
+      shorter |= 1u << g;
+    }
+    const std::uint32_t on = bits(here <= load(b.groups[g].end)) & mine;
+    going_on |= static_cast<std::uint64_t>(on) << (8 * g);
+  }
+  if (shorter == 0) return going_on;
+  for (; shorter != 0; shorter &= shorter - 1) {
+    const auto g = static_cast<std::size_t>(std::countr_zero(shorter));
+    b.group_end[g] = greatest(load(b.groups[g].end));
+  }
+  b.end = greatest(load(b.group_end));
+  return going_on;
+}
+
+/// A leaf's surfels into the lists of the beams that touch them.
+template <bool kOneOrigin>
+POINTFLIGHT_INLINE void visit_leaf(const ConeCall& call, const BundleEntry& entry) {
+  const KernelMap& map = call.map;
+  ConeBundle& b = call.room.bundle;
+  if (!is_readable_leaf(entry.place, map.word_count)) return;
+  std::uint64_t beams = look_at_due(call, entry.beams, entry.place.t);
+  if (beams == 0) return;
+  const ConeLeaf leaf = cone_leaf(map, entry.place);
+  float corner[3];
+  const auto set_corner = [&](std::size_t n) {
+    for (int k = 0; k < 3; ++k) {
+      corner[k] = static_cast<float>(leaf.corner[k] - b.groups[n >> 3].origin[k][n & 7]);
+    }
+  };
+  set_corner(0);
+  // first all that may touch, then those that do: a branch for each pair is one too many
+  std::uint8_t numbers[kTogether];
+  std::uint8_t lanes[kTogether];
+  std::size_t near_by = 0;
+  for (; beams != 0; beams &= beams - 1) {
+    const auto n = static_cast<std::size_t>(std::countr_zero(beams));
+    if constexpr (!kOneOrigin) set_corner(n);
+    numbers[near_by] = static_cast<std::uint8_t>(n);
+    const ConeBeam& beam = b.beams[n];
+    lanes[near_by] = static_cast<std::uint8_t>(may_touch(leaf, beam, see(leaf, beam, corner)));
+    near_by += lanes[near_by] != 0 ? 1 : 0;
+  }
+  for (std::size_t k = 0; k < near_by; ++k) {
+    const std::size_t n = numbers[k];
+    ConeBeam& beam = b.beams[n];
+    if (beam.list.count + 8 > kMostSurfels) {
+      beam.failed = true;
+      continue;
+    }
+    if constexpr (!kOneOrigin) set_corner(n);
+    touch(map, leaf, see(leaf, beam, corner), lanes[k], b, beam);
+    const bool due = beam.cover >= kCoverToLook;
+    b.look_behind[n >> 3][n & 7] = due ? beam.far + map.window : kNever;
+  }
+}
+
+/// The way of a bundle through the tree; `beams` has a bit for each that goes.
+POINTFLIGHT_INLINE void walk(const ConeCall& call, std::uint64_t beams) {
+  const KernelMap& map = call.map;
+  ConeBundle& b = call.room.bundle;
+  b.stack[b.depth++] = {{0.0f, 0, Bvh8Node::kInner}, beams};
+  std::size_t steps = most_steps(map);
+  while (b.depth > 0 && steps-- > 0) {
+    const BundleEntry entry = b.stack[--b.depth];
+    if (entry.place.t > b.end) continue;
+    if (entry.place.meta == Bvh8Node::kInner) {
+      if (entry.place.index >= map.node_count) continue;
+      const std::uint64_t going_on = look_at_due(call, entry.beams, entry.place.t);
+      if (going_on != 0) enter_children(map, b, map.nodes[entry.place.index], going_on);
+    } else if (b.one_origin) {
+      visit_leaf<true>(call, entry);
+    } else {
+      visit_leaf<false>(call, entry);
+    }
+  }
+}
+
+/// Sub-rays of a beam with more surfels than its list holds, as lines.
+static HWY_NOINLINE void hit_as_lines(const ConeCall& call,
+                                      const ConeBeam& beam,
+                                      const SubRayLanes& sub_rays,
+                                      SubRayHits& hits) {
+  constexpr std::uint32_t kOrder[8] = {0, 1, 2, 3, 4, 5, 6, 7};
+  Ray rays[8];
+  KernelHit found[8];
+  for (std::size_t i = 0; i < 8; ++i) {
+    rays[i] = call.rays[beam.ray];
+    const auto along = [&](int k) {
+      return beam.direction[k] + sub_rays.x[i] * beam.across[k] + sub_rays.y[i] * beam.up[k];
+    };
+    rays[i].direction_world[beam.u] = along(0);
+    rays[i].direction_world[beam.v] = along(1);
+    rays[i].direction_world[beam.w] = beam.forward * along(2);
+    rays[i].direction_world.normalize();
+  }
+  trace_singly({call.map, rays, found}, kOrder, 8);
+  for (std::size_t i = 0; i < 8; ++i) {
+    hits.range[i] = found[i].range < 0.0f ? kNever : found[i].range;
+    hits.cosine[i] = found[i].cos_incidence;
+    hits.word[i] = static_cast<std::int32_t>(found[i].strongest);
+  }
+}
+
+/// The parts of a further level's sub-rays into `parts`.
+static HWY_NOINLINE void take_level(const ConeCall& call, const ConeBeam& beam, std::size_t level) {
+  BeamParts& parts = call.room.parts;
+  const std::vector<SubRayLanes>& sub_rays = sub_rays_of_level(level);
+  parts.eights = sub_rays.size();
+  parts.sub_rays = sub_rays.data();
+  for (std::size_t k = 0; k < parts.eights; ++k) {
+    if (beam.failed) {
+      hit_as_lines(call, beam, sub_rays[k], parts.hits[k]);
+    } else {
+      hit_sub_rays(
+          call.map, call.room.bundle, beam, sub_rays[k], beam.end, call.room.rows, parts.hits[k]);
+    }
+  }
+  light_up(call.surfels, call.reflectances, parts);
+}
+
+/// True if eight sub-rays are the beam: they hit one plane, or nothing, and nothing is between
+/// them.
+POINTFLIGHT_INLINE bool is_settled(const ConeCall& call, const ConeBeam& beam) {
+  if (beam.failed) return false;
+  const F8 range = load(beam.eight.range);
+  const std::uint32_t hit = bits(range < splat(kNever));
+  if (hit != 0 && hit != 0xffu) return false;
+  if (hit != 0 && !lie_in_plane(call.eight, beam.eight)) return false;
+  return !has_before(call.room.bundle, beam, call.eight, range, kBefore);
+}
+
+/// The echoes of a beam at the end of its way.
+static HWY_NOINLINE void finish(const ConeCall& call, ConeBeam& beam) {
+  Echoes& echoes = call.wide.echoes[beam.ray];
+  if (beam.list.count == 0) {
+    echoes.count = 0;
+    return;
+  }
+  // eight that know all of the list: its end is the same whatever was looked at before
+  if (beam.looked != beam.list.count) look(call, beam);
+  if (is_settled(call, beam)) {
+    const float farthest = greatest(load(beam.eight.range));
+    echoes.count = farthest == kNever ? 0 : 1;
+    if (echoes.count != 0) {
+      echoes.all[0] = echo_of_eight(call.surfels, call.reflectances, call.eight, beam.eight);
+    }
+    return;
+  }
+  BeamParts& parts = call.room.parts;
+  // as lines they are dear: eight must do
+  for (std::size_t level = beam.failed ? 0 : 1; level < kSubRayLevels; ++level) {
+    take_level(call, beam, level);
+    make_echoes(parts, call.wide.merge, echoes);
+    if (beam.failed) return;
+    // what 96 have not hit is no surface, only surfels; what 32 have not is not the strongest
+    const bool has_missed =
+        level == 1 && !call.wide.receiver->takes_strongest() &&
+        has_before(
+            call.room.bundle, beam, call.eight, splat(nearest_behind(parts, -1.0f)), kBefore);
+    if (!has_missed && !needs_more_sub_rays(echoes, *call.wide.receiver)) return;
+  }
+}
+
+static void trace_wide(const KernelMap& map,
+                       const SurfelMap& surfels,
+                       const Ray* rays,
+                       const std::uint32_t* order,
+                       std::size_t count,
+                       const WideBeams& wide) {
+  // some MB, too large for stacks; filled as it is needed
+  thread_local const auto room = std::make_unique_for_overwrite<ConeRoom>();
+  ConeBundle& bundle = room->bundle;
+  const ConeCall call{
+      map, surfels, rays, wide, wide.receiver->reflectances(), sub_rays_of_level(0)[0], *room};
+  const Beams beams{map, rays, nullptr};
+  const Widths widths{kWidestBundle, kWidestBundle};
+  const auto run =
+      [&](std::size_t groups, const std::uint32_t* const* of_groups, std::uint64_t which) {
+        set_up_cones(wide, bundle, groups, of_groups);
+        walk(call, which);
+        for (; which != 0; which &= which - 1) finish(call, bundle.beams[std::countr_zero(which)]);
+      };
+  const auto run_alone = [&](const std::uint32_t* some, std::size_t of_them) {
+    for (std::size_t i = 0; i < of_them; ++i) {
+      const std::uint32_t eight[8] = {
+          some[i], some[i], some[i], some[i], some[i], some[i], some[i], some[i]};
+      take_beams(map, rays, eight, kWidestBundle, bundle.groups[0]);
+      const std::uint32_t* const of_group = eight;
+      run(1, &of_group, 1);
+    }
+  };
+  std::size_t at = 0;
+  Waiting waiting;
+  std::size_t taken[kGroups];
+  while (at + 8 <= count) {
+    const std::size_t groups = fill(beams, order, count, widths, at, bundle, taken, waiting);
+    if (groups > 0) {
+      const std::uint32_t* of_groups[kGroups];
+      for (std::size_t g = 0; g < groups; ++g) of_groups[g] = order + taken[g];
+      const std::uint64_t all = ~std::uint64_t{0} >> (64 - 8 * groups);
+      run(groups, of_groups, all);
+    }
+    run_alone(waiting.beams, waiting.count);
+    waiting.count = 0;
+  }
+  run_alone(order + at, count - at);
+}
+
+}  // namespace pointflight::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif

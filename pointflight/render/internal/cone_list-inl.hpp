@@ -1,0 +1,233 @@
+// Wide beams on their way down the tree together: their frames, and the lists of surfels that their
+// cross-sections touch.
+//
+// Included once a target by Highway's foreach_target; see cone_kernel.cpp.
+#if defined(POINTFLIGHT_RENDER_CONE_LIST_INL_HPP) == defined(HWY_TARGET_TOGGLE)
+#ifdef POINTFLIGHT_RENDER_CONE_LIST_INL_HPP
+#undef POINTFLIGHT_RENDER_CONE_LIST_INL_HPP
+#else
+#define POINTFLIGHT_RENDER_CONE_LIST_INL_HPP
+#endif
+
+#include "pointflight/render/internal/bundle-inl.hpp"
+#include "pointflight/render/internal/sub_rays.hpp"
+#include "pointflight/render/wide_beams.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace pointflight::HWY_NAMESPACE {
+
+/// How far from its axis a beam is looked at, sigmas: just beyond the outermost sub-ray.
+inline constexpr float kConeRadius = 2.23f;
+/// Surfels in the list of one beam.
+inline constexpr std::size_t kMostSurfels = 1000;
+
+/// Surfels of a leaf as a beam sees them, a lane each. Of a sub-ray that lies (u, v) beside the
+/// axis
+/// (`ConeBeam`) m^2 is quadratic in u and v, if directions within the beam are taken as parallel,
+/// and the inverse of its depth, as a plane's is, linear.
+struct ConeBlock {
+  alignas(32) float m2[6][8];       ///< Of 1, u, v, u^2, u v, v^2.
+  alignas(32) float inverse[3][8];  ///< Of 1, u, v; 1/m.
+  alignas(32) float cosine[8];      ///< |e0 . d|, in whole steps.
+  alignas(32) float nearest[8];     ///< The inverse depth of the nearest ray that touches it, 1/m.
+  alignas(32) float solid[8];       ///< 1: the beam touches more than its fringe; else 0.
+  alignas(32) float word[8];        ///< Its number in the map, as bits.
+};
+
+/// The surfels that a beam touches.
+struct ConeList {
+  std::size_t count;
+  float at[kMostSurfels + 8];  ///< Each one's lane in the pool, counted in floats, as bits.
+};
+
+/// One of them: a lane of a block.
+struct ConeSurfel {
+  const float* lane;
+
+  [[nodiscard]] POINTFLIGHT_INLINE float m2(std::size_t k) const { return lane[8 * k]; }
+  [[nodiscard]] POINTFLIGHT_INLINE float inverse(std::size_t k) const { return lane[8 * (6 + k)]; }
+  [[nodiscard]] POINTFLIGHT_INLINE float cosine() const { return lane[8 * 9]; }
+  [[nodiscard]] POINTFLIGHT_INLINE float nearest() const { return lane[8 * 10]; }
+  [[nodiscard]] POINTFLIGHT_INLINE float solid() const { return lane[8 * 11]; }
+  [[nodiscard]] POINTFLIGHT_INLINE float word() const { return lane[8 * 12]; }
+};
+inline constexpr std::size_t kBlockFloats = sizeof(ConeBlock) / sizeof(float);
+
+/// What eight sub-rays hit.
+struct SubRayHits {
+  alignas(32) float range[8];  ///< m; kNever: nothing.
+  alignas(32) float cosine[8];
+  alignas(32) std::int32_t word[8];  ///< Of the surfel with the largest weight.
+};
+
+/// A wide beam on its way. Its frame has the map's axes: w is the one that its direction is closest
+/// to, forwards, and u and v are the others; positions across it are u and v at depth w = 1.
+struct ConeBeam {
+  SubRayHits eight;       ///< Of the first level, as of the last look.
+  int u, v, w;            ///< Axes of the map.
+  float forward;          ///< 1, or -1 if it goes against the map's w.
+  float direction[3];     ///< In u, v, w.
+  float across[3];        ///< One sigma, rad: axes of the cross-section, turned,
+  float up[3];            ///< in u, v, w.
+  float at_u, at_v;       ///< Of the axis.
+  float length;           ///< Of it to depth 1.
+  float wide_u, wide_v;   ///< Half the beam, at depth 1.
+  float uu, uv, vv, det;  ///< Its covariance at depth 1.
+  float end;              ///< Nothing beyond counts, m.
+  float far;              ///< Of what the list holds, m.
+  float cover;            ///< Of the axis, since the last look.
+  std::size_t looked;     ///< Surfels that the last look knew.
+  std::uint32_t ray;
+  bool failed;  ///< More surfels than the list holds.
+  ConeList list;
+};
+
+struct ConeBundle : BundleWay {
+  float wide_u, wide_v;  ///< Half the widest beam, in the bundle's u and v, rad.
+  alignas(32) float look_behind[kGroups][8];  ///< Time to look when a way has come so far, m.
+  ConeBeam beams[kTogether];
+  std::size_t used;  ///< Of the pool.
+  ConeBlock pool[kTogether * kMostSurfels];
+};
+
+POINTFLIGHT_INLINE ConeSurfel surfel_at(const ConeBundle& b, const ConeList& list, std::size_t i) {
+  return {&b.pool[0].m2[0][0] + std::bit_cast<std::uint32_t>(list.at[i])};
+}
+
+/// The directions across a group's beams in which they are `sigma_across` wide.
+struct AcrossLanes {
+  alignas(32) float x[8], y[8], z[8];
+};
+
+/// The frame of a beam and its cross-section in it.
+POINTFLIGHT_INLINE void set_up_frame(const float (&direction)[3],
+                                     const float (&across)[3],
+                                     const float (&up)[3],
+                                     ConeBeam& beam) {
+  const float x = std::abs(direction[0]);
+  const float y = std::abs(direction[1]);
+  const float z = std::abs(direction[2]);
+  beam.w = z >= x && z >= y ? 2 : y >= x ? 1 : 0;
+  beam.u = (beam.w + 1) % 3;
+  beam.v = (beam.w + 2) % 3;
+  beam.forward = direction[beam.w] < 0.0f ? -1.0f : 1.0f;
+  const auto turned = [&](const float(&from)[3], float(&to)[3]) {
+    to[0] = from[beam.u];
+    to[1] = from[beam.v];
+    to[2] = beam.forward * from[beam.w];
+  };
+  turned(direction, beam.direction);
+  turned(across, beam.across);
+  turned(up, beam.up);
+  beam.length = 1.0f / beam.direction[2];
+  beam.at_u = beam.direction[0] * beam.length;
+  beam.at_v = beam.direction[1] * beam.length;
+  // where one sigma along each axis of the section lies at depth 1
+  const float a_u = (beam.across[0] - beam.at_u * beam.across[2]) * beam.length;
+  const float a_v = (beam.across[1] - beam.at_v * beam.across[2]) * beam.length;
+  const float b_u = (beam.up[0] - beam.at_u * beam.up[2]) * beam.length;
+  const float b_v = (beam.up[1] - beam.at_v * beam.up[2]) * beam.length;
+  beam.uu = a_u * a_u + b_u * b_u;
+  beam.uv = a_u * a_v + b_u * b_v;
+  beam.vv = a_v * a_v + b_v * b_v;
+  const float det = a_u * b_v - a_v * b_u;
+  beam.det = det * det;
+  beam.wide_u = kConeRadius * std::sqrt(beam.uu);
+  beam.wide_v = kConeRadius * std::sqrt(beam.vv);
+}
+
+/// The axes of eight beams' cross-sections, turned as their sub-rays are, into `b.beams`; how far
+/// they reach in u and v is noted.
+POINTFLIGHT_INLINE void set_up_sections(const WideBeams& wide,
+                                        ConeBundle& b,
+                                        std::size_t g,
+                                        const std::uint32_t* rays) {
+  AcrossLanes a;  // NOLINT(cppcoreguidelines-pro-type-member-init): written below
+  alignas(32) float cosines[8];
+  alignas(32) float sines[8];
+  for (std::size_t i = 0; i < 8; ++i) {
+    const Vector3f& across = wide.across[rays[i]];
+    a.x[i] = across.x();
+    a.y[i] = across.y();
+    a.z[i] = across.z();
+    const Turn turn = turn_of(rays[i]);
+    cosines[i] = turn.cosine;
+    sines[i] = turn.sine;
+  }
+  const Group& group = b.groups[g];
+  const F8 dx = load(group.dx);
+  const F8 dy = load(group.dy);
+  const F8 dz = load(group.dz);
+  const F8 x = load(a.x);
+  const F8 y = load(a.y);
+  const F8 z = load(a.z);
+  const F8 c = load(cosines);
+  const F8 s = load(sines);
+  const F8 wide_across = splat(wide.sigma_across);
+  const F8 wide_up = splat(wide.sigma_up);
+  const F8 up[3] = {dy * z - dz * y, dz * x - dx * z, dx * y - dy * x};
+  const F8 from[3] = {x, y, z};
+  alignas(32) float axes[2][3][8];
+  for (int k = 0; k < 3; ++k) {
+    const F8 along = wide_across * from[k];
+    const F8 upward = wide_up * up[k];
+    store(c * along + s * upward, axes[0][k]);
+    store(c * upward - s * along, axes[1][k]);
+  }
+  for (std::size_t i = 0; i < 8; ++i) {
+    ConeBeam& beam = b.beams[8 * g + i];
+    const float direction[3] = {group.dx[i], group.dy[i], group.dz[i]};
+    const float first[3] = {axes[0][0][i], axes[0][1][i], axes[0][2][i]};
+    const float second[3] = {axes[1][0][i], axes[1][1][i], axes[1][2][i]};
+    set_up_frame(direction, first, second, beam);
+  }
+  // how far the section reaches in u: |(a - (d.u / d.w) w) . axes| / d.w
+  const auto along = [](const float(&of)[3][8], const float* axis) {
+    return load(of[0]) * splat(axis[0]) + load(of[1]) * splat(axis[1]) +
+           load(of[2]) * splat(axis[2]);
+  };
+  const F8 ahead = dx * splat(b.w[0]) + dy * splat(b.w[1]) + dz * splat(b.w[2]);
+  const F8 per_ahead = splat(1.0f) / ahead;
+  const F8 first_w = along(axes[0], b.w);
+  const F8 second_w = along(axes[1], b.w);
+  const auto reach = [&](const float* axis, const float* at) {
+    const F8 first = along(axes[0], axis) - load(at) * first_w;
+    const F8 second = along(axes[1], axis) - load(at) * second_w;
+    return greatest(sqrt(first * first + second * second) * per_ahead);
+  };
+  b.wide_u = std::max(b.wide_u, kConeRadius * reach(b.u, b.at_u[g]));
+  b.wide_v = std::max(b.wide_v, kConeRadius * reach(b.v, b.at_v[g]));
+}
+
+/// Sets up a bundle of the first `count` groups; `rays[g]` are those of group g.
+POINTFLIGHT_INLINE void set_up_cones(const WideBeams& wide,
+                                     ConeBundle& b,
+                                     std::size_t count,
+                                     const std::uint32_t* const* rays) {
+  for (std::size_t g = 0; g < count; ++g) {
+    for (std::size_t i = 0; i < 8; ++i) hwy::Prefetch(&wide.across[rays[g][i]]);
+  }
+  set_up_way(b, count);
+  b.used = 0;
+  b.wide_u = b.wide_v = 0.0f;
+  for (std::size_t g = 0; g < count; ++g) {
+    set_up_sections(wide, b, g, rays[g]);
+    store(splat(kNever), b.look_behind[g]);
+    for (std::size_t i = 0; i < 8; ++i) {
+      ConeBeam& beam = b.beams[8 * g + i];
+      beam.end = b.groups[g].end[i];
+      beam.far = 0.0f;
+      beam.cover = 0.0f;
+      beam.looked = 0;
+      beam.list.count = 0;
+      beam.ray = rays[g][i];
+      beam.failed = false;
+    }
+  }
+  widen(b, b.wide_u, b.wide_v);
+}
+
+}  // namespace pointflight::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif
