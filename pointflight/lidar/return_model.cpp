@@ -114,9 +114,11 @@ Echo ReturnModel::echo_of(const Hit& hit) const {
 }
 
 Reflectances ReturnModel::reflectances() const {
+  const bool says =
+      surroundings_.reflectivity_per_intensity > 0.0 || surroundings_.reflectivity > 0.0;
   return {.per_intensity = static_cast<float>(surroundings_.reflectivity_per_intensity),
           .same = static_cast<float>(surroundings_.reflectivity),
-          .usual = usual_reflectivities().data(),
+          .usual = says ? nullptr : usual_reflectivities().data(),
           .least = static_cast<float>(kDarkest)};
 }
 

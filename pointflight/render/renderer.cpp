@@ -14,8 +14,6 @@
 namespace pointflight {
 namespace {
 
-constexpr std::size_t kSubRays = 32;  // of a wide beam, by renderers that trace single rays
-
 /// All is there already.
 class Rendered : public Rendering {
  public:
@@ -96,9 +94,9 @@ std::unique_ptr<Rendering> Renderer::submit(std::span<const RenderJob> jobs,
 void Renderer::render_wide(const RenderJob& job, const Executor& executor) const {
   std::vector<std::uint32_t> beams(job.batch.order.begin(), job.batch.order.end());
   if (beams.size() != job.batch.rays.size()) beams = direction_order(job.batch.rays, executor);
-  const std::size_t count = job.wide->sub_rays > 0 ? job.wide->sub_rays : kSubRays;
+  const std::size_t count = job.wide->sub_rays > 0 ? job.wide->sub_rays : kUsualSubRays;
   const auto render_lines = [&](const RenderJob& lines) { render_one(lines, executor); };
-  render_sub_rays(job, beams, count, render_lines, executor);
+  find_echoes(job, beams, count, render_lines, executor);
 }
 
 Hit Renderer::trace(const Ray& ray) const {

@@ -289,11 +289,6 @@ POINTFLIGHT_INLINE I8 count_from(std::int32_t first) {
   POINTFLIGHT_EACH(hn::Iota(kI, first + static_cast<std::int32_t>(p * kWidth)))
   return out;
 }
-POINTFLIGHT_INLINE U8 count_bits_from(std::uint32_t first) {
-  U8 out;
-  POINTFLIGHT_EACH(hn::Iota(kU, first + static_cast<std::uint32_t>(p * kWidth)))
-  return out;
-}
 POINTFLIGHT_INLINE U8 as_bits(const I8& a) {
   U8 out;
   POINTFLIGHT_EACH(hn::BitCast(kU, a.v[p]))

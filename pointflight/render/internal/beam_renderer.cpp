@@ -15,8 +15,6 @@ namespace pointflight {
 namespace {
 
 constexpr std::size_t kChunk = 1024;  // rays
-constexpr std::size_t kSubRaysAtBodies = 32;
-constexpr float kBeamRadius = 2.22f;  // sigmas
 
 const SurfelMap& map_of(const Scene& scene) {
   require_argument(scene.map != nullptr, "BeamRenderer: the scene has no map");
@@ -39,22 +37,27 @@ std::vector<std::uint32_t> hide_behind_bodies(const RenderJob& job,
                                               const Executor& executor) {
   const WideBeams& wide = *job.wide;
   const std::vector<SubRay> eight = rim_of_eight();
-  SubRayBatch batch(job, beams, eight, executor);
-  render_bodies(batch.lines().batch, batch.hits, executor);
-  std::vector<std::uint32_t> mixed;
-  for (std::size_t b = 0; b < beams.size(); ++b) {
-    const std::span hits = std::span(batch.hits).subspan(b * eight.size(), eight.size());
-    const auto met = [](const Hit& hit) { return hit.is_return(); };
-    if (std::none_of(hits.begin(), hits.end(), met)) continue;
-    Echoes& echoes = wide.echoes[beams[b]];
+  const auto met = [](const Hit& hit) { return hit.is_return(); };
+  std::vector<std::uint8_t> is_mixed(beams.size(), 0);
+  const auto receive = [&](std::size_t k, std::span<const Hit> hits) {
+    if (std::none_of(hits.begin(), hits.end(), met)) return;
+    Echoes& echoes = wide.echoes[beams[k]];
     float nearest = std::numeric_limits<float>::infinity();  // of the map
     for (const Echo& echo : echoes.span()) nearest = std::min(nearest, echo.range - echo.depth);
     const auto in_front = [&](const Hit& hit) { return met(hit) && hit.range < nearest; };
     if (std::all_of(hits.begin(), hits.end(), in_front)) {
       echoes = echoes_of_hits(wide, eight, hits);
     } else {
-      mixed.push_back(beams[b]);
+      is_mixed[k] = 1;
     }
+  };
+  const auto render = [&](const RenderJob& lines) {
+    render_bodies(lines.batch, lines.hits, executor);
+  };
+  render_sub_rays(job, beams, eight, render, receive, executor);
+  std::vector<std::uint32_t> mixed;
+  for (std::size_t k = 0; k < beams.size(); ++k) {
+    if (is_mixed[k] != 0) mixed.push_back(beams[k]);
   }
   return mixed;
 }
@@ -81,7 +84,7 @@ void BeamRenderer::render_one(const RenderJob& job, const Executor& executor) co
 /// Through the map as cones; those that bodies may touch by sub-rays.
 void BeamRenderer::render_wide(const RenderJob& job, const Executor& executor) const {
   const WideBeams& wide = *job.wide;
-  const float widest = kBeamRadius * std::max(wide.sigma_across, wide.sigma_up);
+  const float widest = kSubRayRadius * std::max(wide.sigma_across, wide.sigma_up);
   if (wide.sub_rays != 0 || widest > kWidestCone) {
     Renderer::render_wide(job, executor);
     return;
@@ -95,7 +98,7 @@ void BeamRenderer::render_wide(const RenderJob& job, const Executor& executor) c
   const std::vector<std::uint32_t> near = rays_near_bodies(batch, widest, executor);
   const std::vector<std::uint32_t> mixed = hide_behind_bodies(job, near, executor);
   const auto render_lines = [&](const RenderJob& lines) { render_one(lines, executor); };
-  render_sub_rays(job, mixed, kSubRaysAtBodies, render_lines, executor);
+  find_echoes(job, mixed, kUsualSubRays, render_lines, executor);
 }
 
 Hit BeamRenderer::trace(const Ray& ray) const {

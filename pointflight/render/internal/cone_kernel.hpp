@@ -15,7 +15,7 @@ inline constexpr float kWidestCone = 0.1f;
 /// Finds the echoes of the wide beams `order[0..]` in a map, with as many sub-rays as it takes
 /// (docs/architecture.md, "Wide beams"). The results are the same bits on all instruction sets,
 /// whatever the order and whatever else is traced in the same call, but for beams that touch more
-/// than 96 leaves.
+/// than 1,000 surfels.
 void trace_cones(const SurfelMap& surfels,
                  const KernelMap& map,
                  std::span<const Ray> rays,

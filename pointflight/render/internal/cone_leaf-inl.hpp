@@ -1,6 +1,5 @@
 // The surfels of a leaf as wide beams see them: each that a beam's cross-section touches goes into
-// the beam's list, as a quadratic over the cross-section, so that sub-rays need no way of their
-// own.
+// the beam's list, as a quadratic over the cross-section: sub-rays need no way of their own.
 //
 // Whatever decides of a beam's result is calculated in the beam's own frame: which beams go
 // together does not change a bit of it.
@@ -124,9 +123,9 @@ POINTFLIGHT_INLINE F8 soft_weights_of(const KernelMap& map, const F8& m2) {
   return rounded(steps * share * share);
 }
 
-/// Of a surfel's support, so much counts as the surfel where none of a few sub-rays hits it: by
-/// itself it covers enough for a return up to 0.69 of it, and all the fringe around every edge
-/// would be in the way.
+/// Of a surfel's support, so much counts as the surfel where none of a few sub-rays hits it: with
+/// all of it every edge's fringe would be in the way, with half of it shares of wires are missed
+/// (footprint_test).
 inline constexpr float kSolidShare = 0.62f;
 
 /// The surfels of `lanes` that a beam touches, into its list, which has room. To its cover, too.
@@ -197,10 +196,10 @@ POINTFLIGHT_INLINE void touch(const KernelMap& map,
   store(nearest, block.nearest);
   const F8 solid = splat(kSolidShare * map.support) + room;
   store(select(m2 < solid * solid, one, zero), block.solid);
-  store(as_float(count_bits_from(leaf.first_word)), block.word);
+  store(as_float(as_bits(count_from(static_cast<std::int32_t>(leaf.first_word)))), block.word);
   ConeList& list = beam.list;
-  const auto first = static_cast<std::uint32_t>(b.used * kBlockFloats);
-  store_chosen(as_float(count_bits_from(first)), touched, list.at + list.count);
+  const auto first = static_cast<std::int32_t>(b.used * kBlockFloats);
+  store_chosen(as_float(as_bits(count_from(first))), touched, list.at + list.count);
   const std::uint32_t which = bits(touched);
   list.count += static_cast<std::size_t>(std::popcount(which));
   b.used += which != 0 ? 1 : 0;

@@ -17,12 +17,11 @@ HWY_BEFORE_NAMESPACE();
 namespace pointflight::HWY_NAMESPACE {
 
 /// How far from its axis a beam is looked at, sigmas: just beyond the outermost sub-ray.
-inline constexpr float kConeRadius = 2.23f;
+inline constexpr float kConeRadius = kSubRayRadius + 0.01f;
 /// Surfels in the list of one beam.
 inline constexpr std::size_t kMostSurfels = 1000;
 
-/// Surfels of a leaf as a beam sees them, a lane each. Of a sub-ray that lies (u, v) beside the
-/// axis
+/// Surfels of a leaf as a beam sees them, a lane each. Of a sub-ray (u, v) beside the axis
 /// (`ConeBeam`) m^2 is quadratic in u and v, if directions within the beam are taken as parallel,
 /// and the inverse of its depth, as a plane's is, linear.
 struct ConeBlock {
@@ -94,11 +93,6 @@ POINTFLIGHT_INLINE ConeSurfel surfel_at(const ConeBundle& b, const ConeList& lis
   return {&b.pool[0].m2[0][0] + std::bit_cast<std::uint32_t>(list.at[i])};
 }
 
-/// The directions across a group's beams in which they are `sigma_across` wide.
-struct AcrossLanes {
-  alignas(32) float x[8], y[8], z[8];
-};
-
 /// The frame of a beam and its cross-section in it.
 POINTFLIGHT_INLINE void set_up_frame(const float (&direction)[3],
                                      const float (&across)[3],
@@ -142,14 +136,12 @@ POINTFLIGHT_INLINE void set_up_sections(const WideBeams& wide,
                                         ConeBundle& b,
                                         std::size_t g,
                                         const std::uint32_t* rays) {
-  AcrossLanes a;  // NOLINT(cppcoreguidelines-pro-type-member-init): written below
+  alignas(32) float wide_along[3][8];
   alignas(32) float cosines[8];
   alignas(32) float sines[8];
   for (std::size_t i = 0; i < 8; ++i) {
     const Vector3f& across = wide.across[rays[i]];
-    a.x[i] = across.x();
-    a.y[i] = across.y();
-    a.z[i] = across.z();
+    for (int k = 0; k < 3; ++k) wide_along[k][i] = across[k];
     const Turn turn = turn_of(rays[i]);
     cosines[i] = turn.cosine;
     sines[i] = turn.sine;
@@ -158,9 +150,9 @@ POINTFLIGHT_INLINE void set_up_sections(const WideBeams& wide,
   const F8 dx = load(group.dx);
   const F8 dy = load(group.dy);
   const F8 dz = load(group.dz);
-  const F8 x = load(a.x);
-  const F8 y = load(a.y);
-  const F8 z = load(a.z);
+  const F8 x = load(wide_along[0]);
+  const F8 y = load(wide_along[1]);
+  const F8 z = load(wide_along[2]);
   const F8 c = load(cosines);
   const F8 s = load(sines);
   const F8 wide_across = splat(wide.sigma_across);

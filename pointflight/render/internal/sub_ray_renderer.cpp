@@ -28,32 +28,6 @@ void aim(const WideBeams& wide,
 
 }  // namespace
 
-SubRayBatch::SubRayBatch(const RenderJob& job,
-                         std::span<const std::uint32_t> beams,
-                         const std::vector<SubRay>& sub_rays,
-                         const Executor& executor)
-    : batch_(job.batch) {
-  const std::size_t n = sub_rays.size();
-  rays.resize(beams.size() * n);
-  hits.resize(rays.size());
-  offsets.resize(job.batch.time_offsets.empty() ? 0 : rays.size());
-  executor.parallel_for(beams.size(), kBeamsPerChunk, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t b = begin; b < end; ++b) {
-      const Ray& middle = job.batch.rays[beams[b]];
-      aim(*job.wide, middle, beams[b], sub_rays, std::span(rays).subspan(b * n, n));
-      if (offsets.empty()) continue;
-      std::fill_n(&offsets[b * n], n, job.batch.time_offsets[beams[b]]);
-    }
-  });
-  batch_.rays = rays;
-  batch_.order = {};
-  batch_.time_offsets = offsets;
-}
-
-RenderJob SubRayBatch::lines() {
-  return {batch_, hits, std::nullopt};
-}
-
 Echoes echoes_of_hits(const WideBeams& wide,
                       const std::vector<SubRay>& sub_rays,
                       std::span<const Hit> hits) {
@@ -74,24 +48,52 @@ Echoes echoes_of_hits(const WideBeams& wide,
 
 void render_sub_rays(const RenderJob& job,
                      std::span<const std::uint32_t> beams,
-                     std::size_t count,
-                     const std::function<void(const RenderJob&)>& render_lines,
+                     const std::vector<SubRay>& sub_rays,
+                     const std::function<void(const RenderJob& lines)>& render,
+                     const std::function<void(std::size_t k, std::span<const Hit>)>& receive,
                      const Executor& executor) {
-  const std::vector<SubRay> sub_rays =
-      count <= kFewest ? rim_of_eight() : spread_sub_rays((count + 7) / 8 * 8);
   const std::size_t n = sub_rays.size();
   const std::size_t at_once = std::max<std::size_t>(1, kRaysAtOnce / n);
+  std::vector<Ray> rays;
+  std::vector<Duration> offsets;
+  std::vector<Hit> hits;
   for (std::size_t from = 0; from < beams.size(); from += at_once) {
     const std::span some = beams.subspan(from, std::min(at_once, beams.size() - from));
-    SubRayBatch batch(job, some, sub_rays, executor);
-    render_lines(batch.lines());
+    rays.resize(some.size() * n);
+    hits.assign(rays.size(), {});
+    offsets.resize(job.batch.time_offsets.empty() ? 0 : rays.size());
     executor.parallel_for(some.size(), kBeamsPerChunk, [&](std::size_t begin, std::size_t end) {
       for (std::size_t b = begin; b < end; ++b) {
-        const std::span hits = std::span(batch.hits).subspan(b * n, n);
-        job.wide->echoes[some[b]] = echoes_of_hits(*job.wide, sub_rays, hits);
+        const Ray& middle = job.batch.rays[some[b]];
+        aim(*job.wide, middle, some[b], sub_rays, std::span(rays).subspan(b * n, n));
+        if (offsets.empty()) continue;
+        std::fill_n(&offsets[b * n], n, job.batch.time_offsets[some[b]]);
+      }
+    });
+    RenderJob lines{job.batch, hits, std::nullopt};
+    lines.batch.rays = rays;
+    lines.batch.order = {};
+    lines.batch.time_offsets = offsets;
+    render(lines);
+    executor.parallel_for(some.size(), kBeamsPerChunk, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t b = begin; b < end; ++b) {
+        receive(from + b, std::span<const Hit>(hits).subspan(b * n, n));
       }
     });
   }
+}
+
+void find_echoes(const RenderJob& job,
+                 std::span<const std::uint32_t> beams,
+                 std::size_t count,
+                 const std::function<void(const RenderJob& lines)>& render,
+                 const Executor& executor) {
+  const std::vector<SubRay> sub_rays =
+      count <= kFewest ? rim_of_eight() : spread_sub_rays((count + 7) / 8 * 8);
+  const auto receive = [&](std::size_t k, std::span<const Hit> hits) {
+    job.wide->echoes[beams[k]] = echoes_of_hits(*job.wide, sub_rays, hits);
+  };
+  render_sub_rays(job, beams, sub_rays, render, receive, executor);
 }
 
 }  // namespace pointflight

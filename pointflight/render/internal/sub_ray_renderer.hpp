@@ -12,38 +12,28 @@
 
 namespace pointflight {
 
-/// Rays over the cross-sections of some of a job's wide beams, beam by beam.
-struct SubRayBatch {
-  /// `beams`: numbers of the job's rays; `sub_rays` for each.
-  SubRayBatch(const RenderJob& job,
-              std::span<const std::uint32_t> beams,
-              const std::vector<SubRay>& sub_rays,
-              const Executor& executor);
-  SubRayBatch(const SubRayBatch&) = delete;  // the job refers to the rays
-  SubRayBatch& operator=(const SubRayBatch&) = delete;
-
-  /// Whose hits are written into `hits`.
-  [[nodiscard]] RenderJob lines();
-
-  std::vector<Ray> rays;
-  std::vector<Duration> offsets;
-  std::vector<Hit> hits;
-
- private:
-  RayBatch batch_;
-};
+/// Sub-rays of a wide beam where nothing says how many.
+inline constexpr std::size_t kUsualSubRays = 32;
 
 /// The echoes of a beam of which `hits` are its sub-rays'.
 Echoes echoes_of_hits(const WideBeams& wide,
                       const std::vector<SubRay>& sub_rays,
                       std::span<const Hit> hits);
 
-/// Finds the echoes of some of a job's wide beams by `count` rays over each, which `render_lines`
-/// renders, some ten thousand at once.
+/// Renders sub-rays of some of a job's wide beams as lines (`render`), some ten thousand at once.
+/// `receive` takes the hits of each beam, from any thread; `k` is its place in `beams`.
 void render_sub_rays(const RenderJob& job,
                      std::span<const std::uint32_t> beams,
-                     std::size_t count,
-                     const std::function<void(const RenderJob&)>& render_lines,
+                     const std::vector<SubRay>& sub_rays,
+                     const std::function<void(const RenderJob& lines)>& render,
+                     const std::function<void(std::size_t k, std::span<const Hit>)>& receive,
                      const Executor& executor);
+
+/// Finds the echoes of some of a job's wide beams by `count` rays over each.
+void find_echoes(const RenderJob& job,
+                 std::span<const std::uint32_t> beams,
+                 std::size_t count,
+                 const std::function<void(const RenderJob& lines)>& render,
+                 const Executor& executor);
 
 }  // namespace pointflight

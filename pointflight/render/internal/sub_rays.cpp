@@ -10,8 +10,9 @@
 namespace pointflight {
 namespace {
 
-constexpr double kRadius = 2.0;            // of the cross-section, sigmas
-constexpr double kRim = 2.22;              // of the circle around it: a heptagon's corners, sigmas
+constexpr double kRadius = 2.0;  // of the cross-section, sigmas
+constexpr double kRim = 2.22;    // `kSubRayRadius`
+static_assert(static_cast<float>(kRim) == kSubRayRadius);
 constexpr double kGolden = 0.61803398875;  // turns from one to the next
 constexpr std::size_t kTurns = 64;
 

@@ -11,6 +11,10 @@ struct SubRay {
   float x, y, share;
 };
 
+/// No sub-ray lies farther from its beam's axis, sigmas: the corners of a heptagon around the
+/// cross-section.
+inline constexpr float kSubRayRadius = 2.22f;
+
 /// The middle and seven on a circle around the cross-section, so that no edge across it lies
 /// between them, with the shares that give the cross-section's second moment.
 std::vector<SubRay> rim_of_eight();
