@@ -75,33 +75,37 @@ class NpyHeader {
     std::string_view text = value("shape");
     if (!text.starts_with("(")) fail("its shape cannot be read");
     text = text.substr(1, std::min(text.find(')'), text.size()) - 1);
+    double numbers = 1.0;  // so few that no product of lengths overflows
     for (auto word = take_word(text); !word.empty(); word = take_word(text)) {
       double number = -1.0;
       if (!parse_number(word, number) || !(number >= 0.0 && number <= 1e15)) {
         fail("its shape cannot be read");
       }
+      numbers *= std::max(number, 1.0);
       shape_.push_back(static_cast<std::size_t>(number));
     }
+    if (numbers > 1e15) fail("its shape cannot be read");
   }
 
   NpyNumber number_of(std::string_view type) const {
-    NpyNumber number;
     double size = 0.0;
     if (type.size() < 3 || std::string_view("<>=|").find(type[0]) == std::string_view::npos ||
-        std::string_view("fiub").find(type[1]) == std::string_view::npos ||
-        !parse_number(type.substr(2), size)) {
+        !parse_number(type.substr(2), size) || !is_read(type[1], size)) {
       fail(fmt::format("numbers of the type '{}' are not read", excerpt(type)));
     }
+    NpyNumber number;
     number.big_endian = type[0] == '>';
     number.kind = type[1];
     number.size = static_cast<std::size_t>(size);
-    const bool is_float = number.kind == 'f' && (size == 4.0 || size == 8.0);
-    const bool is_whole =
-        number.kind != 'f' && (size == 1.0 || size == 2.0 || size == 4.0 || size == 8.0);
-    if (!is_float && !is_whole) {
-      fail(fmt::format("numbers of the type '{}' are not read", excerpt(type)));
-    }
     return number;
+  }
+
+  /// Whether numbers of this kind and size in bytes are read. The size is what a file says: it
+  /// may be negative, broken or huge.
+  static bool is_read(char kind, double size) {
+    if (kind == 'f') return size == 4.0 || size == 8.0;
+    return std::string_view("iub").find(kind) != std::string_view::npos &&
+           (size == 1.0 || size == 2.0 || size == 4.0 || size == 8.0);
   }
 
   /// The next text between quotes.

@@ -235,6 +235,12 @@ TEST(Npy, BadFilesSayWhat) {
                   "its shape is (3)");
   expect_contains(error("{'descr': '|O', 'fortran_order': False, 'shape': (3, 3), }"), "'|O'");
   expect_contains(error("{'descr': '<c8', 'fortran_order': False, 'shape': (3, 3), }"), "'<c8'");
+  expect_contains(error("{'descr': '<i-4', 'fortran_order': False, 'shape': (3, 3), }"), "'<i-4'");
+  expect_contains(error("{'descr': '<f1e99', 'fortran_order': False, 'shape': (3, 3), }"),
+                  "'<f1e99'");
+  expect_contains(
+      error("{'descr': '<f4', 'fortran_order': False, 'shape': (4194304, 4398046511104, 3), }"),
+      "its shape cannot be read");
   expect_contains(error("{'fortran_order': False, 'shape': (3, 3), }"), "lacks 'descr'");
   expect_contains(error("{'descr': [('a', '<f4')], 'fortran_order': False, 'shape': (0,), }"),
                   "no fields x, y and z; it has: a");
