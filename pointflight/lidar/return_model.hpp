@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <span>
+#include <vector>
 
 #include "pointflight/lidar/detection.hpp"
 #include "pointflight/lidar/lidar_settings.hpp"
@@ -95,6 +96,7 @@ class ReturnModel : public EchoReceiver {
   /// True if scaling the echo's energy by `less` or `more` changes its probability of detection by
   /// more than 0.05.
   [[nodiscard]] bool is_marginal(const Echo& echo, double less, double more) const override;
+  [[nodiscard]] SureEchoes sure_echoes() const override;
   [[nodiscard]] bool takes_strongest() const override { return mode_ == ReturnMode::kStrongest; }
   /// What the sensor reports of each beam's echoes, the nearest first, whose ranges are what it
   /// measures: at most `most_returns`, the strongest first, into `returns`, beam by beam, which are
@@ -126,6 +128,7 @@ class ReturnModel : public EchoReceiver {
   [[nodiscard]] Return from_nothing(double place) const;
   void choose(std::span<Return> seen, std::span<Return> returns) const;
   [[nodiscard]] float rounded(double range) const;
+  [[nodiscard]] std::vector<float> sure_reflectivities() const;
 
   RangeNoiseSettings noise_;
   Surroundings surroundings_;
@@ -136,6 +139,7 @@ class ReturnModel : public EchoReceiver {
   double intensity_scale_ = 0.0;
   double range_min_ = 0.0;
   ReturnMode mode_;
+  std::vector<float> sure_;  ///< `SureEchoes::reflectivities`
 };
 
 }  // namespace pointflight

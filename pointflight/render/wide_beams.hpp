@@ -26,6 +26,13 @@ constexpr std::uint32_t usual_number(std::uint32_t surfel) {
   return (surfel * kUsualFactor) >> 20;
 }
 
+/// Reflectivities (`Echo::reflectivity`) above which echoes are reported for certain, by steps of
+/// range from 0 m on; the last one goes for all that is farther.
+struct SureEchoes {
+  std::span<const float> reflectivities;  ///< Empty: any echo is.
+  float steps_per_m = 0.0f;
+};
+
 /// What echoes are to a sensor. Asked from any thread.
 class EchoReceiver {
  public:
@@ -36,6 +43,8 @@ class EchoReceiver {
   [[nodiscard]] virtual Reflectances reflectances() const = 0;
   /// True if scaling the echo's energy by `less` or `more` changes whether it is reported.
   [[nodiscard]] virtual bool is_marginal(const Echo& echo, double less, double more) const = 0;
+  /// Echoes that are not marginal even if their energy is off by a quarter.
+  [[nodiscard]] virtual SureEchoes sure_echoes() const { return {}; }
   /// True if one echo of a beam is reported, the strongest.
   [[nodiscard]] virtual bool takes_strongest() const = 0;
 };

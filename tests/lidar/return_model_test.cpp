@@ -111,6 +111,33 @@ TEST(ReturnModel, AsManyComeBackAsTheProbabilitySays) {
   }
 }
 
+TEST(ReturnModel, SureEchoesAreNotMarginalAndMostOthersAre) {
+  const RandomStream random(5, StreamId::kTest, 0);
+  for (const std::string name : {"os1_128", "vlp32c", "mid360", "avia"}) {
+    for (const double fog : {0.0, 100.0}) {
+      Surroundings where = reflecting(0.2);
+      where.weather.visibility = fog;
+      const ReturnModel model(load_lidar(name), where);
+      const SureEchoes sure = model.sure_echoes();
+      ASSERT_FALSE(sure.reflectivities.empty()) << name;
+      std::size_t close = 0;  // to the border, where energies a third lower may be missed
+      for (std::uint64_t i = 0; i < 2000; ++i) {
+        const auto [range, times] = random.uniform2(i);
+        Echo echo;
+        echo.range = static_cast<float>(1.0 + (model.reach() - 1.0) * range);
+        const auto step = static_cast<std::size_t>(echo.range * sure.steps_per_m);
+        const float border = sure.reflectivities[std::min(step, sure.reflectivities.size() - 1)];
+        if (!std::isfinite(border)) continue;
+        echo.reflectivity = border * static_cast<float>(1.0 + times);
+        EXPECT_FALSE(model.is_marginal(echo, 0.75, 1.25)) << name << " " << echo.range;
+        echo.reflectivity = border * 0.75f;
+        close += model.is_marginal(echo, 0.75, 1.25) ? 1 : 0;
+      }
+      EXPECT_GT(close, 1000u) << name << ": the border is much too high";
+    }
+  }
+}
+
 TEST(ReturnModel, EmptyBeamsReportFalseRangesAnywhere) {
   const ReturnModel model(load_lidar("mid360"), Surroundings{});
   std::vector<double> ranges;

@@ -15,6 +15,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "pointflight/core/internal/chosen_lanes.hpp"
 #include "pointflight/core/internal/simd_targets-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
@@ -71,14 +72,6 @@ POINTFLIGHT_INLINE void store(const F8& a, float* x) {
 }
 POINTFLIGHT_INLINE void store_unaligned(const F8& a, float* x) {
   for (std::size_t p = 0; p < kParts; ++p) hn::StoreU(a.v[p], kF, x + p * kWidth);
-}
-/// The lanes of `a` for which `which` holds, one after the other, to x[0..]: eight floats are
-/// written, those behind the last are anything.
-POINTFLIGHT_INLINE void store_chosen(const F8& a, const M8& which, float* x) {
-  for (std::size_t p = 0; p < kParts; ++p) {
-    hn::StoreU(hn::Compress(a.v[p], which.v[p]), kF, x);
-    x += hn::CountTrue(kF, which.v[p]);
-  }
 }
 /// Eight bytes as floats.
 POINTFLIGHT_INLINE F8 load_bytes(const std::uint8_t* x) {
@@ -255,6 +248,26 @@ POINTFLIGHT_INLINE F8 look_up8(const float* table, const U8& index) {
   POINTFLIGHT_EACH(hn::TableLookupLanes(values, hn::IndicesFromVec(kF, index.v[p])))
   return out;
 }
+/// The lanes whose bits are set, one after the other, then zeros. Highway's Compress does it only
+/// with AVX-512: on AVX2 its release 1.0 copies a table to the stack each time.
+POINTFLIGHT_INLINE U8 chosen_lanes(std::uint32_t bits) {
+  U8 out;
+  const hn::Rebind<std::uint8_t, FloatTag> bytes;
+  const std::uint8_t* lanes = kChosenLanes.data() + 8 * std::size_t{bits};
+  POINTFLIGHT_EACH(hn::BitCast(kU, hn::PromoteTo(kI, hn::LoadU(bytes, lanes + p * kWidth))))
+  return out;
+}
+/// a[index] for indices below eight.
+POINTFLIGHT_INLINE F8 permuted(const F8& a, const U8& index) {
+  F8 out;
+  if constexpr (kWidth < 8) {
+    alignas(32) float values[8];
+    store(a, values);
+    return look_up_each(values, index);
+  }
+  POINTFLIGHT_EACH(hn::TableLookupLanes(a.v[p], hn::IndicesFromVec(kF, index.v[p])))
+  return out;
+}
 /// Lanes in which any of the given bits is set.
 POINTFLIGHT_INLINE M8 any_bit(const U8& a, std::uint32_t bits) {
   M8 out;
@@ -287,6 +300,11 @@ POINTFLIGHT_INLINE I8 load_unaligned(const std::int32_t* x) {
 POINTFLIGHT_INLINE I8 count_from(std::int32_t first) {
   I8 out;
   POINTFLIGHT_EACH(hn::Iota(kI, first + static_cast<std::int32_t>(p * kWidth)))
+  return out;
+}
+POINTFLIGHT_INLINE U8 as_bits(const F8& a) {
+  U8 out;
+  POINTFLIGHT_EACH(hn::BitCast(kU, a.v[p]))
   return out;
 }
 POINTFLIGHT_INLINE U8 as_bits(const I8& a) {
@@ -356,6 +374,12 @@ POINTFLIGHT_INLINE float sum(const F8& a) {
   // one order on every target
   return ((lanes[0] + lanes[1]) + (lanes[2] + lanes[3])) +
          ((lanes[4] + lanes[5]) + (lanes[6] + lanes[7]));
+}
+/// Of whole numbers whose sum a float holds exactly: in any order.
+POINTFLIGHT_INLINE float sum_whole(const F8& a) {
+  auto all = a.v[0];
+  for (std::size_t p = 1; p < kParts; ++p) all = hn::Add(all, a.v[p]);
+  return hn::GetLane(hn::SumOfLanes(kF, all));
 }
 POINTFLIGHT_INLINE float greatest(const F8& a) {
   auto all = a.v[0];

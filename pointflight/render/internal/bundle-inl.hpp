@@ -12,6 +12,8 @@
 #define POINTFLIGHT_RENDER_BUNDLE_INL_HPP
 #endif
 
+#include <cstring>
+
 #include "pointflight/render/internal/beam_groups-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
@@ -148,6 +150,68 @@ POINTFLIGHT_INLINE SeenBoxes see(const BundleWay& b, const Bvh8Node& node) {
   return seen;
 }
 
+/// Rectangles of eight boxes, and where they begin: to be looked at one by one.
+struct BoxLanes {  // NOLINT(cppcoreguidelines-pro-type-member-init): all is written
+  alignas(32) float low_u[8], high_u[8], low_v[8], high_v[8], begin[8];
+};
+
+/// The beams of the bundle that may enter one box, by groups of eight.
+POINTFLIGHT_INLINE std::uint64_t beams_in_box(const BundleWay& b, const BoxLanes& boxes, int lane) {
+  const F8 from_u = splat(boxes.low_u[lane]);
+  const F8 to_u = splat(boxes.high_u[lane]);
+  const F8 from_v = splat(boxes.low_v[lane]);
+  const F8 to_v = splat(boxes.high_v[lane]);
+  const F8 t = splat(boxes.begin[lane]);
+  std::uint32_t groups = bits((from_u <= load(b.group_high[0])) & (load(b.group_low[0]) <= to_u) &
+                              (from_v <= load(b.group_high[1])) & (load(b.group_low[1]) <= to_v) &
+                              (t <= load(b.group_end)));
+  std::uint64_t entering = 0;
+  for (; groups != 0; groups &= groups - 1) {
+    const auto g = static_cast<std::size_t>(std::countr_zero(groups));
+    const F8 at_u = load(b.at_u[g]);
+    const F8 at_v = load(b.at_v[g]);
+    const M8 in = (from_u <= at_u) & (at_u <= to_u) & (from_v <= at_v) & (at_v <= to_v) &
+                  (t <= load(b.groups[g].end));
+    entering |= static_cast<std::uint64_t>(bits(in)) << (8 * g);
+  }
+  return entering;
+}
+
+/// As many beams as this are asked one by one which of eight boxes they may enter, not the boxes
+/// which groups of beams.
+inline constexpr int kFewBeams = 24;
+
+/// For each of `beams` the boxes that it may enter, a bit each; 0 for the others.
+POINTFLIGHT_INLINE void boxes_of_beams(const BundleWay& b,
+                                       const SeenBoxes& seen,
+                                       std::uint64_t beams,
+                                       std::uint8_t (&boxes)[kTogether]) {
+  std::memset(boxes, 0, sizeof(boxes));
+  for (; beams != 0; beams &= beams - 1) {
+    const auto n = static_cast<std::size_t>(std::countr_zero(beams));
+    const F8 at_u = splat(b.at_u[n >> 3][n & 7]);
+    const F8 at_v = splat(b.at_v[n >> 3][n & 7]);
+    const M8 in = (seen.low_u <= at_u) & (at_u <= seen.high_u) & (seen.low_v <= at_v) &
+                  (at_v <= seen.high_v) & (seen.begin <= splat(b.groups[n >> 3].end[n & 7]));
+    boxes[n] = static_cast<std::uint8_t>(bits(in) & seen.in_frustum);
+  }
+}
+
+/// The beams that may enter box `lane`.
+POINTFLIGHT_INLINE std::uint64_t beams_of_box(const std::uint8_t (&boxes)[kTogether], int lane) {
+  const hn::CappedTag<std::uint8_t, kTogether> bytes;
+  const auto bit = hn::Set(bytes, static_cast<std::uint8_t>(1u << lane));
+  std::uint64_t beams = 0;
+  for (std::size_t i = 0; i < kTogether; i += hn::Lanes(bytes)) {
+    std::uint8_t part[8] = {};
+    hn::StoreMaskBits(bytes, hn::TestBit(hn::LoadU(bytes, boxes + i), bit), part);
+    std::uint64_t word = 0;
+    std::memcpy(&word, part, sizeof(word));
+    beams |= word << i;
+  }
+  return beams;
+}
+
 /// Pushes the children of a node that some of the beams may enter, the nearest on top.
 POINTFLIGHT_INLINE void enter_children(const KernelMap& map,
                                        BundleWay& b,
@@ -156,36 +220,26 @@ POINTFLIGHT_INLINE void enter_children(const KernelMap& map,
   const SeenBoxes seen = see(b, node);
   std::uint32_t which = seen.in_frustum;
   if (which == 0) return;
-  alignas(32) float low_u[8], high_u[8], low_v[8], high_v[8], begin[8];
-  store(seen.low_u, low_u);
-  store(seen.high_u, high_u);
-  store(seen.low_v, low_v);
-  store(seen.high_v, high_v);
-  store(seen.begin, begin);
+  BoxLanes boxes;  // NOLINT(cppcoreguidelines-pro-type-member-init): all is written
+  store(seen.begin, boxes.begin);
+  std::uint8_t of_beams[kTogether];
+  const bool are_few = std::popcount(beams) <= kFewBeams;
+  if (are_few) {
+    boxes_of_beams(b, seen, beams, of_beams);
+  } else {
+    store(seen.low_u, boxes.low_u);
+    store(seen.high_u, boxes.high_u);
+    store(seen.low_v, boxes.low_v);
+    store(seen.high_v, boxes.high_v);
+  }
   const std::uint64_t meta = meta_of(node);
   const std::size_t bottom = b.depth;
   for (; which != 0 && b.depth < kStack; which &= which - 1) {
     const int lane = std::countr_zero(which);
-    const Entry child = child_of(node, meta, begin, lane);
+    const Entry child = child_of(node, meta, boxes.begin, lane);
     if (child.meta == 0) continue;
-    const F8 from_u = splat(low_u[lane]);
-    const F8 to_u = splat(high_u[lane]);
-    const F8 from_v = splat(low_v[lane]);
-    const F8 to_v = splat(high_v[lane]);
-    const F8 t = splat(child.t);
-    std::uint32_t groups = bits((from_u <= load(b.group_high[0])) & (load(b.group_low[0]) <= to_u) &
-                                (from_v <= load(b.group_high[1])) & (load(b.group_low[1]) <= to_v) &
-                                (t <= load(b.group_end)));
-    std::uint64_t entering = 0;
-    for (; groups != 0; groups &= groups - 1) {
-      const auto g = static_cast<std::size_t>(std::countr_zero(groups));
-      const F8 at_u = load(b.at_u[g]);
-      const F8 at_v = load(b.at_v[g]);
-      const M8 in = (from_u <= at_u) & (at_u <= to_u) & (from_v <= at_v) & (at_v <= to_v) &
-                    (t <= load(b.groups[g].end));
-      entering |= static_cast<std::uint64_t>(bits(in)) << (8 * g);
-    }
-    entering &= beams;
+    const std::uint64_t entering =
+        are_few ? beams_of_box(of_beams, lane) : beams & beams_in_box(b, boxes, lane);
     if (entering == 0) continue;
     prefetch(map.nodes, map.words, child);
     std::size_t at = b.depth++;

@@ -11,6 +11,7 @@
 #endif
 
 #include <memory>
+#include <span>
 
 #include "pointflight/render/internal/cone_echoes-inl.hpp"
 #include "pointflight/render/internal/cone_kernel.hpp"
@@ -29,6 +30,7 @@ struct ConeRoom {  // NOLINT(cppcoreguidelines-pro-type-member-init): written be
   ConeBundle bundle;
   SubRayRows rows;
   BeamParts parts;
+  ConeStrips strips;
 };
 struct ConeCall {
   const KernelMap& map;
@@ -36,6 +38,7 @@ struct ConeCall {
   const Ray* rays;
   const WideBeams& wide;
   const Reflectances reflectances;
+  const SureEchoes sure;
   const SubRayLanes& eight;
   ConeRoom& room;
 };
@@ -43,26 +46,34 @@ struct ConeCall {
 /// The eight sub-rays of the first level, up to the beam's end. True if all have hit something:
 /// nothing behind the farthest counts, and the beam ends there.
 POINTFLIGHT_INLINE bool look(const ConeCall& call, ConeBeam& beam) {
-  hit_sub_rays(call.map, call.room.bundle, beam, call.eight, beam.end, call.room.rows, beam.eight);
+  hit_sub_rays(call.map,
+               call.room.bundle,
+               beam.list,
+               see(beam, call.eight),
+               beam.end,
+               call.room.rows,
+               beam.eight);
   beam.looked = beam.list.count;
   beam.cover = 0.0f;
   const float farthest = greatest(load(beam.eight.range));
   if (farthest == kNever) return false;
-  beam.end = std::min(beam.end, farthest + call.map.window);
+  end_at(std::min(beam.end, farthest + call.map.window), beam);
   forget_behind(call.room.bundle, beam);
   beam.looked = beam.list.count;
   return true;
 }
 
-/// Looks at beams of `which` that are due before `t` (m). Returns those whose way goes on to there.
+/// Looks at beams of `which` that are due before `t` (m). Returns those whose way goes on to there:
+/// some that have ended may be among them.
 POINTFLIGHT_INLINE std::uint64_t look_at_due(const ConeCall& call, std::uint64_t which, float t) {
   ConeBundle& b = call.room.bundle;
+  if (t <= b.first_look) return which;
   const F8 here = splat(t);
+  F8 next = splat(kNever);
   std::uint64_t going_on = 0;
   std::uint32_t shorter = 0;  // groups
   for (std::size_t g = 0; g < b.count; ++g) {
     const auto mine = static_cast<std::uint32_t>(which >> (8 * g)) & 0xffu;
-    if (mine == 0) continue;
     std::uint32_t due = bits(load(b.look_behind[g]) < here) & mine;
     for (; due != 0; due &= due - 1) {
       const auto i = static_cast<std::size_t>(std::countr_zero(due));
@@ -72,9 +83,11 @@ POINTFLIGHT_INLINE std::uint64_t look_at_due(const ConeCall& call, std::uint64_t
       b.groups[g].end[i] = beam.end;
       shorter |= 1u << g;
     }
+    next = min(next, load(b.look_behind[g]));
     const std::uint32_t on = bits(here <= load(b.groups[g].end)) & mine;
     going_on |= static_cast<std::uint64_t>(on) << (8 * g);
   }
+  b.first_look = least(next);
   if (shorter == 0) return going_on;
   for (; shorter != 0; shorter &= shorter - 1) {
     const auto g = static_cast<std::size_t>(std::countr_zero(shorter));
@@ -82,6 +95,37 @@ POINTFLIGHT_INLINE std::uint64_t look_at_due(const ConeCall& call, std::uint64_t
   }
   b.end = greatest(load(b.group_end));
   return going_on;
+}
+
+/// The beams that may touch surfels of a leaf, and which.
+struct NearBeams {  // NOLINT(cppcoreguidelines-pro-type-member-init): written before it is read
+  std::uint8_t numbers[kTogether];
+  std::uint8_t lanes[kTogether];  ///< A bit for each surfel.
+  std::size_t count;
+};
+
+/// Those of the bundle's pairs that touch, which are of the beams `from` to `to`, into these beams'
+/// lists. The beams look along one axis of the map.
+POINTFLIGHT_INLINE void touch_pairs(const ConeCall& call,
+                                    const ConeLeaf& leaf,
+                                    const NearBeams& near_by,
+                                    std::size_t from,
+                                    std::size_t to) {
+  ConeBundle& b = call.room.bundle;
+  const ConeBeam& axes = b.beams[near_by.numbers[from]];
+  for (std::size_t at = 0; at < b.pairs.count; at += 8) touch_eight(call.map, leaf, axes, at, b);
+  std::size_t at = 0;
+  for (; from < to; ++from) {
+    const std::size_t n = near_by.numbers[from];
+    ConeBeam& beam = b.beams[n];
+    const auto count = static_cast<std::size_t>(std::popcount(near_by.lanes[from]));
+    take_touched(b.pairs, at, count, beam);
+    at += count;
+    const float look_behind = beam.cover >= kCoverToLook ? beam.far + call.map.window : kNever;
+    b.look_behind[n >> 3][n & 7] = look_behind;
+    b.first_look = std::min(b.first_look, look_behind);
+  }
+  b.pairs.count = 0;
 }
 
 /// A leaf's surfels into the lists of the beams that touch them.
@@ -100,30 +144,37 @@ POINTFLIGHT_INLINE void visit_leaf(const ConeCall& call, const BundleEntry& entr
     }
   };
   set_corner(0);
-  // first all that may touch, then those that do: a branch for each pair is one too many
-  std::uint8_t numbers[kTogether];
-  std::uint8_t lanes[kTogether];
-  std::size_t near_by = 0;
+  // first the beams that may touch, then their pairs with surfels, eight at a time: one by one,
+  // most lanes would be idle and most branches wrong
+  NearBeams near_by;  // NOLINT(cppcoreguidelines-pro-type-member-init): written before it is read
+  near_by.count = 0;
   for (; beams != 0; beams &= beams - 1) {
     const auto n = static_cast<std::size_t>(std::countr_zero(beams));
     if constexpr (!kOneOrigin) set_corner(n);
-    numbers[near_by] = static_cast<std::uint8_t>(n);
     const ConeBeam& beam = b.beams[n];
-    lanes[near_by] = static_cast<std::uint8_t>(may_touch(leaf, beam, see(leaf, beam, corner)));
-    near_by += lanes[near_by] != 0 ? 1 : 0;
+    const std::uint32_t lanes = may_touch(leaf, beam, see(leaf, beam, corner));
+    near_by.numbers[near_by.count] = static_cast<std::uint8_t>(n);
+    near_by.lanes[near_by.count] = static_cast<std::uint8_t>(lanes);
+    near_by.count += lanes != 0 ? 1 : 0;
   }
-  for (std::size_t k = 0; k < near_by; ++k) {
-    const std::size_t n = numbers[k];
+  const bool is_full = b.used + 2 * kTogether > std::size(b.pool);
+  b.pairs.count = 0;
+  std::size_t from = 0;
+  for (std::size_t k = 0; k < near_by.count; ++k) {
+    const std::size_t n = near_by.numbers[k];
     ConeBeam& beam = b.beams[n];
-    if (beam.list.count + 8 > kMostSurfels) {
+    if (beam.list.count + 8 > kMostSurfels || is_full) {
       beam.failed = true;
-      continue;
+      near_by.lanes[k] = 0;
+    }
+    if (!look_alike(beam, b.beams[near_by.numbers[from]])) {
+      touch_pairs(call, leaf, near_by, from, k);
+      from = k;
     }
     if constexpr (!kOneOrigin) set_corner(n);
-    touch(map, leaf, see(leaf, beam, corner), lanes[k], b, beam);
-    const bool due = beam.cover >= kCoverToLook;
-    b.look_behind[n >> 3][n & 7] = due ? beam.far + map.window : kNever;
+    add_pairs(beam, see(leaf, beam, corner), near_by.lanes[k], b.pairs);
   }
+  if (near_by.count > 0) touch_pairs(call, leaf, near_by, from, near_by.count);
 }
 
 /// The way of a bundle through the tree; `beams` has a bit for each that goes.
@@ -176,16 +227,26 @@ static HWY_NOINLINE void hit_as_lines(const ConeCall& call,
 /// The parts of a further level's sub-rays into `parts`.
 static HWY_NOINLINE void take_level(const ConeCall& call, const ConeBeam& beam, std::size_t level) {
   BeamParts& parts = call.room.parts;
-  const std::vector<SubRayLanes>& sub_rays = sub_rays_of_level(level);
+  const ConeBundle& b = call.room.bundle;
+  ConeStrips& strips = call.room.strips;
+  // as lines they are dear: eight must do
+  const bool has_strips = !beam.failed && beam.list.count >= kFewestForStrips;
+  const std::size_t direction = has_strips ? direction_of_strips(call.eight, beam.eight) : 0;
+  const std::span<const SubRayLanes> sub_rays =
+      beam.failed ? std::span(&call.eight, 1) : std::span(sub_rays_of_level(level, direction));
   parts.eights = sub_rays.size();
   parts.sub_rays = sub_rays.data();
+  if (has_strips) set_up_strips(call.map, b, beam, direction, strips);
   for (std::size_t k = 0; k < parts.eights; ++k) {
+    SubRayHits& hits = parts.hits[k];
     if (beam.failed) {
-      hit_as_lines(call, beam, sub_rays[k], parts.hits[k]);
-    } else {
-      hit_sub_rays(
-          call.map, call.room.bundle, beam, sub_rays[k], beam.end, call.room.rows, parts.hits[k]);
+      hit_as_lines(call, beam, sub_rays[k], hits);
+      continue;
     }
+    const SeenSubRays seen = see(beam, sub_rays[k]);
+    if (has_strips) take_strip(beam.list, seen, strips);
+    hit_sub_rays(
+        call.map, b, has_strips ? strips.part : beam.list, seen, beam.end, call.room.rows, hits);
   }
   light_up(call.surfels, call.reflectances, parts);
 }
@@ -201,6 +262,19 @@ POINTFLIGHT_INLINE bool is_settled(const ConeCall& call, const ConeBeam& beam) {
   return !has_before(call.room.bundle, beam, call.eight, range, kBefore);
 }
 
+/// True if what eight sub-rays are off by may decide whether an echo is reported: they are on the
+/// rim and in the middle, where reflectivities may differ from what lies between.
+POINTFLIGHT_INLINE bool is_marginal(const ConeCall& call, const Echo& echo) {
+  constexpr double kOff = 0.15;
+  const std::span<const float> sure = call.sure.reflectivities;
+  if (sure.empty()) return false;
+  const float step = echo.range * call.sure.steps_per_m;
+  const auto last = static_cast<float>(sure.size() - 1);
+  const auto at = static_cast<std::size_t>(std::clamp(step, 0.0f, last));
+  if (echo.reflectivity >= sure[at]) return false;
+  return call.wide.receiver->is_marginal(echo, 1.0 - kOff, 1.0 + kOff);
+}
+
 /// The echoes of a beam at the end of its way.
 static HWY_NOINLINE void finish(const ConeCall& call, ConeBeam& beam) {
   Echoes& echoes = call.wide.echoes[beam.ray];
@@ -213,14 +287,12 @@ static HWY_NOINLINE void finish(const ConeCall& call, ConeBeam& beam) {
   if (is_settled(call, beam)) {
     const float farthest = greatest(load(beam.eight.range));
     echoes.count = farthest == kNever ? 0 : 1;
-    if (echoes.count != 0) {
-      echoes.all[0] = echo_of_eight(call.surfels, call.reflectances, call.eight, beam.eight);
-    }
-    return;
+    if (echoes.count == 0) return;
+    echoes.all[0] = echo_of_eight(call.surfels, call.reflectances, call.eight, beam.eight);
+    if (!is_marginal(call, echoes.all[0])) return;
   }
   BeamParts& parts = call.room.parts;
-  // as lines they are dear: eight must do
-  for (std::size_t level = beam.failed ? 0 : 1; level < kSubRayLevels; ++level) {
+  for (std::size_t level = 1; level < kSubRayLevels; ++level) {
     take_level(call, beam, level);
     make_echoes(parts, call.wide.merge, echoes);
     if (beam.failed) return;
@@ -242,8 +314,14 @@ static void trace_wide(const KernelMap& map,
   // some MB, too large for stacks; filled as it is needed
   thread_local const auto room = std::make_unique_for_overwrite<ConeRoom>();
   ConeBundle& bundle = room->bundle;
-  const ConeCall call{
-      map, surfels, rays, wide, wide.receiver->reflectances(), sub_rays_of_level(0)[0], *room};
+  const ConeCall call{map,
+                      surfels,
+                      rays,
+                      wide,
+                      wide.receiver->reflectances(),
+                      wide.receiver->sure_echoes(),
+                      first_sub_rays(),
+                      *room};
   const Beams beams{map, rays, nullptr};
   const Widths widths{kWidestBundle, kWidestBundle};
   const auto run =

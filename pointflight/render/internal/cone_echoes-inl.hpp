@@ -9,7 +9,7 @@
 #endif
 
 #include "pointflight/map/surfel_map.hpp"
-#include "pointflight/render/internal/cone_hits-inl.hpp"
+#include "pointflight/render/internal/cone_strips-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace pointflight::HWY_NAMESPACE {
@@ -189,7 +189,7 @@ POINTFLIGHT_INLINE bool lie_in_plane(const SubRayLanes& sub_rays, const SubRayHi
   const F8 one = splat(1.0f);
   const F8 inverse = one / max(range, splat(kNearestEcho));
   // the same in y, and none in x y: positions on a circle
-  const float per_xx = 1.0f / sum(load(sub_rays.xx));
+  const float per_xx = 1.0f / sum(x * x);
   const F8 fitted = splat(0.125f * sum(inverse)) + splat(sum(inverse * x) * per_xx) * x +
                     splat(sum(inverse * y) * per_xx) * y;
   const M8 close = (splat(0.0f) < fitted) & (abs(one / fitted - range) <= splat(kOffPlane));

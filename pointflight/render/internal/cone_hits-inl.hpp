@@ -9,7 +9,7 @@
 #define POINTFLIGHT_RENDER_CONE_HITS_INL_HPP
 #endif
 
-#include "pointflight/render/internal/cone_leaf-inl.hpp"
+#include "pointflight/render/internal/cone_touch-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace pointflight::HWY_NAMESPACE {
@@ -20,8 +20,7 @@ struct SubRayRows {  // NOLINT(cppcoreguidelines-pro-type-member-init): written 
   std::size_t count;
   alignas(32) float t[kMostSurfels + 1][8];
   alignas(32) float weight[kMostSurfels + 1][8];
-  float cosine[kMostSurfels + 1];
-  std::int32_t word[kMostSurfels + 1];
+  ConeSurfel surfel[kMostSurfels + 1];
   F8 nearest, farthest;  ///< Of all t that are hit.
   F8 total;              ///< Of the weights.
 };
@@ -41,12 +40,36 @@ POINTFLIGHT_INLINE SeenSubRays see(const ConeBeam& beam, const SubRayLanes& sub_
   const F8 per_depth = splat(1.0f) / along(2);
   const F8 u = along(0) * per_depth;
   const F8 v = along(1) * per_depth;
-  return {u - splat(beam.at_u), v - splat(beam.at_v), sqrt(splat(1.0f) + (u * u + v * v))};
+  return {u - splat(beam.numbers[kAtU]),
+          v - splat(beam.numbers[kAtV]),
+          sqrt(splat(1.0f) + (u * u + v * v))};
 }
 
 /// 1 / depth of eight sub-rays on a surfel.
 POINTFLIGHT_INLINE F8 inverse_at(const ConeSurfel& surfel, const SeenSubRays& s) {
   return splat(surfel.inverse(0)) + splat(surfel.inverse(1)) * s.u + splat(surfel.inverse(2)) * s.v;
+}
+
+/// The surfels whose supports any of eight sub-rays hits, as rows; m^2 goes where the weights will.
+POINTFLIGHT_INLINE void choose_rows(const KernelMap& map,
+                                    const ConeBundle& b,
+                                    const ConeList& list,
+                                    const SeenSubRays& s,
+                                    SubRayRows& rows) {
+  const F8 uu = s.u * s.u;
+  const F8 uv = s.u * s.v;
+  const F8 vv = s.v * s.v;
+  const F8 support = splat(map.support_squared);
+  std::size_t n = 0;
+  for (std::size_t i = 0; i < list.count; ++i) {
+    const ConeSurfel surfel = surfel_at(b, list, i);
+    const F8 m2 = splat(surfel.m2(0)) + (splat(surfel.m2(1)) * s.u + splat(surfel.m2(2)) * s.v) +
+                  (splat(surfel.m2(3)) * uu + splat(surfel.m2(4)) * uv + splat(surfel.m2(5)) * vv);
+    store(m2, rows.weight[n]);
+    rows.surfel[n] = surfel;
+    n += bits(m2 < support) != 0 ? 1 : 0;
+  }
+  rows.count = n;
 }
 
 /// The rows of eight sub-rays, up to `limit` (m).
@@ -56,9 +79,7 @@ POINTFLIGHT_INLINE void fill_rows(const KernelMap& map,
                                   const SeenSubRays& s,
                                   float limit,
                                   SubRayRows& rows) {
-  const F8 uu = s.u * s.u;
-  const F8 uv = s.u * s.v;
-  const F8 vv = s.v * s.v;
+  choose_rows(map, b, list, s, rows);
   const F8 zero = splat(0.0f);
   const F8 never = splat(kNever);
   const F8 support = splat(map.support_squared);
@@ -66,25 +87,19 @@ POINTFLIGHT_INLINE void fill_rows(const KernelMap& map,
   F8 nearest = never;
   F8 farthest = zero;
   F8 total = zero;
-  std::size_t n = 0;
-  for (std::size_t i = 0; i < list.count; ++i) {
-    const ConeSurfel surfel = surfel_at(b, list, i);
-    const F8 m2 = splat(surfel.m2(0)) + (splat(surfel.m2(1)) * s.u + splat(surfel.m2(2)) * s.v) +
-                  (splat(surfel.m2(3)) * uu + splat(surfel.m2(4)) * uv + splat(surfel.m2(5)) * vv);
-    const F8 t = s.length / inverse_at(surfel, s);
+  const std::size_t count = rows.count;
+  for (std::size_t i = 0; i < count; ++i) {
+    const F8 m2 = load(rows.weight[i]);
+    const F8 t = s.length / inverse_at(rows.surfel[i], s);
     const M8 hit = (m2 < support) & (zero < t) & (t <= end);
     const F8 weight = select(hit, soft_weights_of(map, m2), zero);
     const F8 at = select(hit, t, never);
     nearest = min(nearest, at);
     farthest = max(farthest, select(hit, t, zero));
     total = total + weight;
-    store(at, rows.t[n]);
-    store(weight, rows.weight[n]);
-    rows.cosine[n] = surfel.cosine();
-    rows.word[n] = std::bit_cast<std::int32_t>(surfel.word());
-    n += bits(hit) != 0 ? 1 : 0;
+    store(at, rows.t[i]);
+    store(weight, rows.weight[i]);
   }
-  rows.count = n;
   rows.nearest = nearest;
   rows.farthest = farthest;
   rows.total = total;
@@ -136,8 +151,8 @@ POINTFLIGHT_INLINE void returns_of(const KernelMap& map,
     const F8 weight = select(inside, load(rows.weight[i]), zero);
     total = total + weight;
     depth = depth + select(inside, weight * rounded((t - first) * step), zero);
-    cosine = cosine + weight * splat(rows.cosine[i]);
-    const I8 word = splat_int(rows.word[i]);
+    cosine = cosine + weight * splat(rows.surfel[i].cosine());
+    const I8 word = splat_int(std::bit_cast<std::int32_t>(rows.surfel[i].word()));
     const M8 larger = largest < weight;
     const M8 same = (largest <= weight) & (word < strongest);
     strongest = select(larger, word, select(same, word, strongest));
@@ -153,15 +168,15 @@ POINTFLIGHT_INLINE void returns_of(const KernelMap& map,
   store(strongest, hits.word);
 }
 
-/// What eight sub-rays of a beam hit up to `limit`, m.
+/// What eight sub-rays hit of a list up to `limit`, m.
 POINTFLIGHT_INLINE void hit_sub_rays(const KernelMap& map,
                                      const ConeBundle& b,
-                                     const ConeBeam& beam,
-                                     const SubRayLanes& sub_rays,
+                                     const ConeList& list,
+                                     const SeenSubRays& seen,
                                      float limit,
                                      SubRayRows& rows,
                                      SubRayHits& hits) {
-  fill_rows(map, b, beam.list, see(beam, sub_rays), limit, rows);
+  fill_rows(map, b, list, seen, limit, rows);
   const F8 first = surfaces_of(map, rows);
   if (bits(first < splat(kNever)) == 0) {
     store(splat(kNever), hits.range);

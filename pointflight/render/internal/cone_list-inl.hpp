@@ -52,6 +52,37 @@ struct ConeSurfel {
 };
 inline constexpr std::size_t kBlockFloats = sizeof(ConeBlock) / sizeof(float);
 
+/// Numbers of a beam that lanes of pairs want.
+enum BeamNumber : std::uint8_t {
+  kAtU,
+  kAtV,     ///< Of the axis, at depth 1.
+  kHalfUU,  ///< Half its variances there,
+  kUV,      ///< and its covariance.
+  kHalfVV,
+  kDet,  ///< Of the covariance.
+  kWideU,
+  kWideV,      ///< Half the beam.
+  kPerLength,  ///< 1 / length of the axis to depth 1.
+  kDeepest,    ///< Depth of its end, m.
+  kBeamNumbers
+};
+
+/// Pairs of a beam and a surfel of one leaf that it may touch, one after the other, and whether it
+/// does.
+struct ConePairs {
+  static constexpr std::size_t kMost = 8 * kTogether + 8;
+  std::size_t count;
+  // of the surfel
+  alignas(32) float u[kMost], v[kMost], depth[kMost], lane[kMost];
+  // of the beam
+  alignas(32) float beam[kBeamNumbers][kMost];
+  // of both
+  alignas(32) float weight[kMost];   ///< On the axis.
+  alignas(32) float reached[kMost];  ///< Depth, 0 if it is not touched.
+  alignas(32) float address[kMost];  ///< Lane in the pool, counted in floats, as bits.
+  std::uint8_t touched[kMost / 8 + 1];
+};
+
 /// What eight sub-rays hit.
 struct SubRayHits {
   alignas(32) float range[8];  ///< m; kNever: nothing.
@@ -62,20 +93,18 @@ struct SubRayHits {
 /// A wide beam on its way. Its frame has the map's axes: w is the one that its direction is closest
 /// to, forwards, and u and v are the others; positions across it are u and v at depth w = 1.
 struct ConeBeam {
-  SubRayHits eight;       ///< Of the first level, as of the last look.
-  int u, v, w;            ///< Axes of the map.
-  float forward;          ///< 1, or -1 if it goes against the map's w.
-  float direction[3];     ///< In u, v, w.
-  float across[3];        ///< One sigma, rad: axes of the cross-section, turned,
-  float up[3];            ///< in u, v, w.
-  float at_u, at_v;       ///< Of the axis.
-  float length;           ///< Of it to depth 1.
-  float wide_u, wide_v;   ///< Half the beam, at depth 1.
-  float uu, uv, vv, det;  ///< Its covariance at depth 1.
-  float end;              ///< Nothing beyond counts, m.
-  float far;              ///< Of what the list holds, m.
-  float cover;            ///< Of the axis, since the last look.
-  std::size_t looked;     ///< Surfels that the last look knew.
+  SubRayHits eight;    ///< Of the first level, as of the last look.
+  int u, v, w;         ///< Axes of the map.
+  float forward;       ///< 1, or -1 if it goes against the map's w.
+  float direction[3];  ///< In u, v, w.
+  float across[3];     ///< One sigma, rad: axes of the cross-section, turned,
+  float up[3];         ///< in u, v, w.
+  float length;        ///< Of it to depth 1.
+  float numbers[kBeamNumbers];
+  float end;           ///< Nothing beyond counts, m.
+  float far;           ///< Of what the list holds, m.
+  float cover;         ///< Of the axis, since the last look.
+  std::size_t looked;  ///< Surfels that the last look knew.
   std::uint32_t ray;
   bool failed;  ///< More surfels than the list holds.
   ConeList list;
@@ -84,7 +113,9 @@ struct ConeBeam {
 struct ConeBundle : BundleWay {
   float wide_u, wide_v;  ///< Half the widest beam, in the bundle's u and v, rad.
   alignas(32) float look_behind[kGroups][8];  ///< Time to look when a way has come so far, m.
+  float first_look;                           ///< None of these is less.
   ConeBeam beams[kTogether];
+  ConePairs pairs;
   std::size_t used;  ///< Of the pool.
   ConeBlock pool[kTogether * kMostSurfels];
 };
@@ -114,20 +145,36 @@ POINTFLIGHT_INLINE void set_up_frame(const float (&direction)[3],
   turned(across, beam.across);
   turned(up, beam.up);
   beam.length = 1.0f / beam.direction[2];
-  beam.at_u = beam.direction[0] * beam.length;
-  beam.at_v = beam.direction[1] * beam.length;
+  const float at_u = beam.direction[0] * beam.length;
+  const float at_v = beam.direction[1] * beam.length;
   // where one sigma along each axis of the section lies at depth 1
-  const float a_u = (beam.across[0] - beam.at_u * beam.across[2]) * beam.length;
-  const float a_v = (beam.across[1] - beam.at_v * beam.across[2]) * beam.length;
-  const float b_u = (beam.up[0] - beam.at_u * beam.up[2]) * beam.length;
-  const float b_v = (beam.up[1] - beam.at_v * beam.up[2]) * beam.length;
-  beam.uu = a_u * a_u + b_u * b_u;
-  beam.uv = a_u * a_v + b_u * b_v;
-  beam.vv = a_v * a_v + b_v * b_v;
+  const float a_u = (beam.across[0] - at_u * beam.across[2]) * beam.length;
+  const float a_v = (beam.across[1] - at_v * beam.across[2]) * beam.length;
+  const float b_u = (beam.up[0] - at_u * beam.up[2]) * beam.length;
+  const float b_v = (beam.up[1] - at_v * beam.up[2]) * beam.length;
+  const float uu = a_u * a_u + b_u * b_u;
+  const float vv = a_v * a_v + b_v * b_v;
   const float det = a_u * b_v - a_v * b_u;
-  beam.det = det * det;
-  beam.wide_u = kConeRadius * std::sqrt(beam.uu);
-  beam.wide_v = kConeRadius * std::sqrt(beam.vv);
+  beam.numbers[kAtU] = at_u;
+  beam.numbers[kAtV] = at_v;
+  beam.numbers[kHalfUU] = 0.5f * uu;
+  beam.numbers[kUV] = a_u * a_v + b_u * b_v;
+  beam.numbers[kHalfVV] = 0.5f * vv;
+  beam.numbers[kDet] = det * det;
+  beam.numbers[kWideU] = kConeRadius * std::sqrt(uu);
+  beam.numbers[kWideV] = kConeRadius * std::sqrt(vv);
+  beam.numbers[kPerLength] = beam.direction[2];
+}
+
+/// True if two beams look along the same axis of the map.
+POINTFLIGHT_INLINE bool look_alike(const ConeBeam& one, const ConeBeam& other) {
+  return one.w == other.w && one.forward == other.forward;
+}
+
+/// Nothing beyond `end` (m) counts any more.
+POINTFLIGHT_INLINE void end_at(float end, ConeBeam& beam) {
+  beam.end = end;
+  beam.numbers[kDeepest] = end / beam.length;
 }
 
 /// The axes of eight beams' cross-sections, turned as their sub-rays are, into `b.beams`; how far
@@ -201,13 +248,14 @@ POINTFLIGHT_INLINE void set_up_cones(const WideBeams& wide,
   }
   set_up_way(b, count);
   b.used = 0;
+  b.first_look = kNever;
   b.wide_u = b.wide_v = 0.0f;
   for (std::size_t g = 0; g < count; ++g) {
     set_up_sections(wide, b, g, rays[g]);
     store(splat(kNever), b.look_behind[g]);
     for (std::size_t i = 0; i < 8; ++i) {
       ConeBeam& beam = b.beams[8 * g + i];
-      beam.end = b.groups[g].end[i];
+      end_at(b.groups[g].end[i], beam);
       beam.far = 0.0f;
       beam.cover = 0.0f;
       beam.looked = 0;

@@ -32,12 +32,19 @@ std::vector<SubRayLanes> in_lanes(const std::vector<SubRay>& sub_rays) {
     const auto [x, y, share] = sub_rays[i];
     eight.x[i % 8] = x;
     eight.y[i % 8] = y;
-    eight.xx[i % 8] = x * x;
-    eight.xy[i % 8] = x * y;
-    eight.yy[i % 8] = y * y;
     eight.share[i % 8] = share;
   }
   return all;
+}
+
+std::vector<SubRayLanes> in_strips(std::size_t count, std::size_t direction) {
+  const float x = strip_directions().x[direction];
+  const float y = strip_directions().y[direction];
+  std::vector<SubRay> sub_rays = spread_sub_rays(count);
+  std::stable_sort(sub_rays.begin(), sub_rays.end(), [&](const SubRay& a, const SubRay& b) {
+    return a.x * x + a.y * y < b.x * x + b.y * y;
+  });
+  return in_lanes(sub_rays);
 }
 
 }  // namespace
@@ -90,13 +97,35 @@ Turn turn_of(std::size_t beam) {
   return turns[beam % kTurns];
 }
 
-const std::vector<SubRayLanes>& sub_rays_of_level(std::size_t level) {
-  static const std::array<std::vector<SubRayLanes>, kSubRayLevels> levels = {
-      in_lanes(rim_of_eight()),
-      in_lanes(spread_sub_rays(kLevelSizes[1])),
-      in_lanes(spread_sub_rays(kLevelSizes[2])),
-      in_lanes(spread_sub_rays(kLevelSizes[3]))};
-  return levels[level];
+const SubRayLanes& first_sub_rays() {
+  static const SubRayLanes eight = in_lanes(rim_of_eight())[0];
+  return eight;
+}
+
+const StripDirections& strip_directions() {
+  static const StripDirections directions = [] {
+    StripDirections all{};
+    for (std::size_t i = 0; i < kStripDirections; ++i) {
+      const double angle = kPi * static_cast<double>(i) / static_cast<double>(kStripDirections);
+      all.x[i] = static_cast<float>(math::cos(angle));
+      all.y[i] = static_cast<float>(math::sin(angle));
+    }
+    return all;
+  }();
+  return directions;
+}
+
+const std::vector<SubRayLanes>& sub_rays_of_level(std::size_t level, std::size_t direction) {
+  using Directions = std::array<std::vector<SubRayLanes>, kStripDirections>;
+  static const std::array<Directions, kSubRayLevels> all = [] {
+    std::array<Directions, kSubRayLevels> levels;
+    for (std::size_t i = 1; i < kSubRayLevels; ++i) {
+      for (std::size_t k = 0; k < kStripDirections; ++k)
+        levels[i][k] = in_strips(kLevelSizes[i], k);
+    }
+    return levels;
+  }();
+  return all[level][direction];
 }
 
 }  // namespace pointflight

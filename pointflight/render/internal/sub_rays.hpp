@@ -33,12 +33,22 @@ Turn turn_of(std::size_t beam);
 
 /// Eight sub-rays in lanes.
 struct SubRayLanes {
-  alignas(32) float x[8], y[8], xx[8], xy[8], yy[8], share[8];
+  alignas(32) float x[8], y[8], share[8];
 };
 
 /// The sub-rays that a beam is given as long as it takes more: eight, 32, 96, 288.
 inline constexpr std::size_t kSubRayLevels = 4;
 inline constexpr std::size_t kLevelSizes[kSubRayLevels] = {8, 32, 96, 288};
-const std::vector<SubRayLanes>& sub_rays_of_level(std::size_t level);
+const SubRayLanes& first_sub_rays();
+
+/// Those of a further level, by eights that lie in strips across one of some directions.
+///@{
+inline constexpr std::size_t kStripDirections = 8;
+struct StripDirections {
+  alignas(32) float x[kStripDirections], y[kStripDirections];
+};
+const StripDirections& strip_directions();
+const std::vector<SubRayLanes>& sub_rays_of_level(std::size_t level, std::size_t direction);
+///@}
 
 }  // namespace pointflight
