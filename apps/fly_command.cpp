@@ -14,6 +14,7 @@
 #include "apps/fly_links.hpp"
 #include "apps/input_kind.hpp"
 #include "apps/ros_flags.hpp"
+#include "apps/run_cost.hpp"
 #include "apps/scenario_command.hpp"
 #include "apps/settings_json.hpp"
 #include "apps/share_flags.hpp"
@@ -39,6 +40,7 @@ struct FlyFlags {
   std::string map;   ///< Instead of the scenario's.
   std::int64_t seed = -1;
   std::string lidar;
+  std::string fidelity;  ///< Of all LiDARs' beams; empty: as each says.
   std::string vehicle;
   std::vector<double> start;         ///< x, y, z
   std::vector<double> start_in;      ///< A box.
@@ -134,7 +136,10 @@ Scenario load_input(const FlyFlags& flags, const Executor& executor) {
   }
   if (flags.no_scans) scenario.output.scans = false;
   for (VehicleSetup& vehicle : scenario.vehicles) {
-    for (LidarMount& mount : vehicle.lidars) mount.snapshot = mount.snapshot || flags.snapshot;
+    for (LidarMount& mount : vehicle.lidars) {
+      mount.snapshot = mount.snapshot || flags.snapshot;
+      if (!flags.fidelity.empty()) mount.sub_rays = flags.fidelity == "line" ? 1 : 0;
+    }
   }
   if (bounds) warn_of_starts_outside(scenario, *bounds);
   return scenario;
@@ -197,11 +202,30 @@ void print_vehicle(const Simulation& simulation, std::size_t v) {
   }
 }
 
-void print_result(const FlyFlags& flags, const Simulation& simulation, double wall) {
+/// What a second of the run cost of this machine.
+void print_cost(const RunCost& cost) {
+  std::vector<std::string> parts;
+  double rest = cost.cores;
+  for (const RunCost::Lidar& lidar : cost.lidars) {
+    rest -= lidar.cores;
+    parts.push_back(fmt::format("{}{} {:.2f}",
+                                lidar.count > 1 ? fmt::format("{} x ", lidar.count) : "",
+                                lidar.model,
+                                lidar.cores));
+  }
+  parts.push_back(fmt::format("all else {:.2f}", std::max(0.0, rest)));
+  fmt::print("  cost              {:.2f} of a core for a simulated second: {}\n",
+             cost.cores,
+             fmt::join(parts, ", "));
+}
+
+void print_result(const FlyFlags& flags, const Simulation& simulation, const RunLoop& loop) {
+  const RunCost cost = cost_of(simulation, loop);
   if (flags.json) {
     auto json = nlohmann::ordered_json::parse(summary_json(simulation));
     if (!flags.output.empty()) json["folder"] = flags.output;
-    json["real_time_factor"] = to_seconds(simulation.simulated()) / wall;
+    json["real_time_factor"] = cost.real_time_factor;
+    json["cost"] = json_of(cost);
     print_json(json);
     return;
   }
@@ -212,7 +236,8 @@ void print_result(const FlyFlags& flags, const Simulation& simulation, double wa
              to_seconds(simulation.time()),
              reason.empty() ? "" : ": " + reason);
   for (const std::size_t v : simulation.flying_here()) print_vehicle(simulation, v);
-  fmt::print("  real-time factor  {:.1f}\n", to_seconds(simulation.simulated()) / wall);
+  fmt::print("  real-time factor  {:.1f}\n", cost.real_time_factor);
+  print_cost(cost);
   if (flags.output.empty() || flags.no_picture) return;
   fmt::print("  picture           {}\n", (fs::path(flags.output) / "overview.png").string());
 }
@@ -287,7 +312,7 @@ int fly(const FlyFlags& flags) {
   for (const auto& part : connected) part->report(loop);
   const bool has_failed = std::any_of(
       connected.begin(), connected.end(), [](auto& part) { return part->has_failed(); });
-  if (loop.has_started()) print_result(flags, simulation, loop.wall_time());
+  if (loop.has_started()) print_result(flags, simulation, loop);
   if (has_failed) return kWrongInput;
   return loop.has_started() ? exit_code_of(end) : kInterrupted;
 }
@@ -313,6 +338,11 @@ void add_fly_command(CLI::App& parent, int& exit_code) {
   app->add_option("--lidar",
                   flags->lidar,
                   "LiDAR of all vehicles, instead of the scenario's: a shipped sensor or a path");
+  app->add_option("--fidelity",
+                  flags->fidelity,
+                  "Beams of all LiDARs, instead of what scenario and sensor files say: 'wide' as "
+                  "they are, or 'line' without a width, at a third of the cost")
+      ->check(CLI::IsMember({"line", "wide"}));
   app->add_option("--vehicle",
                   flags->vehicle,
                   "Model of all vehicles, instead of the scenario's: a shipped vehicle or a path");

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "apps/run_cost.hpp"
 #include "apps/terminal.hpp"
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/core/number_text.hpp"
@@ -93,7 +94,9 @@ void FolderLink::write_timing() const {
   const Scenario& scenario = simulation_.scenario();
   nlohmann::ordered_json json;
   json["wall_time"] = loop_.wall_time();
-  json["real_time_factor"] = to_seconds(simulation_.simulated()) / loop_.wall_time();
+  const RunCost cost = cost_of(simulation_, loop_);
+  json["real_time_factor"] = cost.real_time_factor;
+  json["cost"] = json_of(cost);
   json["threads"] = threads_;
   json["map"] = fs::weakly_canonical(resolve_path(scenario.map, scenario.folder())).string();
   json["command_line"] = command_line();

@@ -10,6 +10,7 @@
 #include "apps/terminal.hpp"
 #include "pointflight/core/number_text.hpp"
 #include "pointflight/core/resources.hpp"
+#include "pointflight/lidar/lidar_cost.hpp"
 #include "pointflight/picture/pictures.hpp"
 #include "pointflight/picture/scan_statistics.hpp"
 
@@ -90,6 +91,27 @@ void print_statistics(const LidarSettings& s, const picture::ScanStatistics& sca
              fixed_text(scan.nearest, 3));
 }
 
+void print_cost(const LidarCostClass& cost) {
+  if (!cost.wide) {
+    fmt::print("# cost: {}, about {} of a core\n", cost.name, fixed_text(cost.line, 2));
+    return;
+  }
+  fmt::print(
+      "# cost: {}, about {} (in a hall) to {} (in a forest) of a core; {} with beams as lines\n",
+      cost.name,
+      fixed_text(cost.low, 2),
+      fixed_text(cost.high, 2),
+      fixed_text(cost.line, 2));
+}
+
+nlohmann::ordered_json json_of(const LidarCostClass& cost) {
+  nlohmann::ordered_json json;
+  json["class"] = cost.name;
+  json["cores"] = {cost.low, cost.high};
+  json["cores_as_lines"] = cost.line;
+  return json;
+}
+
 void show_lidar(const LidarFlags& flags) {
   LidarSettings s = load_lidar(flags.name);
   check_outputs({flags.picture}, {s.path}, flags.force);
@@ -98,15 +120,18 @@ void show_lidar(const LidarFlags& flags) {
     fmt::print("{}\n", s.path);
     return;
   }
+  const LidarCostClass cost = cost_class_of(s, scan.beams_a_second);
   if (flags.json) {
     nlohmann::ordered_json json;
     json["path"] = s.path;
     json["scan"] = json_of(scan);
+    json["cost"] = json_of(cost);
     json["settings"] = json_of_settings(s);
     print_json(json);
   } else {
     fmt::print("# {}\n", s.path);
     print_statistics(s, scan);
+    print_cost(cost);
     SettingsWriter writer;
     describe(writer, s);
     fmt::print("{}", writer.text());

@@ -4,6 +4,7 @@
 #include <thread>
 
 #include "pointflight/core/argument.hpp"
+#include "pointflight/core/cpu_account.hpp"
 #include "pointflight/core/mapped_file.hpp"
 
 #ifdef POINTFLIGHT_HAS_TBB
@@ -40,7 +41,11 @@ void Executor::parallel_for(std::size_t count,
                             const std::function<void(std::size_t, std::size_t)>& body) const {
   require_argument(chunk > 0, "parallel_for: a chunk has at least one");
   const std::size_t chunks = (count + chunk - 1) / chunk;
-  const auto run_chunk = [&](std::size_t i) { body(i * chunk, std::min(count, (i + 1) * chunk)); };
+  CpuAccount* const account = ChargeTo::current();
+  const auto run_chunk = [&](std::size_t i) {
+    const ChargeTo charge(account);
+    body(i * chunk, std::min(count, (i + 1) * chunk));
+  };
   if (threads_ == 1 || chunks <= 1) {
     for (std::size_t i = 0; i < chunks; ++i) run_chunk(i);
   } else {
@@ -65,7 +70,9 @@ void Executor::parallel_for(std::size_t count,
   std::atomic<std::size_t> next{0};
   std::atomic<bool> failed{false};
   std::exception_ptr error;
+  CpuAccount* const account = ChargeTo::current();
   const auto work = [&] {
+    const ChargeTo charge(account);
     for (std::size_t i = next++; i < chunks; i = next++) {
       try {
         body(i * chunk, std::min(count, (i + 1) * chunk));

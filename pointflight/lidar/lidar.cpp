@@ -53,6 +53,13 @@ Lidar::Lidar(const LidarSettings& settings,
   if (measures_depth_ && settings.grid.stereo.baseline > 0.0) stereo_.emplace(settings);
 }
 
+Lidar Lidar::as_lines() const {
+  Lidar lines = *this;
+  lines.settings_.optics.sub_rays = 1;
+  lines.footprint_ = Footprint(lines.settings_.optics);
+  return lines;
+}
+
 /// What a beam's range times this is what the sensor measures and its limits are of: depth along
 /// the axis for cameras, else the range itself.
 float Lidar::depth_share(const Beam& beam) const {

@@ -45,6 +45,8 @@ class Lidar {
 
   /// As given to the constructor.
   [[nodiscard]] const LidarSettings& settings() const { return settings_; }
+  /// The same one with beams that are lines.
+  [[nodiscard]] Lidar as_lines() const;
   /// Duration of a scan: 1 / rate, rounded to a nanosecond.
   [[nodiscard]] Duration period() const;
   /// `Scan::middle` of a scan that starts then.

@@ -82,6 +82,8 @@ std::unique_ptr<Rendering> Renderer::submit(std::span<const RenderJob> jobs,
                                             const Executor& executor) const {
   for (const RenderJob& job : jobs) check(job);
   executor.parallel_for(jobs.size(), 1, [&](std::size_t k, std::size_t) {
+    CpuAccount* const account = jobs[k].account;
+    const ChargeTo charge(account != nullptr ? account : ChargeTo::current());
     if (jobs[k].wide) {
       render_wide(jobs[k], executor);
     } else {

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "pointflight/core/cpu_account.hpp"
 #include "pointflight/core/parallel.hpp"
 #include "pointflight/core/registry.hpp"
 #include "pointflight/geometry/types.hpp"
@@ -54,6 +55,7 @@ struct RenderJob {
   /// The beams' cross-sections, if they have any: then rays are their axes, and what is written are
   /// `WideBeams::echoes`, no hits.
   std::optional<WideBeams> wide;
+  CpuAccount* account = nullptr;  ///< Is charged with what the job costs; null: whoever asks.
 };
 
 /// Jobs that a renderer has been given (`Renderer::submit`).

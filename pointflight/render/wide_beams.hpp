@@ -30,7 +30,7 @@ constexpr std::uint32_t usual_number(std::uint32_t surfel) {
 /// range from 0 m on; the last one goes for all that is farther.
 struct SureEchoes {
   std::span<const float> reflectivities;  ///< Empty: any echo is.
-  float steps_per_m = 0.0f;
+  float steps_per_m = 0.0f;               ///< How many steps a metre has.
 };
 
 /// What echoes are to a sensor. Asked from any thread.

@@ -137,6 +137,7 @@ RunEnd RunLoop::run() {
   Splitter sink(*this);
   pace_.restart_at(simulation_.time());
   started_ = Clock::now();
+  cpu_at_start_ = process_cpu_time();
   has_started_ = true;
   for (bool running = true; running;) {
     const auto began = Clock::now();
@@ -157,6 +158,7 @@ RunEnd RunLoop::run() {
     }
   }
   wall_time_ = wall_time();
+  cpu_time_ = cpu_time();
   close_links(links_);
   return simulation_.end();
 }
@@ -167,6 +169,10 @@ std::optional<SimTime> RunLoop::due_at(Clock::time_point wall) const {
 
 double RunLoop::wall_time() const {
   return wall_time_.value_or(std::chrono::duration<double>(Clock::now() - started_).count());
+}
+
+double RunLoop::cpu_time() const {
+  return cpu_time_.value_or(process_cpu_time() - cpu_at_start_);
 }
 
 std::uint64_t RunLoop::dropped() const {
@@ -279,6 +285,24 @@ void RunLoop::reset() {
   pace_.restart_at(simulation_.time());
 }
 
+/// What the LiDARs cost that cost most, and what they would with beams as lines, if that is much
+/// less: once, since a scan of each is taken to know.
+std::string RunLoop::dearest_lidar() {
+  const auto costs = lidar_costs(simulation_);
+  const double simulated = to_seconds(simulation_.simulated());
+  if (said_dearest_ || costs.empty() || simulated <= 0.0) return {};
+  said_dearest_ = true;
+  const LidarCost& dearest = costs.front();
+  const double cores = dearest.cpu_time / simulated;
+  std::string text = fmt::format("{} takes {:.2f} of a core", dearest.model, cores);
+  const ScanCost scan = measure_scan(simulation_, dearest.vehicle, dearest.lidar);
+  constexpr double kWorthIt = 0.8;
+  if (scan.as_lines < kWorthIt * scan.as_is) {
+    text += fmt::format(", with --fidelity line about {:.2f}", cores * scan.as_lines / scan.as_is);
+  }
+  return text + "; ";
+}
+
 void RunLoop::say_behind() {
   const auto behind = pace_.fallen_behind(simulation_.time());
   if (!behind) return;
@@ -290,10 +314,11 @@ void RunLoop::say_behind() {
   if (instead.empty()) instead = fmt::format("--rate {:.1f}, or --lockstep", rate);
   say(
       fmt::format("warning: {:.1f} s behind: this machine manages a rate of {:.2f}, not {}; "
-                  "use fewer LiDARs, a coarser map or {}",
+                  "{}use fewer LiDARs, a coarser map or {}",
                   behind->seconds,
                   behind->rate,
                   pace_.rate(),
+                  dearest_lidar(),
                   instead));
 }
 

@@ -99,6 +99,8 @@ class RunLoop {
   [[nodiscard]] bool has_started() const { return has_started_; }
   /// Since the first step by the wall clock, s.
   [[nodiscard]] double wall_time() const;
+  /// CPU time of all threads of this process since the first step, s.
+  [[nodiscard]] double cpu_time() const;
   /// Where the run should be at a time of the wall clock; nothing before its first step, and where
   /// it is not held to the wall clock. From the loop's thread.
   [[nodiscard]] std::optional<SimTime> due_at(std::chrono::steady_clock::time_point wall) const;
@@ -124,6 +126,7 @@ class RunLoop {
   void wait_while_paused();
   void reset();
   void say_behind();
+  [[nodiscard]] std::string dearest_lidar();
   void say(const std::string& line) const;
 
   Simulation& simulation_;
@@ -134,7 +137,9 @@ class RunLoop {
   std::vector<Link*> links_;
   ScanDelays delays_;
   Clock::time_point started_ = Clock::now();
+  double cpu_at_start_ = 0.0;
   std::optional<double> wall_time_;
+  std::optional<double> cpu_time_;
   bool has_started_ = false;
   bool paused_ = false;
   bool step_once_ = false;  ///< While paused: until a scan has come.
@@ -144,6 +149,7 @@ class RunLoop {
   std::vector<const Link*> asked_;  ///< In lockstep: those that have not answered yet.
   std::uint64_t unanswered_ = 0;
   bool said_rejected_ = false;
+  bool said_dearest_ = false;
 };
 
 /// True if nobody gets anything of a run, or a link ends it.

@@ -16,6 +16,7 @@ struct DueInterval {
   std::size_t vehicle = 0;
   std::size_t sensor_number = 0;
   const IntervalSensor* sensor = nullptr;
+  SensorCosts::Accounts* accounts = nullptr;  ///< Of the sensor.
   std::int64_t index = 0;
   SimTime start, end;
 };
@@ -24,6 +25,7 @@ struct DueInterval {
 /// vehicles forget where they were before what is still to be measured.
 std::vector<DueInterval> due_intervals(const Fleet& fleet,
                                        std::span<VehicleStatus> statuses,
+                                       SensorCosts& costs,
                                        SimTime now) {
   std::vector<DueInterval> due;
   SimTime first_end = SimTime::max();
@@ -40,7 +42,7 @@ std::vector<DueInterval> due_intervals(const Fleet& fleet,
       if (end > now || end > first_end) continue;
       if (end < first_end) due.clear();
       first_end = end;
-      due.push_back({v, i, sensor, number, start, end});
+      due.push_back({v, i, sensor, &costs.of(v, i), number, start, end});
     }
   }
   if (due.empty()) {
@@ -99,6 +101,7 @@ class Together {
       : due_(due), executor_(executor), bodies_(due.size()), measurements_(due.size()) {
     executor.parallel_for(due.size(), 1, [&](std::size_t k, std::size_t) {
       const DueInterval& d = due[k];
+      const ChargeTo charge(&d.accounts->rest);
       if (d.sensor->loses(d.index)) return;
       bodies_[k] = bodies_for(d, fleet, obstacles, statuses, tracks);
       measurements_[k] =
@@ -111,6 +114,7 @@ class Together {
     render();
     std::vector<std::optional<Sample>> samples(due_.size());
     executor_.parallel_for(due_.size(), 1, [&](std::size_t k, std::size_t) {
+      const ChargeTo charge(&due_[k].accounts->rest);
       if (measurements_[k]) samples[k] = measurements_[k]->finish(executor_);
       measurements_[k].reset();
     });
@@ -123,7 +127,10 @@ class Together {
     std::map<const Renderer*, std::vector<RenderJob>> jobs;
     for (std::size_t k = 0; k < due_.size(); ++k) {
       if (!measurements_[k]) continue;
-      if (auto job = measurements_[k]->job()) jobs[due_[k].sensor->renderer()].push_back(*job);
+      auto job = measurements_[k]->job();
+      if (!job) continue;
+      job->account = &due_[k].accounts->rendering;
+      jobs[due_[k].sensor->renderer()].push_back(*job);
     }
     std::vector<std::unique_ptr<Rendering>> renderings;
     for (const auto& [renderer, its_jobs] : jobs) {
@@ -144,10 +151,11 @@ void sense_intervals(const Fleet& fleet,
                      const Obstacles& obstacles,
                      SimTime now,
                      std::span<VehicleStatus> statuses,
+                     SensorCosts& costs,
                      SampleSink& sink,
                      const Executor& executor) {
-  for (auto due = due_intervals(fleet, statuses, now); !due.empty();
-       due = due_intervals(fleet, statuses, now)) {
+  const auto next_due = [&] { return due_intervals(fleet, statuses, costs, now); };
+  for (auto due = next_due(); !due.empty(); due = next_due()) {
     const SimTime end = due.front().end;
     SimTime start = end;
     for (const DueInterval& d : due) start = std::min(start, d.start);

@@ -77,6 +77,7 @@ Simulation::Simulation(const Scenario& scenario,
   setup->end_time = SimTime(from_seconds(scenario.duration > 0.0 ? scenario.duration : natural));
   setup_ = std::move(setup);
   fleet_ = Fleet(std::move(agents));
+  costs_ = std::make_shared<SensorCosts>(fleet_);
   for (std::size_t i = 0; i < vehicle_count(); ++i) check_start(i);
 }
 
@@ -202,7 +203,7 @@ bool Simulation::step(SampleSink& sink) {
   }
   deliver(samples, sink);
   sample_obstacles(until, sink);
-  sense_intervals(fleet_, setup_->obstacles, now, vehicles, sink, *executor_);
+  sense_intervals(fleet_, setup_->obstacles, now, vehicles, *costs_, sink, *executor_);
   if (state_.ending.is_over()) return false;
   advance();
   sample_status(sink);

@@ -12,6 +12,7 @@
 #include "pointflight/sim/fleet.hpp"
 #include "pointflight/sim/samples.hpp"
 #include "pointflight/sim/scenario.hpp"
+#include "pointflight/sim/sensor_costs.hpp"
 
 namespace pointflight {
 
@@ -135,6 +136,9 @@ class Simulation {
     return status(number).summary;
   }
 
+  /// What its sensors have cost so far, those of its copies included.
+  [[nodiscard]] const SensorCosts& costs() const { return *costs_; }
+
   /// How many there are at any time: their labels follow `kFirstObstacle`.
   [[nodiscard]] std::size_t obstacle_count() const;
   /// Obstacles between two instants, at most `kLongestRun` ahead.
@@ -157,6 +161,7 @@ class Simulation {
   std::shared_ptr<const Setup> setup_;
   const Executor* executor_;
   Fleet fleet_;
+  std::shared_ptr<SensorCosts> costs_;
   EndingAgreement* agreement_ = nullptr;
   SimTime agreed_end_;  ///< With an agreement.
   SimulationState state_;

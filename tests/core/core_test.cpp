@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "pointflight/core/constants.hpp"
+#include "pointflight/core/cpu_account.hpp"
 #include "pointflight/core/mapped_file.hpp"
 #include "pointflight/core/math.hpp"
 #include "pointflight/core/number_text.hpp"
@@ -159,6 +160,29 @@ TEST(Executor, PassesOnAnException) {
                                        if (begin == 500) throw InputError("at 500");
                                      }),
                InputError);
+}
+
+TEST(CpuAccount, TheInnermostPaysAndForLoopsOnAllThreadsToo) {
+  const auto work = [] {
+    const double since = process_cpu_time();
+    while (process_cpu_time() - since < 0.02) ASSERT_NE(ChargeTo::current(), nullptr);
+  };
+  CpuAccount outer, inner, loops;
+  {
+    const ChargeTo charge(&outer);
+    const ChargeTo own(&inner);
+    work();
+  }
+  EXPECT_GE(inner.seconds(), 0.01);
+  EXPECT_LT(outer.seconds(), inner.seconds());
+  for (const int threads : {1, 2}) {
+    const ChargeTo charge(&loops);
+    Executor(threads).parallel_for(4, 1, [&](std::size_t, std::size_t) { work(); });
+    EXPECT_EQ(ChargeTo::current(), &loops);
+  }
+  // four times alone; two threads share the process' clock
+  EXPECT_GE(loops.seconds(), 0.08);
+  EXPECT_EQ(ChargeTo::current(), nullptr);
 }
 
 TEST(OutputFile, AppearsOnlyWhenCommitted) {

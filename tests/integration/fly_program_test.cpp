@@ -192,7 +192,50 @@ TEST_F(Program, FallingBehindIsSaidWhileItHappens) {
   const Result result = run(fmt::format("fly {} -o {} --rate 1000", yaml, folder / "run"),
                             "timeout --foreground -s INT 4");
   expect_contains(result.err, "s behind: this machine manages a rate of");
-  expect_contains(result.err, ", not 1000; use fewer LiDARs");
+  expect_contains(result.err, ", not 1000; mid360 takes ");
+  expect_contains(result.err, " of a core, with --fidelity line about ");
+  expect_contains(result.err, "; use fewer LiDARs");
+}
+
+TEST_F(Program, FidelityIsThatOfAllBeamsAndCostsAreSaid) {
+  const TemporaryFolder folder;
+  const auto scenario = [&](const char* name, int sub_rays) {
+    write_file(folder / name,
+               fmt::format("map: {}\nduration: 0.3\nlidars:\n  - {{model: mid360, sub_rays: {}}}\n"
+                           "  - {{model: vlp16, sub_rays: {}}}\nvehicle: {{start: [12, 10, 2]}}\n",
+                           map(),
+                           sub_rays,
+                           sub_rays));
+  };
+  scenario("s.yaml", -1);
+  scenario("line.yaml", 1);
+  scenario("wide.yaml", 0);
+  const auto fly = [&](const std::string& name, const std::string& flags) {
+    const std::string results = folder / (name + flags + ".run");
+    const Result flown =
+        run(fmt::format("fly {} -o {} --no-picture {}", folder / name, results, flags));
+    EXPECT_EQ(flown.code, 0) << flown.err;
+    expect_contains(flown.out, " of a core for a simulated second: ");
+    return read_file(results + "/scans/0_000001.pcd") + read_file(results + "/scans/1_000002.pcd");
+  };
+  const std::string line = fly("s.yaml", "--fidelity=line");
+  EXPECT_TRUE(line == fly("line.yaml", ""));
+  const std::string wide = fly("s.yaml", "--fidelity=wide");
+  EXPECT_TRUE(wide == fly("wide.yaml", ""));
+  EXPECT_TRUE(wide != line);
+  const std::string results = folder / "s.yaml--fidelity=line.run";
+  expect_contains(read_file(results + "/scenario.yaml"), "sub_rays: 1");
+  const auto timing = nlohmann::json::parse(read_file(results + "/timing.json"));
+  ASSERT_EQ(timing["cost"]["lidars"].size(), 2u);
+  double lidars = 0.0;
+  for (const auto& lidar : timing["cost"]["lidars"]) {
+    EXPECT_GT(lidar["cores"], 0.0) << lidar;
+    lidars += lidar["cores"].get<double>();
+  }
+  EXPECT_GT(timing["cost"]["cores"], lidars);
+  expect_user_error(
+      run(fmt::format("fly {} -o {} --fidelity high", folder / "s.yaml", folder / "x")),
+      "--fidelity");
 }
 
 TEST_F(Program, StartsWhereAPlannerCanPlan) {

@@ -28,6 +28,7 @@ TEST(Models, ACopiedSensorFileWorksFromAnywhere) {
   // all but the line with the path
   EXPECT_EQ(mine.out.substr(mine.out.find('\n')), shipped.out.substr(shipped.out.find('\n')));
   expect_contains(mine.out, "# scan: 57878 beams, 32 rings");
+  expect_contains(mine.out, "# cost: ");
 }
 
 TEST(Models, ASensorInFiveLines) {
@@ -42,6 +43,8 @@ TEST(Models, ASensorInFiveLines) {
   const auto json = nlohmann::json::parse(show.out);
   EXPECT_EQ(json["scan"]["rings"], 16);
   EXPECT_NEAR(json["scan"]["elevation_deg"][0].get<double>(), -15.0, 1e-3);
+  EXPECT_EQ(json["cost"]["class"], "light");
+  EXPECT_EQ(json["cost"]["cores"][1], json["cost"]["cores_as_lines"]) << "its beams are lines";
   EXPECT_NEAR(json["scan"]["spacing_between_rings_deg"][1].get<double>(), 2.0, 1e-3);
   EXPECT_EQ(json["settings"]["rings"]["channels"], 16);
   EXPECT_EQ(json["settings"]["rings"].count("columns"), 0u);  // of another convention

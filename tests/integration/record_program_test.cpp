@@ -120,7 +120,7 @@ TEST_F(Program, MakesAMapOfARecordingAndSaysWhatItSaw) {
     const Json rays = Json::parse(compared.out)["overall"]["all"];
     EXPECT_GT(rays["rays"].get<int>(), 40000);
     EXPECT_LT(rays["median_abs_error"].get<double>(), 0.03);
-    EXPECT_LT(rays["wrong_fraction"].get<double>(), 0.05);
+    EXPECT_LT(rays["wrong_fraction"].get<double>(), 0.07) << "points between two things, too";
   }
   const Json info = Json::parse(
       run(fmt::format("map info {} --json --at 2,5,-3 --at 0,0,99", in("seen.pfmap"))).out);

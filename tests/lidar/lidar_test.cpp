@@ -181,6 +181,27 @@ TEST(Lidar, SharedBeamsGiveTheSameScans) {
   }
 }
 
+TEST(Lidar, AsLinesIsTheSensorWithOneSubRay) {
+  ShapeScene scene;
+  scene.add_box({-6, -6, -2}, {6, 6, 4});
+  scene.add_box({2, -0.5, -1}, {2.5, 0.5, 1});
+  const auto renderer = make_renderer("beam", Scene{map_of(scene, 0.2)});
+  const Executor executor(2);
+  LidarSettings settings = load_lidar("os1_32");
+  const Lidar wide(settings, 0, nullptr, Surroundings{});
+  settings.optics.sub_rays = 1;
+  const Lidar line(settings, 0, nullptr, Surroundings{});
+  const auto ranges = [&](const Lidar& lidar) {
+    std::vector<float> all;
+    for (const ScanPoint& point : lidar.take({}, PoseTrack(), *renderer, executor).points) {
+      all.push_back(point.range);
+    }
+    return all;
+  };
+  EXPECT_EQ(ranges(wide.as_lines()), ranges(line));
+  EXPECT_NE(ranges(wide), ranges(line));
+}
+
 TEST(Lidar, MarksWhatCameThroughSpaceThatNoSurveySaw) {
   ShapeScene scene;
   scene.add_box({-6, -6, -2}, {6, 6, 4});
@@ -246,11 +267,11 @@ TEST(Lidar, Statistics_TruthIsWhatIsThereAndWhereExactDeskewingPutsThePoint) {
                      {quaternion_from_rpy(0.3 * s, 0, kPi * s), {3.0 * s, 0.5, 0}}});
   }
   const PoseTrack moving(poses);
+  LidarSettings lines = load_lidar("mid360");
+  lines.optics.sub_rays = 1;
   for (const bool ideal : {false, true}) {
-    const Lidar lidar(load_lidar("mid360"),
-                      0,
-                      nullptr,
-                      ideal ? std::nullopt : std::optional<Surroundings>(Surroundings{}));
+    const Lidar lidar(
+        lines, 0, nullptr, ideal ? std::nullopt : std::optional<Surroundings>(Surroundings{}));
     ScanRequest request;
     request.start = SimTime(std::chrono::milliseconds(50));
     const Scan plain = lidar.take(request, moving, *renderer, Executor(2));

@@ -116,7 +116,7 @@ TEST(ReturnModel, SureEchoesAreNotMarginalAndMostOthersAre) {
   for (const std::string name : {"os1_128", "vlp32c", "mid360", "avia"}) {
     for (const double fog : {0.0, 100.0}) {
       Surroundings where = reflecting(0.2);
-      where.weather.visibility = fog;
+      if (fog > 0.0) where.weather = {.kind = WeatherKind::kFog, .visibility = fog};
       const ReturnModel model(load_lidar(name), where);
       const SureEchoes sure = model.sure_echoes();
       ASSERT_FALSE(sure.reflectivities.empty()) << name;
