@@ -210,7 +210,7 @@ void print_cost(const RunCost& cost) {
     rest -= lidar.cores;
     parts.push_back(fmt::format("{}{} {:.2f}",
                                 lidar.count > 1 ? fmt::format("{} x ", lidar.count) : "",
-                                lidar.model,
+                                fs::path(lidar.model).stem().string(),
                                 lidar.cores));
   }
   parts.push_back(fmt::format("all else {:.2f}", std::max(0.0, rest)));
@@ -341,7 +341,7 @@ void add_fly_command(CLI::App& parent, int& exit_code) {
   app->add_option("--fidelity",
                   flags->fidelity,
                   "Beams of all LiDARs, instead of what scenario and sensor files say: 'wide' as "
-                  "they are, or 'line' without a width, at a third of the cost")
+                  "they are, or 'line' without a width, at a third to two thirds of the cost")
       ->check(CLI::IsMember({"line", "wide"}));
   app->add_option("--vehicle",
                   flags->vehicle,

@@ -6,16 +6,14 @@
 namespace pointflight::apps {
 
 RunCost cost_of(const Simulation& simulation, const RunLoop& loop) {
-  const double simulated = to_seconds(simulation.simulated());
+  const double simulated = loop.simulated();
   const double per_second = simulated > 0.0 ? 1.0 / simulated : 0.0;
   RunCost cost;
   cost.real_time_factor = simulated / loop.wall_time();
   cost.cores = loop.cpu_time() * per_second;
   for (const LidarCost& lidar : lidar_costs(simulation)) {
-    cost.lidars.push_back({lidar.model,
-                           lidar.count,
-                           lidar.cpu_time * per_second,
-                           lidar.rendering * per_second});
+    cost.lidars.push_back(
+        {lidar.model, lidar.count, lidar.cpu_time * per_second, lidar.rendering * per_second});
   }
   return cost;
 }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <thread>
 #include <utility>
 
@@ -171,6 +172,10 @@ double RunLoop::wall_time() const {
   return wall_time_.value_or(std::chrono::duration<double>(Clock::now() - started_).count());
 }
 
+double RunLoop::simulated() const {
+  return to_seconds(before_reset_ + simulation_.simulated());
+}
+
 double RunLoop::cpu_time() const {
   return cpu_time_.value_or(process_cpu_time() - cpu_at_start_);
 }
@@ -280,7 +285,9 @@ void RunLoop::wait_while_paused() {
 
 void RunLoop::reset() {
   for (Link* link : links_) link->on_reset(simulation_.time());
+  before_reset_ += simulation_.simulated();
   simulation_.restore(at_start_);
+  before_reset_ -= simulation_.simulated();
   say("reset: at the start again; stamps go on");
   pace_.restart_at(simulation_.time());
 }
@@ -289,12 +296,12 @@ void RunLoop::reset() {
 /// less: once, since a scan of each is taken to know.
 std::string RunLoop::dearest_lidar() {
   const auto costs = lidar_costs(simulation_);
-  const double simulated = to_seconds(simulation_.simulated());
-  if (said_dearest_ || costs.empty() || simulated <= 0.0) return {};
+  if (said_dearest_ || costs.empty() || simulated() <= 0.0) return {};
   said_dearest_ = true;
   const LidarCost& dearest = costs.front();
-  const double cores = dearest.cpu_time / simulated;
-  std::string text = fmt::format("{} takes {:.2f} of a core", dearest.model, cores);
+  const double cores = dearest.cpu_time / simulated();
+  std::string text = fmt::format(
+      "{} takes {:.2f} of a core", std::filesystem::path(dearest.model).stem().string(), cores);
   const ScanCost scan = measure_scan(simulation_, dearest.vehicle, dearest.lidar);
   constexpr double kWorthIt = 0.8;
   if (scan.as_lines < kWorthIt * scan.as_is) {

@@ -99,6 +99,8 @@ class RunLoop {
   [[nodiscard]] bool has_started() const { return has_started_; }
   /// Since the first step by the wall clock, s.
   [[nodiscard]] double wall_time() const;
+  /// How much was simulated, s: what was before a reset, too.
+  [[nodiscard]] double simulated() const;
   /// CPU time of all threads of this process since the first step, s.
   [[nodiscard]] double cpu_time() const;
   /// Where the run should be at a time of the wall clock; nothing before its first step, and where
@@ -137,6 +139,7 @@ class RunLoop {
   std::vector<Link*> links_;
   ScanDelays delays_;
   Clock::time_point started_ = Clock::now();
+  Duration before_reset_{0};  ///< Simulated.
   double cpu_at_start_ = 0.0;
   std::optional<double> wall_time_;
   std::optional<double> cpu_time_;

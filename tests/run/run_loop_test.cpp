@@ -124,6 +124,19 @@ TEST(RunLoop, ObeysOrdersBetweenSteps) {
   ByteSink untouched;
   testing::run(short_run(), untouched, executor);
   EXPECT_EQ(link.bytes.hash(), untouched.hash());
+  // what it cost is of all that was simulated
+  EXPECT_DOUBLE_EQ(
+      loop.simulated(),
+      to_seconds(link.reset_at.time_since_epoch() + simulation.time().time_since_epoch()));
+  const auto costs = lidar_costs(simulation);
+  ASSERT_EQ(costs.size(), 1u);
+  EXPECT_EQ(costs[0].model, "mid360");
+  EXPECT_EQ(costs[0].count, 1u);
+  EXPECT_GT(costs[0].rendering, 0.0);
+  EXPECT_GT(costs[0].cpu_time, costs[0].rendering);
+  const ScanCost scan = measure_scan(simulation, 0, 0);
+  EXPECT_GT(scan.as_is, 0.0);
+  EXPECT_GT(scan.as_lines, 0.0);
 }
 
 /// Wants to answer each scan, and never does.
