@@ -18,6 +18,7 @@ namespace {
 struct Flags {
   std::string map;
   std::string lidar = "mid360";
+  bool line = false;  ///< Beams are lines.
   std::vector<int> vehicles = {1, 10, 20};
   std::vector<int> threads = {1, 2};
   int obstacles = 50;
@@ -46,6 +47,7 @@ Scenario scenario_for(const Flags& flags, const SurfelMap& map, int vehicles) {
     VehicleSetup setup;
     setup.start = p;
     setup.lidars.front().model = flags.lidar;
+    if (flags.line) setup.lidars.front().sub_rays = 1;
     setup.mission.waypoints = {goal, p};
     s.vehicles.push_back(setup);
   }
@@ -134,6 +136,7 @@ int main(int argc, char** argv) {
   pointflight::Flags flags;
   app.add_option("map", flags.map, "A .pfmap")->required();
   app.add_option("--lidar", flags.lidar, "A shipped sensor")->capture_default_str();
+  app.add_flag("--line", flags.line, "Beams are lines");
   app.add_option("--vehicles", flags.vehicles, "Numbers of them")
       ->delimiter(',')
       ->capture_default_str();

@@ -77,6 +77,7 @@ Echoes echoes_of(std::span<BeamPart> parts, float merge) {
   Echoes echoes;
   std::size_t begin = 0;
   while (begin < parts.size() && !parts[begin].is_return()) ++begin;
+  echoes.all_hit = begin == 0 && !parts.empty();
   while (begin < parts.size()) {
     std::size_t end = begin + 1;
     while (end < parts.size() && parts[end].range - parts[end - 1].range <= merge) ++end;

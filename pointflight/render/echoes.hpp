@@ -48,7 +48,8 @@ struct Echo {
 struct Echoes {
   static constexpr std::size_t kMost = 4;  ///< The strongest are kept.
   std::array<Echo, kMost> all{};           ///< The first `count` of these.
-  std::size_t count = 0;                   ///< How many there are.
+  std::uint32_t count = 0;                 ///< How many there are.
+  bool all_hit = false;                    ///< All of the beam hit something: no light goes on.
   /// Them.
   [[nodiscard]] std::span<const Echo> span() const { return {all.data(), count}; }
 };

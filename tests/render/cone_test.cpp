@@ -262,6 +262,15 @@ TEST(Cones, BodiesCoverThemAndShareThem) {
   }
   EXPECT_GT(covered, 50u);
   EXPECT_GT(mixed, 10u);
+  // behind the wall nobody sees it, and nothing changes
+  ball.motion = PoseTrack(Pose{Quaterniond::Identity(), {9, 0.3, 0}});
+  const auto hidden = scan.echoes(*renderer, receiver, 0, bodies);
+  for (std::size_t i = 0; i < hidden.size(); ++i) {
+    ASSERT_EQ(hidden[i].count, without[i].count) << i;
+    ASSERT_TRUE(hidden[i].all_hit) << i;
+    ASSERT_EQ(hidden[i].all[0].range, without[i].all[0].range) << i;
+    ASSERT_EQ(hidden[i].all[0].parts, without[i].all[0].parts) << i;
+  }
 }
 
 TEST(Cones, OfTooManySurfelsEightRaysAreTaken) {

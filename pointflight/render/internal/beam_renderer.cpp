@@ -15,6 +15,7 @@ namespace pointflight {
 namespace {
 
 constexpr std::size_t kChunk = 1024;  // rays
+constexpr float kApart = 0.3f;        // m between what a beam ends at and a body behind it
 
 const SurfelMap& map_of(const Scene& scene) {
   require_argument(scene.map != nullptr, "BeamRenderer: the scene has no map");
@@ -30,8 +31,9 @@ std::span<const std::uint32_t> order_of(const RayBatch& batch,
   return room;
 }
 
-/// The echoes of beams that bodies cover, by eight rays against bodies alone. `beams` are numbers
-/// of the job's rays; those that a body covers in part, or is behind something, are returned.
+/// The echoes of beams that bodies cover, by eight rays against bodies alone; where the map covers
+/// the bodies its echoes stand. `beams` are numbers of the job's rays; those in which both are seen
+/// are returned.
 std::vector<std::uint32_t> hide_behind_bodies(const RenderJob& job,
                                               std::span<const std::uint32_t> beams,
                                               const Executor& executor) {
@@ -43,7 +45,14 @@ std::vector<std::uint32_t> hide_behind_bodies(const RenderJob& job,
     if (std::none_of(hits.begin(), hits.end(), met)) return;
     Echoes& echoes = wide.echoes[beams[k]];
     float nearest = std::numeric_limits<float>::infinity();  // of the map
-    for (const Echo& echo : echoes.span()) nearest = std::min(nearest, echo.range - echo.depth);
+    float farthest = 0.0f;
+    for (const Echo& echo : echoes.span()) {
+      nearest = std::min(nearest, echo.range - echo.depth);
+      farthest = std::max(farthest, echo.range + echo.depth);
+    }
+    const auto behind = [&](const Hit& hit) { return !met(hit) || hit.range > farthest + kApart; };
+    const bool knows_all = echoes.all_hit && echoes.count < Echoes::kMost;
+    if (knows_all && std::all_of(hits.begin(), hits.end(), behind)) return;
     const auto in_front = [&](const Hit& hit) { return met(hit) && hit.range < nearest; };
     if (std::all_of(hits.begin(), hits.end(), in_front)) {
       echoes = echoes_of_hits(wide, eight, hits);

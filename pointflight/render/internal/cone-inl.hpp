@@ -280,13 +280,15 @@ static HWY_NOINLINE void finish(const ConeCall& call, ConeBeam& beam) {
   Echoes& echoes = call.wide.echoes[beam.ray];
   if (beam.list.count == 0) {
     echoes.count = 0;
+    echoes.all_hit = false;
     return;
   }
   // eight that know all of the list: its end is the same whatever was looked at before
   if (beam.looked != beam.list.count) look(call, beam);
   if (is_settled(call, beam)) {
     const float farthest = greatest(load(beam.eight.range));
-    echoes.count = farthest == kNever ? 0 : 1;
+    echoes.all_hit = farthest < kNever;  // or none: they are settled
+    echoes.count = echoes.all_hit ? 1 : 0;
     if (echoes.count == 0) return;
     echoes.all[0] = echo_of_eight(call.surfels, call.reflectances, call.eight, beam.eight);
     if (!is_marginal(call, echoes.all[0])) return;

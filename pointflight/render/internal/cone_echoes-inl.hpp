@@ -172,6 +172,10 @@ POINTFLIGHT_INLINE float end_of_pulse(const BeamParts& parts, float nearest, flo
 /// The parts as the receiver tells them apart: `echoes_of` of echoes.hpp.
 static HWY_NOINLINE void make_echoes(const BeamParts& parts, float merge, Echoes& echoes) {
   echoes.count = 0;
+  echoes.all_hit = true;
+  for (std::size_t k = 0; k < parts.eights; ++k) {
+    echoes.all_hit = echoes.all_hit && greatest(load(parts.hits[k].range)) < kNever;
+  }
   for (float end = -1.0f;;) {
     const float nearest = nearest_behind(parts, end);
     if (nearest == kNever) return;

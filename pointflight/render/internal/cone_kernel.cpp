@@ -53,7 +53,7 @@ void trace_cones(const SurfelMap& surfels,
                  std::span<const std::uint32_t> order,
                  const WideBeams& wide) {
   if (map.node_count == 0) {
-    for (const std::uint32_t i : order) wide.echoes[i].count = 0;
+    for (const std::uint32_t i : order) wide.echoes[i] = {};
     return;
   }
   HWY_DYNAMIC_DISPATCH(trace_wide)(map, surfels, rays.data(), order.data(), order.size(), wide);
