@@ -124,6 +124,23 @@ POINTFLIGHT_INLINE ConeSurfel surfel_at(const ConeBundle& b, const ConeList& lis
   return {&b.pool[0].m2[0][0] + std::bit_cast<std::uint32_t>(list.at[i])};
 }
 
+/// Where one sigma along each axis of a beam's section lies at depth 1, from the beam's axis.
+struct BeamSection {
+  float a_u, a_v;  ///< Along `across`.
+  float b_u, b_v;  ///< Along `up`.
+
+  [[nodiscard]] POINTFLIGHT_INLINE float det() const { return a_u * b_v - a_v * b_u; }
+};
+
+POINTFLIGHT_INLINE BeamSection section_of(const ConeBeam& beam) {
+  const float at_u = beam.numbers[kAtU];
+  const float at_v = beam.numbers[kAtV];
+  return {(beam.across[0] - at_u * beam.across[2]) * beam.length,
+          (beam.across[1] - at_v * beam.across[2]) * beam.length,
+          (beam.up[0] - at_u * beam.up[2]) * beam.length,
+          (beam.up[1] - at_v * beam.up[2]) * beam.length};
+}
+
 /// The frame of a beam and its cross-section in it.
 POINTFLIGHT_INLINE void set_up_frame(const float (&direction)[3],
                                      const float (&across)[3],
@@ -145,20 +162,14 @@ POINTFLIGHT_INLINE void set_up_frame(const float (&direction)[3],
   turned(across, beam.across);
   turned(up, beam.up);
   beam.length = 1.0f / beam.direction[2];
-  const float at_u = beam.direction[0] * beam.length;
-  const float at_v = beam.direction[1] * beam.length;
-  // where one sigma along each axis of the section lies at depth 1
-  const float a_u = (beam.across[0] - at_u * beam.across[2]) * beam.length;
-  const float a_v = (beam.across[1] - at_v * beam.across[2]) * beam.length;
-  const float b_u = (beam.up[0] - at_u * beam.up[2]) * beam.length;
-  const float b_v = (beam.up[1] - at_v * beam.up[2]) * beam.length;
-  const float uu = a_u * a_u + b_u * b_u;
-  const float vv = a_v * a_v + b_v * b_v;
-  const float det = a_u * b_v - a_v * b_u;
-  beam.numbers[kAtU] = at_u;
-  beam.numbers[kAtV] = at_v;
+  beam.numbers[kAtU] = beam.direction[0] * beam.length;
+  beam.numbers[kAtV] = beam.direction[1] * beam.length;
+  const BeamSection section = section_of(beam);
+  const float uu = section.a_u * section.a_u + section.b_u * section.b_u;
+  const float vv = section.a_v * section.a_v + section.b_v * section.b_v;
+  const float det = section.det();
   beam.numbers[kHalfUU] = 0.5f * uu;
-  beam.numbers[kUV] = a_u * a_v + b_u * b_v;
+  beam.numbers[kUV] = section.a_u * section.a_v + section.b_u * section.b_v;
   beam.numbers[kHalfVV] = 0.5f * vv;
   beam.numbers[kDet] = det * det;
   beam.numbers[kWideU] = kConeRadius * std::sqrt(uu);

@@ -34,7 +34,9 @@ POINTFLIGHT_INLINE std::size_t direction_of_strips(const SubRayLanes& eight,
   const F8 y = splat(sum(inverse * load(eight.y)));
   const StripDirections& directions = strip_directions();
   const F8 along = abs(x * load(directions.x) + y * load(directions.y));
-  return static_cast<std::size_t>(std::countr_zero(bits(splat(greatest(along)) <= along)));
+  const std::uint32_t greatest_ones = bits(splat(greatest(along)) <= along);
+  // of a corrupt map there may be none
+  return static_cast<std::size_t>(std::countr_zero(greatest_ones | 0x80u));
 }
 
 /// Which of eight surfels of a list from `at` on there are.
@@ -48,18 +50,12 @@ POINTFLIGHT_INLINE void set_up_strips(const KernelMap& map,
                                       const ConeBeam& beam,
                                       std::size_t direction,
                                       ConeStrips& strips) {
-  // the section's axes at depth 1 (set_up_frame), and how u and v turn into sigmas along them
-  const float at_u = beam.numbers[kAtU];
-  const float at_v = beam.numbers[kAtV];
-  const float a_u = (beam.across[0] - at_u * beam.across[2]) * beam.length;
-  const float a_v = (beam.across[1] - at_v * beam.across[2]) * beam.length;
-  const float b_u = (beam.up[0] - at_u * beam.up[2]) * beam.length;
-  const float b_v = (beam.up[1] - at_v * beam.up[2]) * beam.length;
-  const float per_det = 1.0f / (a_u * b_v - a_v * b_u);
+  const BeamSection section = section_of(beam);
+  const float per_det = 1.0f / section.det();
   const float x = strip_directions().x[direction];
   const float y = strip_directions().y[direction];
-  strips.along_u = (x * b_v - y * a_v) * per_det;
-  strips.along_v = (y * a_u - x * b_u) * per_det;
+  strips.along_u = (x * section.b_v - y * section.a_v) * per_det;
+  strips.along_v = (y * section.a_u - x * section.b_u) * per_det;
   const F8 along_u = splat(strips.along_u);
   const F8 along_v = splat(strips.along_v);
   const F8 half = splat(0.5f);
