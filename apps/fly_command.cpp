@@ -341,7 +341,7 @@ void add_fly_command(CLI::App& parent, int& exit_code) {
   app->add_option("--fidelity",
                   flags->fidelity,
                   "Beams of all LiDARs, instead of what scenario and sensor files say: 'wide' as "
-                  "they are, or 'line' without a width, at a third to two thirds of the cost")
+                  "they are, or 'line' without a width, at about half of the cost")
       ->check(CLI::IsMember({"line", "wide"}));
   app->add_option("--vehicle",
                   flags->vehicle,

@@ -1,6 +1,5 @@
 #include "apps/run_cost.hpp"
 
-#include <algorithm>
 #include <nlohmann/json.hpp>
 
 namespace pointflight::apps {

@@ -99,10 +99,12 @@ def main():
             match = re.fullmatch(r"([^=]+)=(.+)@([-0-9.,e]+)", word)
             if not match:
                 sys.exit(f"defaults: '{word}'; give NAME=MAP.pfmap@X,Y,Z")
-            maps.append((match[1], pathlib.Path(match[2]).resolve(), match[3]))
+            pfmap = pathlib.Path(match[2]).resolve()
+            if not pfmap.is_file():
+                sys.exit(f"defaults: {match[2]}: there is no such map; import one first")
+            maps.append((match[1], pfmap, match[3]))
         listed = json.loads(program(flags.program, "lidar", "list", "--json"))
-        shipped = [sensor["name"] if isinstance(sensor, dict) else sensor for sensor in listed]
-        sensors = flags.sensors.split(",") if flags.sensors else shipped
+        sensors = flags.sensors.split(",") if flags.sensors else [sensor["name"] for sensor in listed]
         text = table(flags.program, maps, sensors, folder)
     print(text)
     if flags.into:

@@ -6,8 +6,8 @@
 
 namespace pointflight {
 
-/// What a LiDAR costs in a flight, roughly: cores (CPU time per simulated second) of a server of
-/// 2023 (docs/performance.md, "Shipped LiDARs").
+/// What a LiDAR costs in a flight, to within a half: cores (CPU time per simulated second) of the
+/// machine of docs/performance.md, "Shipped LiDARs".
 struct LidarCostClass {
   std::string name;   ///< light, moderate, heavy, very heavy.
   double low = 0.0;   ///< Cores, in a hall,
