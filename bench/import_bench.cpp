@@ -45,7 +45,9 @@ class MemoryReader : public CloudReader {
     if (copy_ == copies_) return false;
     const std::size_t n = std::min(kBatch, cloud_.points.size() - at_);
     batch.resize(n);
-    const Vector3d shift = (cloud_.size.array() * Eigen::Array3d(copy_ % 8, copy_ / 8, 0)).matrix();
+    constexpr int kInARow = 8;
+    const int row = copy_ / kInARow;
+    const Vector3d shift = cloud_.size.cwiseProduct(Vector3d(copy_ - row * kInARow, row, 0));
     for (std::size_t i = 0; i < n; ++i) {
       const auto& p = cloud_.points[at_ + i];
       batch[i].position =

@@ -86,7 +86,7 @@ class EmbreeQuery {
   }
 
  private:
-  RTCIntersectArguments how_;
+  RTCIntersectArguments how_{};
 #else
   void one(RTCScene scene, RTCRayHit& hit) {
     rtcIntersect1(scene, &how_, &hit);
@@ -96,7 +96,7 @@ class EmbreeQuery {
   }
 
  private:
-  RTCIntersectContext how_;
+  RTCIntersectContext how_{};
 #endif
 };
 

@@ -55,8 +55,8 @@ Times times_of(const char* name, const Renderer& renderer, const PoseTrack& trac
     static_cast<void>(modelled.aim(request, track, renderer, executor));
     keep_least(times.aim, since);
     const auto plain = ideal.aim(request, track, renderer, executor);
-    const RenderJob job = plain->job();
-    renderer.render({&job, 1}, executor);
+    const RenderJob plain_job = plain->job();
+    renderer.render({&plain_job, 1}, executor);
     since = cpu_time();
     times.beams = plain->finish(executor).beams;
     keep_least(times.ideal, since);

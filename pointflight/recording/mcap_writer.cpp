@@ -1,12 +1,9 @@
 #include "pointflight/recording/mcap_writer.hpp"
 
 #include <fmt/format.h>
-#include <lz4frame.h>
 #include <zlib.h>
-#include <zstd.h>
 
 #include <algorithm>
-#include <cassert>
 
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/core/version.hpp"
@@ -21,25 +18,6 @@ std::uint32_t crc_of(std::span<const std::byte> bytes, std::uint32_t before = 0)
       crc32_z(before, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
 }
 
-std::vector<std::byte> compressed(std::span<const std::byte> bytes, const std::string& how) {
-  std::vector<std::byte> out;
-  std::size_t size = 0;
-  bool failed = false;
-  if (how == "zstd") {
-    constexpr int kLevel = 1;  // 3 takes twice the time for 2 % on clouds of floats
-    out.resize(ZSTD_compressBound(bytes.size()));
-    size = ZSTD_compress(out.data(), out.size(), bytes.data(), bytes.size(), kLevel);
-    failed = ZSTD_isError(size) != 0;
-  } else {
-    out.resize(LZ4F_compressFrameBound(bytes.size(), nullptr));
-    size = LZ4F_compressFrame(out.data(), out.size(), bytes.data(), bytes.size(), nullptr);
-    failed = LZ4F_isError(size) != 0;
-  }
-  assert(!failed);  // there is room, and nothing else can fail
-  out.resize(failed ? 0 : size);
-  return out;
-}
-
 /// How rosbag2 notes a writer's quality of service (integers: Humble's form, which all read).
 std::string qos_yaml(const Topic& topic) {
   return fmt::format(
@@ -51,25 +29,19 @@ std::string qos_yaml(const Topic& topic) {
       topic.latched ? 1 : 2);
 }
 
-/// A record with its head.
-std::vector<std::byte> record_of(mcap::Opcode opcode, std::span<const std::byte> content) {
-  RecordWriter record;
-  record.number(static_cast<std::uint8_t>(opcode))
-      .number(static_cast<std::uint64_t>(content.size()))
-      .raw(content);
-  return record.bytes();
+/// As chunks say it.
+std::string compression_of(const McapOptions& options) {
+  const std::string& name = options.compression;
+  if (name != "zstd" && name != "lz4" && name != "none") {
+    throw InputError(fmt::format("compression '{}' is unknown; zstd, lz4 or none", name));
+  }
+  return name == "none" ? "" : name;
 }
 
 }  // namespace
 
 McapWriter::McapWriter(const std::string& path, const McapOptions& options)
-    : options_(options), file_(path) {
-  if (options_.compression == "none") options_.compression.clear();
-  if (!options_.compression.empty() && options_.compression != "zstd" &&
-      options_.compression != "lz4") {
-    throw InputError(
-        fmt::format("compression '{}' is unknown; zstd, lz4 or none", options_.compression));
-  }
+    : options_(options), packer_(compression_of(options)), file_(path) {
   try {
     file_.write(std::as_bytes(std::span(mcap::kMagic)));
     RecordWriter header;
@@ -91,7 +63,9 @@ McapWriter::~McapWriter() {
 }
 
 void McapWriter::write_record(Opcode opcode, std::span<const std::byte> content) {
-  file_.write(record_of(opcode, content));
+  RecordWriter record;
+  record.record(opcode, content);
+  file_.write(record.bytes());
 }
 
 int McapWriter::advertise(const Topic& topic) {
@@ -121,46 +95,45 @@ void McapWriter::send(int topic, const Bytes& bytes, std::int64_t time) {
   if (!open_) return;
   const auto id = static_cast<std::uint16_t>(topic);
   const auto at = static_cast<std::uint64_t>(time);
-  if (chunk_.records.empty()) {
+  RecordWriter& records = chunk_.records;
+  if (records.bytes().empty()) {
     // a chunk by itself is readable: it repeats what its messages need
-    for (const auto& schema : schemas_) {
-      const auto record = record_of(Opcode::kSchema, schema);
-      chunk_.records.insert(chunk_.records.end(), record.begin(), record.end());
-    }
-    for (const auto& channel : channels_) {
-      const auto record = record_of(Opcode::kChannel, channel);
-      chunk_.records.insert(chunk_.records.end(), record.begin(), record.end());
-    }
+    for (const auto& schema : schemas_) records.record(Opcode::kSchema, schema);
+    for (const auto& channel : channels_) records.record(Opcode::kChannel, channel);
     chunk_.first = chunk_.last = at;
   }
-  chunk_.index[id].emplace_back(at, chunk_.records.size());
+  chunk_.index[id].emplace_back(at, records.bytes().size());
   chunk_.first = std::min(chunk_.first, at);
   chunk_.last = std::max(chunk_.last, at);
-  RecordWriter message;
-  message.number(id).number(sequences_[id]++).number(at).number(at).raw(*bytes);
-  const auto record = record_of(Opcode::kMessage, message.bytes());
-  chunk_.records.insert(chunk_.records.end(), record.begin(), record.end());
+  constexpr std::size_t kFields = 2 + 4 + 8 + 8;
+  records.head(Opcode::kMessage, kFields + bytes->size())
+      .number(id)
+      .number(sequences_[id]++)
+      .number(at)
+      .number(at)
+      .raw(*bytes);
   if (messages_++ == 0) first_ = last_ = at;
   first_ = std::min(first_, at);
   last_ = std::max(last_, at);
-  if (chunk_.records.size() >= options_.chunk_size) end_chunk();
+  if (records.bytes().size() >= options_.chunk_size) end_chunk();
 }
 
 void McapWriter::end_chunk() {
   if (chunk_.index.empty()) return;
   const std::uint64_t start = file_.size();
-  const auto packed = options_.compression.empty()
-                          ? chunk_.records
-                          : compressed(chunk_.records, options_.compression);
-  RecordWriter chunk;
-  chunk.number(chunk_.first)
+  const std::vector<std::byte>& records = chunk_.records.bytes();
+  const std::span<const std::byte> packed = packer_.pack(records);
+  RecordWriter fields;
+  fields.number(chunk_.first)
       .number(chunk_.last)
-      .number(static_cast<std::uint64_t>(chunk_.records.size()))
-      .number(crc_of(chunk_.records))
-      .text(options_.compression)
-      .number(static_cast<std::uint64_t>(packed.size()))
-      .raw(packed);
-  write_record(Opcode::kChunk, chunk.bytes());
+      .number(static_cast<std::uint64_t>(records.size()))
+      .number(crc_of(records))
+      .text(packer_.compression())
+      .number(static_cast<std::uint64_t>(packed.size()));
+  RecordWriter head;
+  head.head(Opcode::kChunk, fields.bytes().size() + packed.size()).raw(fields.bytes());
+  file_.write(head.bytes());
+  file_.write(packed);
   const std::uint64_t length = file_.size() - start;
 
   RecordWriter offsets;
@@ -182,11 +155,12 @@ void McapWriter::end_chunk() {
       .number(static_cast<std::uint32_t>(offsets.bytes().size()))
       .raw(offsets.bytes())
       .number(file_.size() - start - length)
-      .text(options_.compression)
+      .text(packer_.compression())
       .number(static_cast<std::uint64_t>(packed.size()))
-      .number(static_cast<std::uint64_t>(chunk_.records.size()));
+      .number(static_cast<std::uint64_t>(records.size()));
   chunk_indices_.push_back(index.bytes());
-  chunk_ = Chunk{};
+  chunk_.records.clear();
+  chunk_.index.clear();
 }
 
 void McapWriter::attach(const std::string& name,
@@ -235,12 +209,12 @@ void McapWriter::write_summary() {
   const auto group = [&](Opcode opcode, const std::vector<std::vector<std::byte>>& contents) {
     if (contents.empty()) return;
     const std::uint64_t from = start + summary.bytes().size();
-    for (const auto& content : contents) summary.raw(record_of(opcode, content));
+    for (const auto& content : contents) summary.record(opcode, content);
     RecordWriter offset;
     offset.number(static_cast<std::uint8_t>(opcode))
         .number(from)
         .number(start + summary.bytes().size() - from);
-    offsets.raw(record_of(Opcode::kSummaryOffset, offset.bytes()));
+    offsets.record(Opcode::kSummaryOffset, offset.bytes());
   };
   RecordWriter counts;
   for (std::size_t i = 0; i < sequences_.size(); ++i) {
@@ -267,10 +241,7 @@ void McapWriter::write_summary() {
   summary.raw(offsets.bytes());
   // the checksum covers the footer up to itself
   constexpr std::uint64_t kFooterSize = 8 + 8 + 4;
-  summary.number(static_cast<std::uint8_t>(Opcode::kFooter))
-      .number(kFooterSize)
-      .number(start)
-      .number(offsets_start);
+  summary.head(Opcode::kFooter, kFooterSize).number(start).number(offsets_start);
   summary.number(crc_of(summary.bytes()));
   file_.write(summary.bytes());
 }

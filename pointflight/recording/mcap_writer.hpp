@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "pointflight/recording/internal/active_file.hpp"
+#include "pointflight/recording/internal/mcap_chunk.hpp"
 #include "pointflight/recording/internal/mcap_format.hpp"
 #include "pointflight/ros/common/wire.hpp"
 
@@ -47,6 +48,7 @@ class McapWriter : public Outlet {
   void write_summary();
 
   McapOptions options_;
+  mcap::Packer packer_;
   ActiveFile file_;
   bool open_ = true;
   std::map<std::string, std::uint16_t> schema_ids_;         ///< By type name.
@@ -54,9 +56,10 @@ class McapWriter : public Outlet {
   std::vector<std::uint32_t> sequences_;                    ///< Of each channel.
   std::vector<std::vector<std::byte>> chunk_indices_, attachment_indices_;
 
-  /// The chunk that is being filled.
+  /// The chunk that is being filled. Its memory is kept for the next: to fault in some MB for
+  /// each scan took more time than to compress them.
   struct Chunk {
-    std::vector<std::byte> records;
+    mcap::RecordWriter records;
     std::map<std::uint16_t, std::vector<std::pair<std::uint64_t, std::uint64_t>>> index;
     std::uint64_t first = 0, last = 0;
   } chunk_;

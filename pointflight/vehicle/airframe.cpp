@@ -7,7 +7,6 @@
 
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/input_error.hpp"
-#include "pointflight/core/interpolation.hpp"
 #include "pointflight/core/resources.hpp"
 #include "pointflight/vehicle/command.hpp"
 
@@ -141,13 +140,6 @@ void describe_battery(SettingsVisitor& v, BatterySettings& b) {
   });
 }
 
-/// Constant beyond the first and the last.
-double share_at(const std::vector<double>& ratios,
-                const std::vector<double>& shares,
-                double ratio) {
-  return on_line(ratios, shares, std::clamp(ratio, ratios.front(), ratios.back()));
-}
-
 /// J = v / (n D).
 double advance_ratio(double climb, double speed, double radius) {
   return kPi * climb / (std::max(speed, 1.0) * radius);
@@ -271,9 +263,21 @@ Solid VehicleSettings::hull() const {
   return shape->make(hull_size);
 }
 
-double RotorModel::thrust_share(double climb, double speed) const {
-  if (advance_ratios.empty()) return 1.0;
-  return share_at(advance_ratios, thrust_shares, advance_ratio(climb, speed, radius));
+/// Constant beyond the first and the last ratio. Both lines are `on_line`'s, with one search.
+RotorModel::Shares RotorModel::shares(double climb, double speed) const {
+  const std::vector<double>& js = advance_ratios;
+  if (js.empty()) return {};
+  const double ratio = advance_ratio(climb, speed, radius);
+  if (ratio <= js.front()) return {thrust_shares.front(), torque_shares.front()};
+  const double x = std::min(ratio, js.back());
+  std::size_t i = 1;  // a handful of pieces
+  while (i + 1 < js.size() && x >= js[i]) ++i;
+  const double along = x - js[i - 1];
+  const double length = js[i] - js[i - 1];
+  const auto share = [&](const std::vector<double>& ys) {
+    return ys[i - 1] + (ys[i] - ys[i - 1]) * along / length;
+  };
+  return {share(thrust_shares), share(torque_shares)};
 }
 
 /// Where the share is constant w^2 = T / (k_f share). Along a straight piece of it, share = y + m J
@@ -299,11 +303,6 @@ double RotorModel::speed_for(double thrust, double climb) const {
     if (ratio >= js[i - 1] - kRounding && ratio <= js[i] + kRounding) return speed;
   }
   return speed_max;
-}
-
-double RotorModel::torque_share(double climb, double speed) const {
-  if (advance_ratios.empty()) return 1.0;
-  return share_at(advance_ratios, torque_shares, advance_ratio(climb, speed, radius));
 }
 
 double VehicleSettings::hover_speed() const {

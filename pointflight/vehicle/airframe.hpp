@@ -38,13 +38,23 @@ struct RotorModel {
       thrust_shares;  ///< C_T(J) / C_T(0) at these, straight between, constant beyond.
   std::vector<double> torque_shares;  ///< C_P(J) / C_P(0) at these.
 
+  /// Shares of the static thrust and torque.
+  struct Shares {
+    double thrust = 1.0;  ///< Of k_f w^2.
+    double torque = 1.0;  ///< Of k_m w^2.
+  };
+  /// At `climb` m/s along the axis and `speed` rad/s (> 0).
+  [[nodiscard]] Shares shares(double climb, double speed) const;
   /// Of the static thrust, at `climb` m/s along the axis and `speed` rad/s (> 0).
-  [[nodiscard]] double thrust_share(double climb, double speed) const;
+  [[nodiscard]] double thrust_share(double climb, double speed) const {
+    return shares(climb, speed).thrust;
+  }
   /// Speed (rad/s) that gives a thrust (N, 0 or more) at `climb` m/s, whatever the limits.
   [[nodiscard]] double speed_for(double thrust, double climb) const;
   /// Of the static torque.
-  /// Of the static torque.
-  [[nodiscard]] double torque_share(double climb, double speed) const;
+  [[nodiscard]] double torque_share(double climb, double speed) const {
+    return shares(climb, speed).torque;
+  }
 };
 
 /// Gains follow from these and from the airframe's mass and inertia.

@@ -18,6 +18,18 @@ struct Multirotor::Rate {
   Vector3d torque_body;   ///< What changes the momentum of body and rotors, with w x (J w + h).
 };
 
+/// Of x'' = -wn^2 x - 2 z wn x' over some time t: x(t) = decay (x0 c + (x0' + z wn x0) s).
+struct Multirotor::RotorResponse {
+  double decay = 1.0, c = 1.0, s = 0.0;
+};
+
+/// What one step of the integrator works with: both halves of a step have it in common.
+struct Multirotor::Stages {
+  std::vector<double> targets;          ///< Speeds that the rotors go to, rad/s.
+  RotorResponse half, whole;            ///< Until its middle and its end.
+  std::vector<RotorState> middle, end;  ///< The rotors there.
+};
+
 Multirotor::Multirotor(const VehicleSettings& settings) : settings_(settings) {
   check_settings(settings, settings.path.empty() ? "vehicle" : settings.path);
 }
@@ -44,36 +56,37 @@ double Multirotor::ground_effect(double height) const {
   return 1.0 / (1.0 - share * share);
 }
 
-/// x'' = -wn^2 x - 2 z wn x' for x = speed - command, in closed form: exact at any `dt`.
-void Multirotor::advance(std::span<RotorState> rotors,
-                         std::span<const double> commands,
-                         double dt,
-                         const FlightConditions& conditions) const {
+/// c and s by the kind of damping, in closed form: exact at any `dt`.
+Multirotor::RotorResponse Multirotor::response(double dt) const {
   const double wn = settings_.rotor.natural_frequency;
   const double z = settings_.rotor.damping;
-  if (wn <= 0.0) return;
   const double decay = math::exp(-z * wn * dt);
-  // x(t) = decay (x0 c + (x0' + z wn x0) s), c and s by the kind of damping
-  double c = 1.0;
-  double s = dt;
   const double under = 1.0 - z * z;
   if (under > 1e-8) {
     const double wd = wn * std::sqrt(under);
     const auto angle = math::sincos(wd * dt);
-    c = angle.cos;
-    s = angle.sin / wd;
-  } else if (under < -1e-8) {
+    return {decay, angle.cos, angle.sin / wd};
+  }
+  if (under < -1e-8) {
     const double wd = wn * std::sqrt(-under);
     const double grow = math::exp(wd * dt);
-    c = 0.5 * (grow + 1.0 / grow);
-    s = 0.5 * (grow - 1.0 / grow) / wd;
+    return {decay, 0.5 * (grow + 1.0 / grow), 0.5 * (grow - 1.0 / grow) / wd};
   }
-  for (std::size_t i = 0; i < rotors.size(); ++i) {
-    const double command = target(i, commands[i], conditions);
-    const double x = rotors[i].speed - command;
-    const double v = rotors[i].acceleration;
-    rotors[i].speed = command + decay * (x * c + (v + z * wn * x) * s);
-    rotors[i].acceleration = decay * (v * c - (z * wn * v + wn * wn * x) * s);
+  return {decay, 1.0, dt};
+}
+
+void Multirotor::advance(std::span<const RotorState> now,
+                         std::span<const double> targets,
+                         const RotorResponse& response,
+                         std::span<RotorState> later) const {
+  const double wn = settings_.rotor.natural_frequency;
+  const double z = settings_.rotor.damping;
+  const auto [decay, c, s] = response;
+  for (std::size_t i = 0; i < now.size(); ++i) {
+    const double x = now[i].speed - targets[i];
+    const double v = now[i].acceleration;
+    later[i].speed = targets[i] + decay * (x * c + (v + z * wn * x) * s);
+    later[i].acceleration = decay * (v * c - (z * wn * v + wn * wn * x) * s);
   }
 }
 
@@ -106,13 +119,13 @@ Multirotor::Rate Multirotor::rate(const RigidBodyState& body,
     const Vector3d v_rotor = v_body + body.omega_body.cross(place.position);
     const double thrust =
         rotor.thrust_coefficient * w * w * ground_effect(height + up_body.dot(place.position));
+    const RotorModel::Shares shares = rotor.shares(v_rotor.z(), w);
     const Vector3d f(-rotor.drag_coefficient * w * v_rotor.x(),
                      -rotor.drag_coefficient * w * v_rotor.y(),
-                     thrust * rotor.thrust_share(v_rotor.z(), w));
+                     thrust * shares.thrust);
     force += f;
     torque += place.position.cross(f);
-    torque.z() +=
-        place.yaw_sign * rotor.torque_coefficient * w * w * rotor.torque_share(v_rotor.z(), w);
+    torque.z() += place.yaw_sign * rotor.torque_coefficient * w * w * shares.torque;
   }
   // quadratic drag of the body along its axes
   force -=
@@ -135,25 +148,34 @@ void Multirotor::step(VehicleState& state,
   assert(commands.size() == settings_.rotors.size() && state.rotors.size() == commands.size());
   assert(conditions.rotor_shares.empty() || conditions.rotor_shares.size() == commands.size());
   assert(std::isfinite(dt));
+  Stages stages;
+  stages.targets.resize(commands.size());
+  for (std::size_t i = 0; i < commands.size(); ++i) {
+    stages.targets[i] = target(i, commands[i], conditions);
+  }
+  stages.half = response(0.5 * (0.5 * dt));
+  stages.whole = response(0.5 * dt);
+  stages.middle.resize(commands.size());
+  stages.end.resize(commands.size());
   // in two halves: a vehicle that tumbles at 7 rad/s then stays within 1e-9 m of the exact motion
   // over 10 s of 1 ms steps, not only within 1e-8
-  for (int half = 0; half < 2; ++half) runge_kutta(state, commands, 0.5 * dt, conditions);
+  for (int half = 0; half < 2; ++half) runge_kutta(state, stages, 0.5 * dt, conditions);
 }
 
 void Multirotor::runge_kutta(VehicleState& state,
-                             std::span<const double> commands,
+                             Stages& stages,
                              double dt,
                              const FlightConditions& conditions) const {
-  if (settings_.rotor.natural_frequency <= 0.0) {
-    for (std::size_t i = 0; i < commands.size(); ++i) {
-      state.rotors[i] = {target(i, commands[i], conditions), 0.0};
+  auto& [targets, to_middle, to_end, middle, end] = stages;
+  std::vector<RotorState>& begin = state.rotors;
+  if (settings_.rotor.natural_frequency > 0.0) {
+    advance(begin, targets, to_middle, middle);
+    advance(begin, targets, to_end, end);
+  } else {
+    for (std::size_t i = 0; i < targets.size(); ++i) {
+      begin[i] = middle[i] = end[i] = {targets[i], 0.0};
     }
   }
-  const std::vector<RotorState>& begin = state.rotors;
-  std::vector<RotorState> middle = state.rotors;
-  advance(middle, commands, 0.5 * dt, conditions);
-  std::vector<RotorState> end = state.rotors;
-  advance(end, commands, dt, conditions);
 
   // the momentum of body and rotors together is what is integrated: what a rotor gains by speeding
   // up the body loses, to the last bit
@@ -184,8 +206,8 @@ void Multirotor::runge_kutta(VehicleState& state,
   r.torque_body = mean(k1.torque_body, k2.torque_body, k3.torque_body, k4.torque_body);
   state.body = advanced(r, dt, end);
   state.body.q_world_body.normalize();
-  state.rotors = std::move(end);
-  for (RotorState& r : state.rotors) {
+  begin.swap(end);
+  for (RotorState& r : begin) {
     if (r.speed < 0.0) r = {0.0, std::max(0.0, r.acceleration)};
   }
 }

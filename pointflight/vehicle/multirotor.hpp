@@ -60,18 +60,22 @@ class Multirotor {
 
  private:
   struct Rate;
+  struct RotorResponse;
+  struct Stages;
   void runge_kutta(VehicleState& state,
-                   std::span<const double> commands,
+                   Stages& stages,
                    double dt,
                    const FlightConditions& conditions) const;
   [[nodiscard]] Rate rate(const RigidBodyState& body,
                           std::span<const RotorState> rotors,
                           const FlightConditions& conditions) const;
-  /// The rotors `dt` seconds later.
-  void advance(std::span<RotorState> rotors,
-               std::span<const double> commands,
-               double dt,
-               const FlightConditions& conditions) const;
+  /// Of a rotor's speed within `dt` seconds.
+  [[nodiscard]] RotorResponse response(double dt) const;
+  /// The rotors' speeds later, on their way to `targets`.
+  void advance(std::span<const RotorState> now,
+               std::span<const double> targets,
+               const RotorResponse& response,
+               std::span<RotorState> later) const;
   [[nodiscard]] double rotor_momentum(std::span<const RotorState> rotors,
                                       double RotorState::*member) const;
   /// The speed that rotor i goes to.

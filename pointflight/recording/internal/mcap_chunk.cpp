@@ -5,6 +5,8 @@
 #include <zstd.h>
 
 #include <algorithm>
+#include <cassert>
+#include <utility>
 
 namespace pointflight::mcap {
 namespace {
@@ -51,6 +53,35 @@ std::vector<std::byte> unpacked(std::span<const std::byte> packed,
 }
 
 }  // namespace
+
+void Packer::FreeContext::operator()(ZSTD_CCtx_s* context) const {
+  ZSTD_freeCCtx(context);
+}
+
+Packer::Packer(std::string compression) : compression_(std::move(compression)) {
+  if (compression_ == "zstd") zstd_.reset(ZSTD_createCCtx());
+}
+
+std::span<const std::byte> Packer::pack(std::span<const std::byte> bytes) {
+  if (compression_.empty()) return bytes;
+  const bool is_zstd = compression_ == "zstd";
+  const std::size_t most =
+      is_zstd ? ZSTD_compressBound(bytes.size()) : LZ4F_compressFrameBound(bytes.size(), nullptr);
+  if (packed_.size() < most) packed_.resize(most);
+  std::size_t size = 0;
+  bool failed = false;
+  if (is_zstd) {
+    constexpr int kLevel = 1;  // 3 takes twice the time for 2 % on clouds of floats
+    size = ZSTD_compressCCtx(
+        zstd_.get(), packed_.data(), packed_.size(), bytes.data(), bytes.size(), kLevel);
+    failed = ZSTD_isError(size) != 0;
+  } else {
+    size = LZ4F_compressFrame(packed_.data(), packed_.size(), bytes.data(), bytes.size(), nullptr);
+    failed = LZ4F_isError(size) != 0;
+  }
+  assert(!failed);  // there is room, and nothing else can fail
+  return std::span(packed_).first(failed ? 0 : size);
+}
 
 std::optional<PackedChunk> chunk_of(RecordReader& record) {
   PackedChunk chunk;

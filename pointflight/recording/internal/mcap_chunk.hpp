@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -9,7 +10,31 @@
 
 #include "pointflight/recording/internal/mcap_format.hpp"
 
+struct ZSTD_CCtx_s;
+
 namespace pointflight::mcap {
+
+/// Compresses chunks, one after another; keeps its memory.
+class Packer {
+ public:
+  /// "", "lz4", "zstd"
+  explicit Packer(std::string compression);
+
+  /// As chunks say it.
+  [[nodiscard]] const std::string& compression() const { return compression_; }
+
+  /// Compressed, until the next call; without a compression `bytes` themselves.
+  [[nodiscard]] std::span<const std::byte> pack(std::span<const std::byte> bytes);
+
+ private:
+  struct FreeContext {
+    void operator()(ZSTD_CCtx_s* context) const;
+  };
+
+  std::string compression_;
+  std::unique_ptr<ZSTD_CCtx_s, FreeContext> zstd_;
+  std::vector<std::byte> packed_;
+};
 
 /// A chunk as it lies in a file, of a record's content.
 struct PackedChunk {

@@ -43,9 +43,17 @@ inline constexpr std::size_t kRecordHead = 9;  // opcode and length
 
 using StringMap = std::map<std::string, std::string>;
 
-/// One record's content.
+/// One record's content, or records one after another.
 class RecordWriter {
  public:
+  /// What a record begins with; `length` bytes of content follow.
+  RecordWriter& head(Opcode opcode, std::uint64_t length) {
+    return number(static_cast<std::uint8_t>(opcode)).number(length);
+  }
+  /// A whole record.
+  RecordWriter& record(Opcode opcode, std::span<const std::byte> content) {
+    return head(opcode, content.size()).raw(content);
+  }
   template <class T>
   RecordWriter& number(T value) {
     const auto* first = reinterpret_cast<const std::byte*>(&value);
@@ -67,6 +75,8 @@ class RecordWriter {
     return raw(inner.bytes_);
   }
   [[nodiscard]] const std::vector<std::byte>& bytes() const { return bytes_; }
+  /// Empty again; the memory is kept.
+  void clear() { bytes_.clear(); }
 
  private:
   std::vector<std::byte> bytes_;
