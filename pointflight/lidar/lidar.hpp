@@ -110,7 +110,8 @@ class Lidar {
                                             std::span<const Hit> hits,
                                             const Executor& executor) const;
   [[nodiscard]] std::vector<std::uint8_t> infrared_of(std::span<const Beam> beams,
-                                                      std::span<const Hit> hits) const;
+                                                      std::span<const Hit> hits,
+                                                      const Executor& executor) const;
   [[nodiscard]] Scan written(const Aimed& aimed,
                              const PoseTrack& T_world_sensor,
                              Received received,

@@ -236,41 +236,53 @@ Lidar::Received Lidar::received_as_stereo(const Aimed& aimed,
   const ScanRequest& request = aimed.request;
   const std::vector<Beam>& beams = aimed.beams();
   std::vector<float> shares(beams.size());
-  for (std::size_t i = 0; i < beams.size(); ++i) shares[i] = depth_share(beams[i]);
+  executor.parallel_for(beams.size(), kReturnsPerChunk, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) shares[i] = depth_share(beams[i]);
+  });
   const RandomStream pixels(request.seed, StreamId::kLidarRangeNoise, sensor_);
   const RandomStream windows(request.seed, StreamId::kStereo, sensor_);
   Received received;
   std::vector<Return>& returns = received.returns;
   returns =
       stereo_->measure(hits, shares, {pixels, windows, request.index, request.noise}, executor);
-  for (std::size_t i = 0; i < returns.size(); ++i) {
-    returns[i].range /= shares[i];
-    returns[i].true_range /= shares[i];
-  }
+  executor.parallel_for(returns.size(), kReturnsPerChunk, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      returns[i].range /= shares[i];
+      returns[i].true_range /= shares[i];
+    }
+  });
   return received;
 }
 
 /// What a camera's imager sees by the sun and by its own light, which falls off with the square of
 /// the depth; exposed so that the mean of what it hits is a third of the brightest.
 std::vector<std::uint8_t> Lidar::infrared_of(std::span<const Beam> beams,
-                                             std::span<const Hit> hits) const {
+                                             std::span<const Hit> hits,
+                                             const Executor& executor) const {
   constexpr double kMean = 85.0;
   std::vector<double> light(hits.size(), 0.0);
-  double sum = 0.0;
+  executor.parallel_for(hits.size(), kReturnsPerChunk, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      if (!hits[i].is_return()) continue;
+      const auto depth = static_cast<double>(std::max(hits[i].range * depth_share(beams[i]), 0.1f));
+      light[i] = returns_->reflectivity(hits[i]) *
+                 (returns_->sun_klx() + settings_.grid.projector_klx / (depth * depth));
+    }
+  });
+  double sum = 0.0;  // in the order of the pixels, whatever the threads
   double lit = 0.0;
   for (std::size_t i = 0; i < hits.size(); ++i) {
     if (!hits[i].is_return()) continue;
-    const auto depth = static_cast<double>(std::max(hits[i].range * depth_share(beams[i]), 0.1f));
-    light[i] = returns_->reflectivity(hits[i]) *
-               (returns_->sun_klx() + settings_.grid.projector_klx / (depth * depth));
     sum += light[i];
     lit += 1.0;
   }
   std::vector<std::uint8_t> infrared(hits.size(), 0);
   if (!(sum > 0.0)) return infrared;
-  for (std::size_t i = 0; i < hits.size(); ++i) {
-    infrared[i] = static_cast<std::uint8_t>(std::min(255.0, kMean * light[i] * lit / sum + 0.5));
-  }
+  executor.parallel_for(hits.size(), kReturnsPerChunk, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      infrared[i] = static_cast<std::uint8_t>(std::min(255.0, kMean * light[i] * lit / sum + 0.5));
+    }
+  });
   return infrared;
 }
 
@@ -285,7 +297,7 @@ Lidar::Received Lidar::received(const Aimed& aimed,
   } else {
     made = reported(aimed, hits, executor);
   }
-  if (measures_depth_) made.infrared = infrared_of(aimed.beams(), hits);
+  if (measures_depth_) made.infrared = infrared_of(aimed.beams(), hits, executor);
   return made;
 }
 

@@ -1,7 +1,6 @@
 #include "pointflight/lidar/stereo.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "pointflight/core/constants.hpp"
@@ -72,19 +71,24 @@ std::vector<double> StereoCamera::noise_of(std::size_t row,
   const double share = stereo_.white_share;
   const double common_share = std::sqrt(1.0 - share * share);
   const std::size_t pairs = (columns_ + 1) / 2;
+  std::vector<double> even(pairs);  // of columns 0, 2, ...
+  std::vector<double> odd(pairs);
+  draws.pixels.normal2(draws.image << 32 | (row * pairs), even, odd);
   std::vector<double> noise(columns_);
-  std::array<double, 2> own{};
-  for (std::size_t u = 0; u < columns_; ++u) {
-    if (u % 2 == 0) own = draws.pixels.normal2(draws.image << 32 | (row * pairs + u / 2));
-    const std::size_t i = u / window;
-    const double right = static_cast<double>(u % window) / static_cast<double>(window);
+  // column by column of all windows: what the four nodes count is the same in each
+  for (std::size_t in_window = 0; in_window < window; ++in_window) {
+    const double right = static_cast<double>(in_window) / static_cast<double>(window);
     const double a = (1.0 - right) * (1.0 - down);
     const double b = right * (1.0 - down);
     const double c = (1.0 - right) * down;
     const double d = right * down;
-    const double common = (a * above[i] + b * above[i + 1] + c * below[i] + d * below[i + 1]) /
-                          std::sqrt(a * a + b * b + c * c + d * d);
-    noise[u] = common_share * common + share * own[u % 2];
+    const double deviation = std::sqrt(a * a + b * b + c * c + d * d);
+    for (std::size_t u = in_window, i = 0; u < columns_; u += window, ++i) {
+      const double common =
+          (a * above[i] + b * above[i + 1] + c * below[i] + d * below[i + 1]) / deviation;
+      const double own = (u % 2 == 0 ? even : odd)[u / 2];
+      noise[u] = common_share * common + share * own;
+    }
   }
   return noise;
 }
@@ -135,9 +139,8 @@ std::vector<Return> StereoCamera::measure(std::span<const Hit> hits,
   std::vector<double> nodes;
   if (draws.noise) {
     nodes.resize(nodes_ * (rows_ / static_cast<std::size_t>(stereo_.window) + 2));
-    for (std::size_t n = 0; n < nodes.size(); ++n) {
-      nodes[n] = draws.windows.normal(draws.image << 32 | n);
-    }
+    std::vector<double> unused(nodes.size());
+    draws.windows.normal2(draws.image << 32, nodes, unused);
   }
   executor.parallel_for(rows_, 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t row = begin; row < end; ++row) {
