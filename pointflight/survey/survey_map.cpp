@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <utility>
 
 #include "pointflight/core/argument.hpp"
@@ -16,7 +15,6 @@ namespace pointflight {
 namespace {
 
 constexpr std::size_t kLeftOut = 10;  // one scan of so many judges
-constexpr double kCoarsest = 0.1;     // m: coarser ones are tried only if points are far apart
 
 EditOptions edit_options_of(const ImportOptions& options) {
   EditOptions edit;
@@ -97,7 +95,6 @@ std::vector<TriedResolution> try_resolutions(const ScanOpener& survey,
   FitOptions quick = fit;
   quick.known_space = false;
   quick.blame_passes = 1;  // a second one would take half as long again
-  std::vector<TriedResolution> tried;
   const auto try_one = [&](const std::optional<double>& resolution) {
     chosen.resolution = resolution;
     const ImportedMap imported = import_points(points, learnt, &seen, chosen, executor, progress);
@@ -111,30 +108,10 @@ std::vector<TriedResolution> try_resolutions(const ScanOpener& survey,
                                      progress);
     const OwnRays rays = measure_rays(
         *opened(fitted.tree, fitted.description), judges, fit.right, counts, executor, progress);
-    tried.push_back({imported.report.resolution, rays.right_share(), rays.returns + rays.empty});
-    return tried.back();
+    return TriedResolution{
+        imported.report.resolution, rays.right_share(), rays.returns + rays.empty};
   };
-  const double supported = try_one(std::nullopt).resolution;
-  if (tried.back().rays == 0) return tried;  // scans that do not overlap judge nothing
-  try_one(supported / std::numbers::sqrt2);
-  const double coarsest = std::max(2.0 * supported, kCoarsest);
-  for (double r = std::numbers::sqrt2 * supported; r < 1.01 * coarsest; r *= std::numbers::sqrt2) {
-    const double last = tried.back().right;
-    if (try_one(r).right < last && tried.size() > 4) break;
-  }
-  std::sort(tried.begin(), tried.end(), [](const TriedResolution& a, const TriedResolution& b) {
-    return a.resolution < b.resolution;
-  });
-  return tried;
-}
-
-double best_resolution(const std::vector<TriedResolution>& tried) {
-  require_argument(!tried.empty(), "best_resolution: none was tried");
-  return std::max_element(
-             tried.begin(),
-             tried.end(),
-             [](const TriedResolution& a, const TriedResolution& b) { return a.right < b.right; })
-      ->resolution;
+  return search_resolutions(try_one);
 }
 
 SurveyMap map_survey(const SurveySource& survey,

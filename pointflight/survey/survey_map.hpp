@@ -6,15 +6,9 @@
 #include "pointflight/map/import/map_builder.hpp"
 #include "pointflight/survey/map_fit.hpp"
 #include "pointflight/survey/posed_scans.hpp"
+#include "pointflight/survey/resolution_search.hpp"
 
 namespace pointflight {
-
-/// How a resolution did on scans that were left out.
-struct TriedResolution {
-  double resolution;   ///< r, m.
-  double right;        ///< Share of their rays, those without a return included.
-  std::uint64_t rays;  ///< That judged it; 0: the scans do not overlap.
-};
 
 /// A finished map of a survey.
 struct SurveyMap {
@@ -36,11 +30,9 @@ struct SurveyPoints {
   CloudOpener open;                ///< One of them at its beginning.
 };
 
-/// Tries resolutions a factor of the square root of two apart, from 1.4 spacings of the points to
-/// 4, or to 0.1 m if these lie closer: maps of the points beside which nine tenths of the scans
-/// saw something, fitted to these, judged by the rays of the others: those that end where the nine
-/// tenths saw something and those without a return. Coarser maps close gaps that a survey left, so
-/// that they may win without being truer: hence the limit. Without `points` the returns of the nine
+/// Tries resolutions (`search_resolutions`): maps of the points beside which nine tenths of the
+/// scans saw something, fitted to these, judged by the rays of the others: those that end where the
+/// nine tenths saw something and those without a return. Without `points` the returns of the nine
 /// tenths. Two scans at least. Throws InputError.
 std::vector<TriedResolution> try_resolutions(const ScanOpener& survey,
                                              std::size_t scan_count,
@@ -49,9 +41,6 @@ std::vector<TriedResolution> try_resolutions(const ScanOpener& survey,
                                              const FitOptions& fit,
                                              const Executor& executor,
                                              const Progress& progress = {});
-
-/// The best one of those tried.
-double best_resolution(const std::vector<TriedResolution>& tried);
 
 /// Makes the map of a survey. Without a resolution in
 /// `options` the best one is found.
