@@ -79,10 +79,11 @@ TEST(Mixer, WhatIsLeftMakesTheSameWrenchWhereItCan) {
 /// What became of a vehicle that hovers at a height of 20 m, of which a rotor has `share` of its
 /// speed from second 2 on.
 struct Loss {
-  double sideways = 0.0;  ///< Farthest from its position, m.
-  double sunk = 0.0;      ///< Farthest from the height that was asked for, m.
-  double tilt_deg = 0.0;  ///< Greatest.
-  double spin = 0.0;      ///< Greatest yaw rate, rad/s.
+  double sideways = 0.0;   ///< Farthest from its position, m.
+  double sunk = 0.0;       ///< Farthest from the height that was asked for, m.
+  double tilt_deg = 0.0;   ///< Greatest.
+  double spin = 0.0;       ///< Greatest yaw rate, rad/s.
+  double last_spin = 0.0;  ///< Yaw rate at the end, rad/s.
 };
 Loss lose_a_rotor(const VehicleSettings& vehicle,
                   std::size_t lost,
@@ -115,6 +116,7 @@ Loss lose_a_rotor(const VehicleSettings& vehicle,
     loss.tilt_deg = std::max(loss.tilt_deg, std::acos(std::clamp(up, -1.0, 1.0)) / kDegree);
     loss.spin = std::max(loss.spin, std::abs(state.body.omega_body.z()));
   }
+  loss.last_spin = std::abs(state.body.omega_body.z());
   return loss;
 }
 
@@ -131,6 +133,8 @@ TEST_P(RotorLoss, Slow_SixAndEightRotorsHoldTheirPlace) {
       EXPECT_LT(calm.sideways, 0.1);
       EXPECT_LT(calm.sunk, 0.1);
       EXPECT_LT(calm.spin, 0.5);
+      // what turns a hexarotor's last four about the vertical tilts them as well
+      EXPECT_LT(calm.last_spin, vehicle.rotors.size() == 6 ? 0.13 : 1e-3);
     }
     EXPECT_LT(lose_a_rotor(vehicle, 1, 0.0, {3.0, 2.0, 0.0}, 0.0).sideways, 3.0);
   }
