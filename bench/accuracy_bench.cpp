@@ -6,6 +6,7 @@
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
 #include <vector>
@@ -14,9 +15,8 @@
 #include "pointflight/core/parallel.hpp"
 #include "pointflight/core/random.hpp"
 #include "pointflight/lidar/footprint.hpp"
-#include "pointflight/lidar/lidar_settings.hpp"
+#include "pointflight/lidar/lidar.hpp"
 #include "pointflight/lidar/return_model.hpp"
-#include "pointflight/lidar/scan_beams.hpp"
 #include "pointflight/render/renderer.hpp"
 
 namespace pointflight {
@@ -37,13 +37,18 @@ struct SomeBeams {
 /// Some `wanted` beams in runs of 512 that follow each other in the order of rendering.
 SomeBeams some_beams(const LidarSettings& settings,
                      const Vector3d& position,
-                     float range_max,
+                     const Renderer& renderer,
                      std::size_t wanted,
                      const Executor& executor) {
-  const auto scan = ScanBeams(settings).of(0, executor);
-  std::vector<std::uint32_t> order = scan->order;
+  const Lidar lidar(settings, 0, nullptr, Surroundings{});
+  ScanRequest request;
+  request.noise = false;
+  const PoseTrack still(Pose{Quaterniond::Identity(), position});
+  const auto scan = lidar.aim(request, still, renderer, executor);
+  const RenderJob job = scan->job();
+  std::vector<std::uint32_t> order(job.batch.order.begin(), job.batch.order.end());
   if (order.empty()) {
-    order.resize(scan->beams.size());
+    order.resize(job.batch.rays.size());
     std::iota(order.begin(), order.end(), 0u);
   }
   constexpr std::size_t kRun = 512;
@@ -51,17 +56,8 @@ SomeBeams some_beams(const LidarSettings& settings,
   SomeBeams some;
   for (std::size_t i = 0; i < order.size(); ++i) {
     if (i / kRun % every != 0) continue;
-    const Beam& beam = scan->beams[order[i]];
-    const Vector3f direction = beam.direction_sensor.cast<float>().normalized();
-    Ray ray;
-    ray.origin_world = position + beam.origin_sensor.cast<double>();
-    ray.direction_world = direction;
-    ray.range_max = range_max;
-    some.rays.push_back(ray);
-    const float flat = std::hypot(direction.x(), direction.y());
-    some.across.push_back(flat < 1e-6f
-                              ? Vector3f(Vector3f::UnitY())
-                              : Vector3f(-direction.y() / flat, direction.x() / flat, 0.0f));
+    some.rays.push_back(job.batch.rays[order[i]]);
+    some.across.push_back(job.wide->across[order[i]]);
   }
   return some;
 }
@@ -146,8 +142,7 @@ void compare(const Renderer& renderer,
   even.reflectivity = kReflectivity;
   const ReturnModel of_even(settings, even);
   const ReturnModel of_varied(settings, {});
-  const SomeBeams beams =
-      some_beams(settings, position, static_cast<float>(of_varied.reach()), wanted, executor);
+  const SomeBeams beams = some_beams(settings, position, renderer, wanted, executor);
 
   const auto even_truth = echoes_with(renderer, beams, many, of_even, executor);
   const auto even_shipped = echoes_with(renderer, beams, settings.optics, of_even, executor);
@@ -202,10 +197,7 @@ void bench(const std::string& path, const std::vector<double>& at, std::size_t w
 }  // namespace pointflight
 
 int main(int argc, char** argv) {
-  CLI::App app(
-      "Wide beams against a thousand sub-rays: the largest error of an echo's share of its beam, "
-      "where "
-      "a beam hits more than one thing, and how many beams report other returns");
+  CLI::App app("How near wide beams come to a thousand sub-rays each");
   std::string map;
   std::vector<double> at = {0.0, 0.0, 1.0};
   std::size_t beams = 8000;

@@ -7,6 +7,7 @@
 
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/input_error.hpp"
+#include "pointflight/core/interpolation.hpp"
 #include "pointflight/core/resources.hpp"
 #include "pointflight/vehicle/command.hpp"
 
@@ -263,21 +264,15 @@ Solid VehicleSettings::hull() const {
   return shape->make(hull_size);
 }
 
-/// Constant beyond the first and the last ratio. Both lines are `on_line`'s, with one search.
+/// Constant beyond the first and the last ratio.
 RotorModel::Shares RotorModel::shares(double climb, double speed) const {
   const std::vector<double>& js = advance_ratios;
   if (js.empty()) return {};
   const double ratio = advance_ratio(climb, speed, radius);
   if (ratio <= js.front()) return {thrust_shares.front(), torque_shares.front()};
   const double x = std::min(ratio, js.back());
-  std::size_t i = 1;  // a handful of pieces
-  while (i + 1 < js.size() && x >= js[i]) ++i;
-  const double along = x - js[i - 1];
-  const double length = js[i] - js[i - 1];
-  const auto share = [&](const std::vector<double>& ys) {
-    return ys[i - 1] + (ys[i] - ys[i - 1]) * along / length;
-  };
-  return {share(thrust_shares), share(torque_shares)};
+  const std::size_t piece = piece_at(js, x);  // of both
+  return {on_piece(js, thrust_shares, piece, x), on_piece(js, torque_shares, piece, x)};
 }
 
 /// Where the share is constant w^2 = T / (k_f share). Along a straight piece of it, share = y + m J

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cassert>
+#include <new>
 #include <utility>
 
 namespace pointflight::mcap {
@@ -59,7 +60,9 @@ void Packer::FreeContext::operator()(ZSTD_CCtx_s* context) const {
 }
 
 Packer::Packer(std::string compression) : compression_(std::move(compression)) {
-  if (compression_ == "zstd") zstd_.reset(ZSTD_createCCtx());
+  if (compression_ != "zstd") return;
+  zstd_.reset(ZSTD_createCCtx());
+  if (zstd_ == nullptr) throw std::bad_alloc();
 }
 
 std::span<const std::byte> Packer::pack(std::span<const std::byte> bytes) {
