@@ -21,6 +21,13 @@ std::string about_spacing(double spacing, double resolution, double supported) {
                      supported);
 }
 
+void print_tried(const std::vector<TriedResolution>& tried, std::string_view judged_by) {
+  for (const TriedResolution& one : tried) {
+    log(fmt::format(
+        "  {:.4g} m     {:.2f} % of {} right", one.resolution, 100.0 * one.right, judged_by));
+  }
+}
+
 std::string about_noise(double noise, std::uint64_t projected, std::uint64_t too_thick) {
   return fmt::format(
       "{:.1f} mm across flat surfaces; {}",
@@ -85,8 +92,12 @@ void print_report(const ImportReport& r, const ImportOptions& options) {
   log(fmt::format("size          {:.4g} x {:.4g} x {:.4g} m", r.size.x(), r.size.y(), r.size.z()));
   log(fmt::format("resolution    {:.4g} m{}",
                   r.resolution,
-                  r.resolution_was_chosen ? " (chosen from the spacing)" : ""));
-  log("spacing       " + about_spacing(r.spacing, r.resolution, r.supported_resolution));
+                  r.resolution_was_tried    ? " (the best by those tried)"
+                  : r.resolution_was_chosen ? " (chosen from the spacing)"
+                                            : ""));
+  // what was tried needs no advice
+  const double advised = r.resolution_was_tried ? 0.0 : r.supported_resolution;
+  log("spacing       " + about_spacing(r.spacing, r.resolution, advised));
   print_columns(r);
   if (r.intensity_outliers_from > 0.0) {
     log(fmt::format("intensity     99.9 % are below {:.4g}; brighter ones are kept in coarse steps",

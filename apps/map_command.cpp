@@ -50,10 +50,12 @@ std::uint64_t count_in(const nlohmann::ordered_json& json, const char* key) {
 void print_findings(const nlohmann::ordered_json& metadata, double resolution) {
   if (!metadata.contains("noise")) return;
   const auto projection = metadata.value("projection", nlohmann::ordered_json::object());
+  // what was tried needs no advice
+  const bool was_tried = metadata.value("resolution_was_tried", nlohmann::ordered_json()) == true;
   fmt::print("  spacing     {}\n",
              about_spacing(number_in(metadata, "point_spacing"),
                            resolution,
-                           number_in(metadata, "supported_resolution")));
+                           was_tried ? 0.0 : number_in(metadata, "supported_resolution")));
   fmt::print("  noise       {}\n",
              about_noise(number_in(metadata, "noise"),
                          count_in(projection, "projected"),

@@ -16,6 +16,7 @@
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/io/pcd_writer.hpp"
 #include "pointflight/map/import/map_builder.hpp"
+#include "pointflight/survey/cloud_map.hpp"
 
 namespace pointflight::apps {
 namespace {
@@ -133,10 +134,7 @@ void import_survey(const ImportFlags& flags) {
   write_ghosts(std::move(ghosts), made.fit);
   outputs.commit();
   print_report(made.imported, options);
-  for (const TriedResolution& tried : made.tried) {
-    log(fmt::format(
-        "  {:.4g} m     {:.2f} % of left out rays right", tried.resolution, 100.0 * tried.right));
-  }
+  print_tried(made.tried, "left out rays");
   print_fit(made.fit, made.after);
   print_end(flags, made.imported, start);
 }
@@ -160,7 +158,8 @@ void import_map(const ImportFlags& flags) {
     });
     if (!any) throw InputError("--reflectivity: the points carry no intensity");
   }
-  ImportedMap map = import_clouds(sources, options, executor, progress);
+  CloudMap made = map_clouds(sources, options, executor, progress);
+  ImportedMap& map = made.map;
   end_progress();
   calibrate(flags, map.description);
   OutputSet outputs;
@@ -168,6 +167,7 @@ void import_map(const ImportFlags& flags) {
   write_map(std::move(output), map.tree, map.description);
   outputs.commit();
   print_report(map.report, options);
+  print_tried(made.tried, "rays to left out points");
   print_end(flags, map.report, start);
 }
 
@@ -225,8 +225,8 @@ void add_import(CLI::App& parent) {
       "the name, standard input by its first bytes");
   app->add_option("--resolution",
                   flags->resolution,
-                  "Voxel size r, m; without it the one that the points' spacing supports, or with "
-                  "--scans the one that renders scans left out best")
+                  "Voxel size r, m; without it the one of those tried whose map shows best what "
+                  "was left out of it: points, or with --scans scans")
       ->check(within(1e-4, 1e4));
   app->add_option("--shift",
                   flags->shift,

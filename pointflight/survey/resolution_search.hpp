@@ -19,12 +19,22 @@ struct TriedResolution {
 using TryResolution = std::function<TriedResolution(const std::optional<double>& resolution)>;
 
 /// Tries the resolution that the points support, then coarser ones, a factor of the square root of
-/// two apart, until one is worse than the one before; if the first of them is, finer ones likewise.
-/// From 5 mm to 1 m. In ascending order.
-std::vector<TriedResolution> search_resolutions(const TryResolution& try_one);
+/// two apart, until one is worse than the best of them by more than `slack` (a share of the rays);
+/// if none is better than the first one, finer ones likewise. From 5 mm to 1 m. In ascending order.
+std::vector<TriedResolution> search_resolutions(const TryResolution& try_one, double slack);
 
-/// The finest that is within 0.3 % of the rays of the best: what is smaller than the rays tell is
-/// not lost without need.
-double best_resolution(const std::vector<TriedResolution>& tried);
+/// Tries, beside what was tried, halfway (in the logarithm) between the best and its neighbours.
+/// Nothing if a single one was tried. In ascending order.
+std::vector<TriedResolution> refine_resolutions(std::vector<TriedResolution> tried,
+                                                const TryResolution& try_one);
+
+/// The finest whose share of right rays is within `level` of the best one's.
+double best_resolution(const std::vector<TriedResolution>& tried, double level);
+
+/// Where a parabola over the resolutions' logarithms, fitted to those within an octave and 2 % of
+/// the rays of the best one, is highest; the best one if fewer than four are, or they lie on none.
+/// What a grid's cells happen to cut is less than a percent of the rays, and more than neighbours
+/// differ by.
+double peak_resolution(const std::vector<TriedResolution>& tried);
 
 }  // namespace pointflight

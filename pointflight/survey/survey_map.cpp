@@ -15,6 +15,8 @@ namespace pointflight {
 namespace {
 
 constexpr std::size_t kLeftOut = 10;  // one scan of so many judges
+// share of the rays: what is smaller than they tell is not lost without need
+constexpr double kLevel = 0.003;
 
 EditOptions edit_options_of(const ImportOptions& options) {
   EditOptions edit;
@@ -111,7 +113,7 @@ std::vector<TriedResolution> try_resolutions(const ScanOpener& survey,
     return TriedResolution{
         imported.report.resolution, rays.right_share(), rays.returns + rays.empty};
   };
-  return search_resolutions(try_one);
+  return search_resolutions(try_one, 0.0);
 }
 
 SurveyMap map_survey(const SurveySource& survey,
@@ -127,7 +129,8 @@ SurveyMap map_survey(const SurveySource& survey,
   if (!chosen.resolution && survey.scan_count() > 1) {
     made.tried =
         try_resolutions(some, survey.scan_count(), points, options, fit, executor, progress);
-    chosen.resolution = best_resolution(made.tried);
+    chosen.resolution = best_resolution(made.tried, kLevel);
+    chosen.resolution_is_tried = made.tried.front().rays > 0;
   }
   ImportedMap imported = import_points(points, all, nullptr, chosen, executor, progress);
   made.imported = imported.report;

@@ -61,6 +61,7 @@ class Import {
       report.sources.push_back(std::filesystem::path(name).filename().string());
     }
     report.resolution_was_chosen = !options_.resolution.has_value();
+    report.resolution_was_tried = options_.resolution_is_tried;
     if (report.resolution_was_chosen) choose_resolution();
     report.resolution = options_.resolution.value_or(report.supported_resolution);
     check_resolution();
@@ -102,7 +103,7 @@ class Import {
         steps.add(batch);
         std::size_t finite = 0;
         for (const CloudPoint& point : batch) {
-          const Vector3d p = to_world(point.position);
+          const Vector3d p = world_position(point.position, options_);
           if (!p.allFinite()) continue;
           const float intensity = by_color ? luminance(point) : point.intensity;
           batch[finite++] = {p, std::isfinite(intensity) ? intensity : 0.0f};
@@ -124,12 +125,6 @@ class Import {
       throw InputError(
           fmt::format("{}: all {} points are NaN or infinite", names_.front(), report.points_read));
     }
-  }
-
-  [[nodiscard]] Vector3d to_world(const Vector3d& p) const {
-    const Vector3d q = options_.scale * p;
-    // y up to z up: a quarter turn about x
-    return (options_.up == 'y' ? Vector3d(q.x(), -q.z(), q.y()) : q) + options_.shift;
   }
 
   void choose_resolution() {
@@ -328,6 +323,12 @@ class Import {
 };
 
 }  // namespace
+
+Vector3d world_position(const Vector3d& position, const ImportOptions& options) {
+  const Vector3d p = options.scale * position;
+  // y up to z up: a quarter turn about x
+  return (options.up == 'y' ? Vector3d(p.x(), -p.z(), p.y()) : p) + options.shift;
+}
 
 ImportedMap build_map(const std::vector<std::string>& source_names,
                       const CloudOpener& opener,

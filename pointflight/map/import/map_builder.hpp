@@ -22,6 +22,7 @@ namespace pointflight {
 /// How clouds become a map.
 struct ImportOptions {
   std::optional<double> resolution;   ///< r, m; without it the one that the spacing supports.
+  bool resolution_is_tried = false;   ///< True: rays found it, no person gave it.
   double scale = 1.0;                 ///< Metres per unit of the file.
   char up = 'z';                      ///< The file's up axis: 'z', or 'y' (turned to z).
   Vector3d shift = Vector3d::Zero();  ///< Added to each point, after scale and up, m.
@@ -76,6 +77,7 @@ struct ImportReport {
   double spacing = 0.0;                   ///< Median nearest-neighbour distance, m; 0 if unknown.
   double supported_resolution = 0.0;      ///< 2 spacings.
   bool resolution_was_chosen = false;     ///< True: by the spacing, since no option gave one.
+  bool resolution_was_tried = false;      ///< True: rays found it.
   bool has_intensity = false;             ///< A source has them.
   bool intensity_from_colors = false;     ///< Of a source that has colours and no intensity.
   bool has_mesh = false;                  ///< A source was sampled.
@@ -95,6 +97,9 @@ struct ImportedMap {
   ImportReport report;               ///< What was done.
   std::vector<CloudPoint> outliers;  ///< Centroids of the dropped cells.
 };
+
+/// Where a point of a source lies in the map: scaled, turned, shifted; m.
+Vector3d world_position(const Vector3d& position, const ImportOptions& options);
 
 /// Opens the sources again for each pass over the points.
 using CloudOpener = std::function<std::unique_ptr<CloudReader>(std::size_t source)>;

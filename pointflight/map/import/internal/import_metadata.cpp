@@ -17,6 +17,7 @@ std::string import_metadata(const ImportReport& report, const ImportOptions& opt
   }
   json["resolution"] = report.resolution;
   json["resolution_was_chosen"] = report.resolution_was_chosen;
+  json["resolution_was_tried"] = report.resolution_was_tried;
   json["point_spacing"] = report.spacing;
   json["supported_resolution"] = report.supported_resolution;
   json["points_read"] = report.points_read;
