@@ -32,8 +32,8 @@ bool is_left_out(std::size_t point);
 /// Only rays that nothing hides: no point lies within 0.3 spacings of them, and nowhere are points
 /// within three spacings all around (they leave 150 degrees free where a ray passes an edge or
 /// along a floor; of rays through thinned surfaces one in a hundred is not noticed, through random
-/// points one in four). Of 100 candidates the half that see most are taken, if they see half as much
-/// as the best one: the top of a ceiling is level ground, too.
+/// points one in four). Of 100 candidates the half that see most are taken, if they see half as
+/// much as the best one: the top of a ceiling is level ground, too.
 ///
 /// `points`: m, z up, from `origin_world`; `spacing`: between neighbours, m. Without level ground,
 /// room or enough points there are none. Does not depend on the threads.
