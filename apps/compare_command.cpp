@@ -18,6 +18,7 @@
 #include "apps/terminal.hpp"
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/fidelity/scan_comparison.hpp"
+#include "pointflight/fidelity/scan_noise.hpp"
 #include "pointflight/fidelity/sensor_comparison.hpp"
 #include "pointflight/lidar/lidar.hpp"
 #include "pointflight/picture/error_picture.hpp"
@@ -103,6 +104,32 @@ nlohmann::ordered_json sensor_json(const SensorComparison& made) {
           {"shares", shares},
           {"edge_error_limits", SensorComparison::kErrors},
           {"edges", edges}};
+}
+
+nlohmann::ordered_json noise_json(const NoiseComparison& noise) {
+  nlohmann::ordered_json rows = nlohmann::ordered_json::array();
+  for (std::size_t k = 0; k < noise.bins.size(); ++k) {
+    const PlaneNoise& bin = noise.bins[k];
+    if (!NoiseComparison::counts(bin)) continue;
+    rows.push_back({{"range", {NoiseComparison::kRanges[k], NoiseComparison::kRanges[k + 1]}},
+                    {"real", bin.real},
+                    {"modelled", bin.modelled},
+                    {"real_points", bin.real_points},
+                    {"modelled_points", bin.modelled_points}});
+  }
+  return rows;
+}
+
+void print_noise(const NoiseComparison& noise) {
+  fmt::print("\nranges off planes, mm: real / by the model\n");
+  for (std::size_t k = 0; k < noise.bins.size(); ++k) {
+    const PlaneNoise& bin = noise.bins[k];
+    if (!NoiseComparison::counts(bin)) continue;
+    fmt::print(
+        "{:>10}{:>14}\n",
+        fmt::format("{:g}-{:g}", NoiseComparison::kRanges[k], NoiseComparison::kRanges[k + 1]),
+        fmt::format("{:.1f} / {:.1f}", 1e3 * bin.real, 1e3 * bin.modelled));
+  }
 }
 
 std::string nearer(const Sides& distance) {
@@ -196,9 +223,11 @@ void compare(const CompareFlags& flags) {
   std::optional<ErrorCollector> floor;
   if (flags.floor) floor = compare_floor(scans, executor, progress);
   std::optional<SensorComparison> sensor;
+  std::optional<NoiseComparison> noise;
   if (lidar) {
-    sensor = compare_sensor(
-        scans, *lidar, surroundings_in(*map, flags.surroundings), *renderer, executor, progress);
+    const Surroundings where = surroundings_in(*map, flags.surroundings);
+    sensor = compare_sensor(scans, *lidar, where, *renderer, executor, progress);
+    noise = compare_noise(scans, *lidar, where, *renderer, executor, progress);
     if (!flags.png.empty()) {
       picture::draw_sensor_comparison(
           *sensor, flags.lidar + " beside real scans", flags.png + "/sensor.png");
@@ -212,6 +241,7 @@ void compare(const CompareFlags& flags) {
                                    {"scans", rows}};
     if (floor) json["floor"] = table.json(floor->statistics());
     if (sensor) json["sensor"] = sensor_json(*sensor);
+    if (noise) json["sensor"]["noise"] = noise_json(*noise);
     print_json(json);
     return;
   }
@@ -219,6 +249,7 @@ void compare(const CompareFlags& flags) {
   if (cloud) table.print_row("all, supported", supported.statistics());
   if (floor) table.print_row("scans among themselves", floor->statistics());
   if (sensor) print_sensor(*sensor);
+  if (noise) print_noise(*noise);
 }
 
 }  // namespace

@@ -13,8 +13,8 @@ namespace pointflight {
 
 /// A ray that ends at the surface beside a point that was left out.
 struct LeftOutRay {
-  Ray ray;      ///< From where a sensor could be.
-  float range;  ///< At which it should end, m.
+  Ray ray;             ///< From where a sensor could be.
+  float range = 0.0f;  ///< At which it should end, m.
 };
 
 inline constexpr std::size_t kLeaveOut = 20;  ///< One point of so many is left out.
