@@ -133,7 +133,7 @@ TEST(CloudMap, TakesAResolutionThatItTried) {
   }
 }
 
-TEST(CloudMap, TriesPlacesOfALargeCloud) {
+TEST(CloudMap, Slow_TriesPlacesOfALargeCloud) {
   const TemporaryFolder folder;
   std::vector<Vector3d> points = divided_room(0.06);
   const std::size_t one = points.size();
@@ -151,7 +151,7 @@ TEST(CloudMap, TriesPlacesOfALargeCloud) {
       0.5);
 }
 
-TEST(CloudMap, TurnsAndScalesBeforeItLooks) {
+TEST(CloudMap, Slow_TurnsAndScalesBeforeItLooks) {
   const TemporaryFolder folder;
   std::vector<Vector3d> turned;
   for (const Vector3d& p : divided_room(0.06))
