@@ -39,7 +39,7 @@ enum class StreamId : std::uint32_t {
   kNavigation = 28,       ///< entity: vehicle << 8 | sensor, index: measurement * 12 + draw
   kStereo = 29,           ///< of windows; entity: vehicle << 8 | lidar, index: scan << 32 | node
   kStudy = 30,            ///< values drawn for a campaign; entity: key, index: draw
-  kLeftOutPoints = 31,    ///< entity: 0 positions, index: try; 1 ends of rays, index: point
+  kLeftOutPoints = 31,    ///< entity: 0 positions, index: try; 1, 2 ends of rays: point
   kTest = 1000,           ///< inputs of tests and benchmarks
 };
 

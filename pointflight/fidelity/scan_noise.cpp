@@ -8,6 +8,7 @@
 #include "pointflight/geometry/internal/point_tree-inl.hpp"
 #include "pointflight/lidar/lidar.hpp"
 #include "pointflight/map/internal/covariance_axes.hpp"
+#include "pointflight/survey/median.hpp"
 
 namespace pointflight {
 namespace {
@@ -27,10 +28,10 @@ constexpr double kPerMedian = 1.4826;   // deviation of a normal distribution pe
 using ScanTree = PointTree<Vector3f>;
 
 /// Distances of points from planes, m, by range.
-using Residuals = std::array<std::vector<float>, NoiseComparison::kRanges.size() - 1>;
+using Residuals = std::array<std::vector<double>, NoiseComparison::kRanges.size() - 1>;
 
-/// A scan's points, and where the map has a surface along their rays, m in the sensor frame; NaN:
-/// nowhere.
+/// Points of a scan that lie near the map, and where the map is along their rays, m in the sensor
+/// frame.
 struct MappedScan {
   std::vector<Vector3f> measured;
   std::vector<Vector3f> mapped;
@@ -129,16 +130,9 @@ void add_residuals(const MappedScan& scan, Residuals& residuals, const Executor&
     const auto range = static_cast<double>(tree.points()[i * kEvery].norm());
     for (std::size_t k = 0; k < residuals.size(); ++k) {
       if (range < NoiseComparison::kRanges[k] || range >= NoiseComparison::kRanges[k + 1]) continue;
-      residuals[k].push_back(static_cast<float>(std::abs(found[i])));
+      residuals[k].push_back(std::abs(found[i]));
     }
   }
-}
-
-double deviation(std::vector<float>& residuals) {
-  if (residuals.empty()) return 0.0;
-  const auto middle = residuals.begin() + static_cast<std::ptrdiff_t>(residuals.size() / 2);
-  std::nth_element(residuals.begin(), middle, residuals.end());
-  return kPerMedian * static_cast<double>(*middle);
 }
 
 }  // namespace
@@ -173,8 +167,10 @@ NoiseComparison compare_noise(const std::vector<RealScan>& scans,
   }
   NoiseComparison noise;
   for (std::size_t k = 0; k < noise.bins.size(); ++k) {
-    noise.bins[k] = {
-        deviation(real[k]), deviation(modelled[k]), real[k].size(), modelled[k].size()};
+    noise.bins[k] = {kPerMedian * median(real[k]),
+                     kPerMedian * median(modelled[k]),
+                     real[k].size(),
+                     modelled[k].size()};
   }
   return noise;
 }

@@ -11,8 +11,8 @@ namespace pointflight {
 /// A finished map of clouds.
 struct CloudMap {
   ImportedMap map;  ///< Of all points.
-  std::vector<TriedResolution>
-      tried;  ///< In ascending order; empty if one was given or none judged.
+  /// In ascending order; empty if one was given, or nothing could judge.
+  std::vector<TriedResolution> tried;
 };
 
 /// Tries resolutions: maps of nineteen points in twenty, judged by rays to the others
@@ -26,8 +26,7 @@ std::vector<TriedResolution> try_resolutions(const std::vector<CloudSource>& clo
                                              const Progress& progress = {},
                                              std::size_t most_points = 2'000'000);
 
-/// `import_clouds`; without a resolution in `options` the one at which those that were tried are
-/// best
+/// `import_clouds`; without a resolution in `options` the best by those that were tried
 /// (`peak_resolution`), if anything could judge them and no source is a mesh.
 CloudMap map_clouds(const std::vector<CloudSource>& sources,
                     const ImportOptions& options,

@@ -153,8 +153,8 @@ Targets targets_from(const FloatTree& tree, const Vector3d& position) {
     if (!is_left_out(i)) continue;
     const Vector3d d = tree.points()[i].cast<double>() - position;
     const double squared = d.squaredNorm();
-    if (squared < kNearestTarget * kNearestTarget || squared > kFarthestTarget * kFarthestTarget)
-      continue;
+    const double distance = std::sqrt(squared);
+    if (distance < kNearestTarget || distance > kFarthestTarget) continue;
     const bool by_x = std::abs(d.x()) >= std::abs(d.y());
     const double depth = by_x ? d.x() : d.y();
     const double size = std::abs(depth);

@@ -22,7 +22,7 @@ inline constexpr std::size_t kLeaveOut = 20;  ///< One point of so many is left 
 /// By a hash of its number.
 bool is_left_out(std::size_t point);
 
-/// Rays from up to 50 positions, 0.8 to 1.8 m above level ground and 0.7 m or more from everything,
+/// Rays from up to 32 positions, 0.8 to 1.8 m above level ground and 0.7 m or more from everything,
 /// to points that are left out: in each direction (cells of a degree) the nearest, within 0.5 to
 /// 30 m, with 16 points or more within 0.25 m. Three rays each: to the point, and to two positions
 /// between it and one of the six nearest. If points were thinned, each lies where no other is near,
@@ -31,9 +31,8 @@ bool is_left_out(std::size_t point);
 ///
 /// Only rays that nothing hides: no point lies within 0.3 spacings of them, and nowhere are points
 /// within three spacings all around (they leave 150 degrees free where a ray passes an edge or
-/// along a floor; of rays through thinned surfaces one in a hundred is not noticed, through random
-/// points one in four). Of 100 candidates the half that see most are taken, if they see half as
-/// much as the best one: the top of a ceiling is level ground, too.
+/// along a floor). Of 64 candidates the half that see most are taken, if they see half as much as
+/// the best one: the top of a ceiling is level ground, too.
 ///
 /// `points`: m, z up, from `origin_world`; `spacing`: between neighbours, m. Without level ground,
 /// room or enough points there are none. Does not depend on the threads.

@@ -33,8 +33,8 @@ double best_resolution(const std::vector<TriedResolution>& tried, double level);
 
 /// Where a parabola over the resolutions' logarithms, fitted to those within an octave and 2 % of
 /// the rays of the best one, is highest; the best one if fewer than four are, or they lie on none.
-/// What a grid's cells happen to cut is less than a percent of the rays, and more than neighbours
-/// differ by.
+/// How a grid happens to
+/// cut surfaces moves shares by tenths of a percent, as much as neighbours differ.
 double peak_resolution(const std::vector<TriedResolution>& tried);
 
 }  // namespace pointflight

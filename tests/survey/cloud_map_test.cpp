@@ -154,14 +154,15 @@ TEST(CloudMap, Slow_TriesPlacesOfALargeCloud) {
 TEST(CloudMap, Slow_TurnsAndScalesBeforeItLooks) {
   const TemporaryFolder folder;
   std::vector<Vector3d> turned;
-  for (const Vector3d& p : divided_room(0.06))
+  for (const Vector3d& p : divided_room(0.06)) {
     turned.emplace_back(1e3 * p.x(), 1e3 * p.z(), -1e3 * p.y());
+  }
   const CloudSource room(saved(folder / "millimetres.pcd", turned));
   ImportOptions options;
   options.scale = 0.001;
   options.up = 'y';
   EXPECT_GE(map_clouds({room}, options, Executor(2)).tried.size(), 3u);
-  // as they are they are 10 km of points 30 m apart
+  // without a scale they are a place of 10 km with points 60 m apart
   EXPECT_TRUE(try_resolutions({room}, {}, Executor(2)).empty());
 }
 
