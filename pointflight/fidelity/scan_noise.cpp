@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <utility>
 
+#include "pointflight/fidelity/sensor_lines.hpp"
 #include "pointflight/geometry/internal/point_tree-inl.hpp"
 #include "pointflight/lidar/lidar.hpp"
 #include "pointflight/map/internal/covariance_axes.hpp"
@@ -37,29 +37,20 @@ struct MappedScan {
   std::vector<Vector3f> mapped;
 };
 
-MappedScan mapped_scan(std::vector<Vector3f> points,
+MappedScan mapped_scan(const std::vector<Vector3f>& points,
                        const Pose& T_world_sensor,
                        const Renderer& renderer,
                        const Executor& executor) {
-  std::vector<Ray> rays;
-  rays.reserve(points.size());
-  for (const Vector3f& point : points) {
-    const Vector3d direction = point.cast<double>().normalized();
-    rays.push_back({T_world_sensor.translation,
-                    (T_world_sensor.rotation * direction).cast<float>(),
-                    kFarthestHit});
-  }
-  std::vector<Hit> hits(rays.size());
-  RayBatch batch;
-  batch.rays = rays;
-  batch.T_world_sensor = T_world_sensor;
-  batch.range_max = kFarthestHit;
-  renderer.render(batch, hits, executor);
+  std::vector<Vector3f> directions;
+  directions.reserve(points.size());
+  for (const Vector3f& point : points) directions.push_back(point.normalized());
+  const std::vector<Hit> hits =
+      render_lines(T_world_sensor, {}, directions, kFarthestHit, renderer, executor);
   MappedScan scan;
   for (std::size_t i = 0; i < points.size(); ++i) {
     const float off = hits[i].range - points[i].norm();
     if (!hits[i].is_return() || std::abs(off) > kFarthestOff) continue;
-    scan.mapped.push_back(hits[i].range * points[i].normalized());
+    scan.mapped.push_back(hits[i].range * directions[i]);
     scan.measured.push_back(points[i]);
   }
   return scan;
@@ -154,16 +145,13 @@ NoiseComparison compare_noise(const std::vector<RealScan>& scans,
     std::vector<Vector3f> points;
     points.reserve(scan.rays.size());
     for (std::size_t k = 0; k < scan.rays.size(); ++k) points.push_back(scan.point_sensor(k));
-    add_residuals(
-        mapped_scan(std::move(points), scan.T_world_sensor, renderer, executor), real, executor);
+    add_residuals(mapped_scan(points, scan.T_world_sensor, renderer, executor), real, executor);
     ScanRequest request;
     request.index = i;
     const Scan made = sensor.take(request, PoseTrack(scan.T_world_sensor), renderer, executor);
     points.clear();
     for (const ScanPoint& point : made.points) points.push_back(point.position_sensor);
-    add_residuals(mapped_scan(std::move(points), scan.T_world_sensor, renderer, executor),
-                  modelled,
-                  executor);
+    add_residuals(mapped_scan(points, scan.T_world_sensor, renderer, executor), modelled, executor);
   }
   NoiseComparison noise;
   for (std::size_t k = 0; k < noise.bins.size(); ++k) {

@@ -7,6 +7,7 @@
 
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/math.hpp"
+#include "pointflight/fidelity/sensor_lines.hpp"
 #include "pointflight/lidar/lidar.hpp"
 
 namespace pointflight {
@@ -165,23 +166,8 @@ class Counter {
                                        std::span<const Vector3f> origins_sensor,
                                        std::span<const Vector3f> directions_sensor) const {
     const auto far = static_cast<float>(SensorComparison::kRanges.back());
-    std::vector<Ray> rays(directions_sensor.size());
-    for (std::size_t i = 0; i < rays.size(); ++i) {
-      rays[i].origin_world = T_world_sensor.translation;
-      if (!origins_sensor.empty()) {
-        rays[i].origin_world = T_world_sensor * origins_sensor[i].cast<double>();
-      }
-      rays[i].direction_world =
-          (T_world_sensor.rotation * directions_sensor[i].cast<double>()).cast<float>();
-      rays[i].range_max = far;
-    }
-    std::vector<Hit> hits(rays.size());
-    RayBatch batch;
-    batch.rays = rays;
-    batch.T_world_sensor = T_world_sensor;
-    batch.range_max = far;
-    renderer_.render(batch, hits, executor_);
-    return hits;
+    return render_lines(
+        T_world_sensor, origins_sensor, directions_sensor, far, renderer_, executor_);
   }
 
   void count_returns(std::size_t scan) {
