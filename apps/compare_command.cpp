@@ -204,14 +204,17 @@ void compare(const CompareFlags& flags) {
   const auto renderer = make_renderer(flags.renderer, Scene{map});
   ErrorCollector all;
   ErrorCollector supported;
+  ErrorCollector assumed;
   nlohmann::ordered_json rows = nlohmann::ordered_json::array();
   const ErrorTable table;
   if (!flags.json) table.print_heading();
   for (std::size_t i = 0; i < scans.size(); ++i) {
     report(progress, "comparing", static_cast<double>(i) / static_cast<double>(scans.size()));
-    const auto rays = compare_scan(scans[i], *renderer, cloud ? &*cloud : nullptr, executor);
-    const ErrorCollector scan_all = collect(rays, false);
-    const ErrorCollector scan_supported = collect(rays, true);
+    const auto rays = compare_scan(scans[i], *renderer, *map, cloud ? &*cloud : nullptr, executor);
+    const ErrorCollector scan_all = collect(rays, [](const ComparedRay&) { return true; });
+    const ErrorCollector scan_supported =
+        collect(rays, [](const ComparedRay& ray) { return ray.supported; });
+    assumed.add(collect(rays, [](const ComparedRay& ray) { return ray.assumed; }));
     all.add(scan_all);
     supported.add(scan_supported);
     rows.push_back({{"file", scans[i].name},
@@ -239,6 +242,7 @@ void compare(const CompareFlags& flags) {
                                     {{"all", table.json(all.statistics())},
                                      {"supported", table.json(supported.statistics())}}},
                                    {"scans", rows}};
+    if (map->has_assumed()) json["overall"]["assumed"] = table.json(assumed.statistics());
     if (floor) json["floor"] = table.json(floor->statistics());
     if (sensor) json["sensor"] = sensor_json(*sensor);
     if (noise) json["sensor"]["noise"] = noise_json(*noise);
@@ -247,6 +251,7 @@ void compare(const CompareFlags& flags) {
   }
   table.print_row("all", all.statistics());
   if (cloud) table.print_row("all, supported", supported.statistics());
+  if (map->has_assumed()) table.print_row("all, on what is assumed", assumed.statistics());
   if (floor) table.print_row("scans among themselves", floor->statistics());
   if (sensor) print_sensor(*sensor);
   if (noise) print_noise(*noise);

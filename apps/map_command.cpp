@@ -121,11 +121,13 @@ void print_places(const std::vector<PlaceInfo>& places) {
 struct SurfelCount {
   std::uint64_t surfels = 0;
   std::uint64_t planar = 0;
+  std::uint64_t assumed = 0;
 
   explicit SurfelCount(const SurfelMap& map) {
     map.for_each_surfel([&](const Vector3d&, const Vector3d&, double, std::uint32_t word) {
       ++surfels;
       planar += is_planar(map.words()[word]) ? 1 : 0;
+      assumed += map.is_assumed(word) ? 1 : 0;
     });
   }
   [[nodiscard]] double planar_share() const {
@@ -147,6 +149,7 @@ nlohmann::ordered_json info_json(const SurfelMap& map,
   json["min"] = {b.min.x(), b.min.y(), b.min.z()};
   json["max"] = {b.max.x(), b.max.y(), b.max.z()};
   json["planar_share"] = count.planar_share();
+  json["assumed"] = count.assumed;
   json["bytes"] = map.file_size();
   json["bytes_per_surfel"] = count.bytes_each(map);
   json["has_intensity"] = map.has_intensity();
@@ -194,6 +197,11 @@ void print_info(const SurfelMap& map, const SurfelCount& count, const InfoFlags&
         100.0 * known->known_share(),
         100.0 * (1.0 - known->known_share()),
         known->grid().cell);
+  }
+  if (count.assumed > 0) {
+    fmt::print(
+        "  assumed     {} surfels close holes in floors and walls that no ray went through\n",
+        count.assumed);
   }
   print_places(places_at(map, flags.points));
   if (flags.verify) fmt::print("  checksums   match\n");

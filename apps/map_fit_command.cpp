@@ -30,8 +30,16 @@ void run_fit(const MapFitFlags& flags) {
   check_signal(flags.fit, *survey);
   const auto rays = [&] { return survey->open(); };
   FitReport report;
-  EditedMap fitted = fit_map(
-      *map, rays, fit_options(flags.fit), edit_options(flags, {}), executor, report, progress);
+  ClosingReport closed;
+  EditedMap fitted = fit_and_close(*map,
+                                   rays,
+                                   fit_options(flags.fit),
+                                   closing_options(flags.fit),
+                                   edit_options(flags, {}),
+                                   executor,
+                                   report,
+                                   closed,
+                                   progress);
   append_note(fitted, fit_note(*survey, report));
   paint_by_signal(fitted, flags.fit, *survey, edit_options(flags, {}), executor, progress);
   const auto written =
@@ -39,6 +47,7 @@ void run_fit(const MapFitFlags& flags) {
   const OwnRays after =
       measure_rays(*written, rays, fit_options(flags.fit).right, {}, executor, progress);
   end_progress();
+  print_closed(flags.fit, closed);
   print_fit(report, after);
   OutputSet outputs;
   finish_map(flags, std::move(output), fitted);

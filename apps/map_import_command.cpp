@@ -120,7 +120,11 @@ void import_survey(const ImportFlags& flags) {
     points.names.push_back(source.name());
   }
   points.open = [&](std::size_t i) { return sources[i].open(); };
-  SurveyMap made = map_survey(*survey, points, options, fit_options(flags.fit), executor, progress);
+  SurveyMap made = map_survey(*survey,
+                              points,
+                              {options, fit_options(flags.fit), closing_options(flags.fit)},
+                              executor,
+                              progress);
   end_progress();
   calibrate(flags, made.map.description);
   EditOptions edit;
@@ -135,6 +139,7 @@ void import_survey(const ImportFlags& flags) {
   outputs.commit();
   print_report(made.imported, options);
   print_tried(made.tried, "left out rays");
+  print_closed(flags.fit, made.closed);
   print_fit(made.fit, made.after);
   print_end(flags, made.imported, start);
 }

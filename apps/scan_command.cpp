@@ -99,6 +99,7 @@ void take_scan(const ScanFlags& flags) {
   request.noise = !flags.no_noise;
   request.seed = flags.seed;
   request.truth = flags.truth;
+  request.map = map.get();
   if (flags.mark_unknown) request.known = &known_space_of(*map);
   const Scan scan = lidar.take(request, PoseTrack(pose), *renderer, executor);
   if (scan.points.empty()) {

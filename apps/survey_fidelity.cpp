@@ -14,7 +14,7 @@
 #include "pointflight/io/pcd_writer.hpp"
 #include "pointflight/lidar/lidar.hpp"
 #include "pointflight/map/import/map_builder.hpp"
-#include "pointflight/survey/map_fit.hpp"
+#include "pointflight/survey/survey_map.hpp"
 
 namespace pointflight::apps {
 namespace {
@@ -207,8 +207,17 @@ void measure_surveyed(const ExactScene& scene,
     judge(bare, scene, beams, seen, flags, nullptr, executor, cases);
     if (!flags.fit) continue;
     FitReport report;
-    const EditedMap fitted = fit_map(
-        *bare, [&] { return rays_of(survey); }, {}, {}, executor, report, progress);
+    ClosingReport closed;
+    const EditedMap fitted = fit_and_close(
+        *bare,
+        [&] { return rays_of(survey); },
+        {},
+        ClosingOptions{},
+        {},
+        executor,
+        report,
+        closed,
+        progress);
     const auto map = SurfelMap::from_bytes(map_bytes(fitted.tree, fitted.description), scene.name);
     const OwnRays own = measure_rays(
         *map, [&] { return rays_of(survey); }, FitOptions{}.right, {}, executor, progress);

@@ -176,6 +176,10 @@ void add_fit_flags(CLI::App& app, FitFlags& flags, bool required) {
          "the space is free")
       ->check(CLI::ExistingDirectory)
       ->needs(scans);
+  app.add_flag("--no-assume",
+               flags.no_assume,
+               "Leave holes in floors and walls open that no ray went through")
+      ->needs(scans);
   app.add_option(
          "--leak-weight",
          flags.leak_weight,
@@ -220,6 +224,22 @@ FitOptions fit_options(const FitFlags& flags) {
   FitOptions options;
   options.leak_weight = flags.leak_weight;
   return options;
+}
+
+std::optional<ClosingOptions> closing_options(const FitFlags& flags) {
+  if (flags.no_assume) return std::nullopt;
+  return ClosingOptions{};
+}
+
+void print_closed(const FitFlags& flags, const ClosingReport& report) {
+  if (flags.no_assume) return;
+  log(fmt::format(
+      "holes         {} surfels assumed in {} large planes; {} places were passed by rays, {} lie "
+      "beside openings",
+      short_count(static_cast<double>(report.assumed)),
+      report.planes,
+      short_count(static_cast<double>(report.passed)),
+      short_count(static_cast<double>(report.opening))));
 }
 
 std::string fit_note(const SurveySource& survey, const FitReport& report) {

@@ -34,9 +34,11 @@ struct FitFlags : ScansFlags {
   double leak_weight = FitOptions{}.leak_weight;
   std::string signal_of;
   double signal_limit = 0.0;  ///< 0: found.
+  bool no_assume = false;
 };
 
-/// Those of a survey, --free, --leak-weight, --export-ghosts, --signal-of, --signal-limit.
+/// Those of a survey, --free, --no-assume, --leak-weight, --export-ghosts, --signal-of,
+/// --signal-limit.
 void add_fit_flags(CLI::App& app, FitFlags& flags, bool required);
 
 /// The MCAP files of a folder, in the order of their names. Throws InputError if it holds a
@@ -60,6 +62,12 @@ std::vector<std::string> survey_inputs(const ScansFlags& flags);
 std::unique_ptr<SurveySource> open_survey(const ScansFlags& flags, const Progress& progress);
 
 FitOptions fit_options(const FitFlags& flags);
+
+/// Nothing with --no-assume.
+std::optional<ClosingOptions> closing_options(const FitFlags& flags);
+
+/// What was assumed in holes of floors and walls, on stderr.
+void print_closed(const FitFlags& flags, const ClosingReport& report);
 
 /// Shares of them, in words.
 std::string about_rays(const OwnRays& rays);

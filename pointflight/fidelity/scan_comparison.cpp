@@ -68,6 +68,7 @@ bool SupportCloud::supports(const Vector3d& point_world) const {
 
 std::vector<ComparedRay> compare_scan(const RealScan& scan,
                                       const Renderer& renderer,
+                                      const SurfelMap& map,
                                       const SupportCloud* cloud,
                                       const Executor& executor) {
   std::vector<Ray> rays;
@@ -86,6 +87,7 @@ std::vector<ComparedRay> compare_scan(const RealScan& scan,
   executor.parallel_for(compared.size(), 1024, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       if (hits[i].is_return()) compared[i].rendered = hits[i].range;
+      compared[i].assumed = map.is_assumed(hits[i].surfel);
       if (cloud == nullptr) continue;
       compared[i].supported = cloud->supports(scan.rays[i].point_world());
     }
@@ -154,10 +156,11 @@ ErrorCollector ScanPlanes::compare(std::size_t scan, const Executor& executor) c
   return collector;
 }
 
-ErrorCollector collect(const std::vector<ComparedRay>& rays, bool supported_only) {
+ErrorCollector collect(const std::vector<ComparedRay>& rays,
+                       const std::function<bool(const ComparedRay&)>& counts) {
   ErrorCollector collector;
   for (const ComparedRay& ray : rays) {
-    if (supported_only && !ray.supported) continue;
+    if (!counts(ray)) continue;
     std::optional<double> rendered;
     if (ray.rendered >= 0.0f) rendered = static_cast<double>(ray.rendered);
     collector.add(static_cast<double>(ray.range), rendered);

@@ -48,12 +48,14 @@ struct ComparedRay {
   float range = 0.0f;      ///< Measured, m.
   float rendered = -1.0f;  ///< m; negative if nothing was hit.
   bool supported = false;  ///< By the cloud that was given: `SupportCloud`.
+  bool assumed = false;    ///< Rendered on a surfel that no survey saw.
 };
 
-/// Renders the ray of each real return; one result a return, in their order.
-/// Without a cloud no ray is supported.
+/// Renders the ray of each real return in `map`, which the renderer is of; one result a return, in
+/// their order. Without a cloud no ray is supported.
 std::vector<ComparedRay> compare_scan(const RealScan& scan,
                                       const Renderer& renderer,
+                                      const SurfelMap& map,
                                       const SupportCloud* cloud,
                                       const Executor& executor);
 
@@ -75,7 +77,8 @@ class ScanPlanes {
   std::unique_ptr<Tree> tree_;
 };
 
-/// All rays, or only the supported ones.
-ErrorCollector collect(const std::vector<ComparedRay>& rays, bool supported_only);
+/// Those of the rays that `counts` accepts.
+ErrorCollector collect(const std::vector<ComparedRay>& rays,
+                       const std::function<bool(const ComparedRay&)>& counts);
 
 }  // namespace pointflight

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "pointflight/survey/grid_cells.hpp"
+#include "pointflight/geometry/internal/grid_cells.hpp"
 
 namespace pointflight {
 namespace {

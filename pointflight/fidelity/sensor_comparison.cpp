@@ -8,6 +8,7 @@
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/math.hpp"
 #include "pointflight/fidelity/sensor_lines.hpp"
+#include "pointflight/geometry/internal/point_tree-inl.hpp"
 #include "pointflight/lidar/lidar.hpp"
 
 namespace pointflight {
@@ -22,7 +23,9 @@ constexpr double kMargin = 0.1;          // m, of what is too near
 constexpr double kOffPlane = 0.3;        // m
 constexpr double kLeastWidth = 0.1;      // deg, about lines
 constexpr double kFwhmPerSigma = 2.3548;
-constexpr std::size_t kRim = 8;  // lines around a beam
+constexpr std::size_t kRim = 8;       // lines around a beam
+constexpr double kBesideEdge = 0.03;  // rad
+constexpr double kOffMap = 0.15;      // m: farther off is something else
 
 /// Beams of one scan that were given.
 class GivenBeams : public BeamPattern {
@@ -84,6 +87,44 @@ struct RealBeams {
   std::vector<Vector3f> origins_sensor;
   std::vector<Vector3f> directions_sensor;
   std::vector<float> ranges;
+};
+
+/// How far real returns lie off the map where there is no edge: what noise, poses and map make of a
+/// range.
+class EvenErrors {
+ public:
+  EvenErrors(const RealBeams& real, const std::vector<Hit>& lines, const std::vector<bool>& edges)
+      : tree_(even_directions(real, lines, edges)) {
+    for (const std::size_t i : even_) errors_.push_back(error_of(real, lines, i));
+  }
+
+  /// Measured minus rendered range of the return that is nearest to a direction, m; 0 if none is
+  /// near.
+  [[nodiscard]] double beside(const Vector3f& direction_sensor) const {
+    const auto near = tree_.within(direction_sensor.cast<double>(), kBesideEdge);
+    return near.empty() ? 0.0 : errors_[near.front().index];
+  }
+
+ private:
+  static double error_of(const RealBeams& real, const std::vector<Hit>& lines, std::size_t i) {
+    return static_cast<double>(real.ranges[i] - lines[i].range);
+  }
+  std::vector<Vector3f> even_directions(const RealBeams& real,
+                                        const std::vector<Hit>& lines,
+                                        const std::vector<bool>& edges) {
+    std::vector<Vector3f> directions;
+    for (std::size_t i = 0; i < lines.size(); ++i) {
+      if (edges[i] || !lines[i].is_return()) continue;
+      if (std::abs(error_of(real, lines, i)) > kOffMap) continue;
+      even_.push_back(i);
+      directions.push_back(real.directions_sensor[i]);
+    }
+    return directions;
+  }
+
+  std::vector<std::size_t> even_;
+  PointTree<Vector3f> tree_;
+  std::vector<double> errors_;
 };
 
 /// Counts the scans of one sensor into a comparison.
@@ -255,7 +296,9 @@ class Counter {
     const std::vector<Hit> middles =
         lines(real.T_world_sensor, all.origins_sensor, all.directions_sensor);
     const std::vector<bool> edges = at_edges(real.T_world_sensor, all, middles);
+    const EvenErrors even(all, middles, edges);
     std::vector<Beam> chosen;
+    std::vector<double> beside;
     std::vector<double> rendered;
     for (std::size_t i = 0; i < middles.size(); ++i) {
       if (!edges[i]) continue;
@@ -263,17 +306,21 @@ class Counter {
       chosen.back().origin_sensor = all.origins_sensor[i];
       chosen.back().direction_sensor = all.directions_sensor[i];
       rendered.push_back(static_cast<double>(middles[i].range));
+      beside.push_back(even.beside(all.directions_sensor[i]));
       count_error(&Sides::real, static_cast<double>(all.ranges[i]) - rendered.back());
     }
     const auto beams =
         std::make_shared<const ScanBeams>(std::make_unique<GivenBeams>(std::move(chosen)));
     const auto count = [&](double Sides::*side, const std::optional<Surroundings>& surroundings) {
-      const Lidar lidar(settings_, 0, beams, surroundings);
+      LidarSettings settings = settings_;
+      settings.noise = {};  // it is in what is added
+      const Lidar lidar(settings, 0, beams, surroundings);
       ScanRequest request;
       request.index = scan;
       const Scan made = lidar.take(request, PoseTrack(real.T_world_sensor), renderer_, executor_);
       for (const ScanPoint& point : made.points) {
-        count_error(side, static_cast<double>(point.range) - rendered[point.beam]);
+        const double error = static_cast<double>(point.range) - rendered[point.beam];
+        count_error(side, error + beside[point.beam]);
       }
     };
     count(&Sides::modelled, surroundings_);

@@ -47,7 +47,9 @@ struct SensorComparison {
   using OfIncidences = std::array<ReturnShare, kIncidences.size() - 1>;
   std::array<OfIncidences, kRanges.size() - 1> shares{};  ///< By range, then incidence.
   /// Returns at edges by measured minus rendered range, the range that a line along the beam has;
-  /// first and last: beyond the limits.
+  /// first and last: beyond the limits. The others are without noise of ranges; each has added to
+  /// it by how much the nearest real return away from edges is off (within 1.7 degrees and 0.15 m):
+  /// what noise, poses and map make of a range.
   std::array<Sides, kErrors.size() + 1> edges{};
   double beams = 0.0;         ///< That the sensor fired, in all scans.
   double blocked = 0.0;       ///< Of these: in directions where next to nothing ever comes back.

@@ -12,11 +12,11 @@
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/core/random.hpp"
 #include "pointflight/fidelity/scene_renderer.hpp"
+#include "pointflight/geometry/internal/grid_cells.hpp"
 #include "pointflight/geometry/rotation.hpp"
 #include "pointflight/io/pcd_writer.hpp"
 #include "pointflight/io/pose_files.hpp"
 #include "pointflight/lidar/lidar.hpp"
-#include "pointflight/survey/grid_cells.hpp"
 
 namespace pointflight {
 namespace {

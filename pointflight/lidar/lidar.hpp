@@ -18,6 +18,8 @@
 
 namespace pointflight {
 
+class RangeOffsets;
+
 /// Which scan to take.
 struct ScanRequest {
   std::uint64_t index = 0;  ///< Scan number: `Lidar::pattern_scan`, and its number among draws.
@@ -27,6 +29,9 @@ struct ScanRequest {
   std::uint64_t seed = 0;   ///< Of all noise and of which beams come back.
   /// Points get `is_unknown` by it; null: they do not.
   const KnownSpace* known = nullptr;
+  /// What is rendered, if it has assumed surfels: points on them get `PointTruth::is_assumed` and,
+  /// if `known` is there, `is_unknown`.
+  const SurfelMap* map = nullptr;
   bool truth = false;            ///< `Scan::truth` is wanted.
   std::span<const Body> bodies;  ///< What moves in the map, without what carries the sensor.
 };
@@ -103,6 +108,7 @@ class Lidar {
   [[nodiscard]] Received received(const Aimed& aimed,
                                   std::span<const Echoes> echoes,
                                   const Executor& executor) const;
+  [[nodiscard]] RangeOffsets offsets_of(const Aimed& aimed) const;
   [[nodiscard]] Received received_as_ideal(const Aimed& aimed,
                                            std::span<const Hit> hits,
                                            const Executor& executor) const;

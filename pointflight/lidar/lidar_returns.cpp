@@ -7,6 +7,7 @@
 #include "pointflight/core/math.hpp"
 #include "pointflight/core/random.hpp"
 #include "pointflight/lidar/internal/aimed.hpp"
+#include "pointflight/lidar/internal/range_offsets.hpp"
 
 namespace pointflight {
 namespace {
@@ -45,10 +46,20 @@ float with_noise(float range,
   return sigma > 0.0 ? static_cast<float>(r + sigma * normals(beam)) : range;
 }
 
+bool is_assumed(const SurfelMap* map, std::uint32_t surfel) {
+  return map != nullptr && map->is_assumed(surfel);
+}
+
+/// What a mark of a point is made of.
+struct MarkedReturn {
+  float true_range;
+  bool is_assumed;
+};
+
 /// By the true range: noise takes no point into a wall. False alarms have none but their own.
 void mark_unknown(const KnownSpace& known,
                   std::span<const Ray> rays,
-                  std::span<const float> true_ranges,
+                  std::span<const MarkedReturn> returns,
                   Scan& scan,
                   const Executor& executor) {
   scan.marks.unknown = true;
@@ -57,15 +68,19 @@ void mark_unknown(const KnownSpace& known,
         for (std::size_t i = begin; i < end; ++i) {
           ScanPoint& point = scan.points[i];
           const Ray& ray = rays[point.beam];
-          point.is_unknown = !known.is_seen_through(ray.origin_world,
+          point.is_unknown = returns[i].is_assumed ||
+                             !known.is_seen_through(ray.origin_world,
                                                     ray.direction_world.cast<double>(),
-                                                    static_cast<double>(true_ranges[i]));
+                                                    static_cast<double>(returns[i].true_range));
         }
       });
 }
 
 /// `Scan::truth` of its points. `returns`: those of all beams, room for `most` each.
-void add_truth(std::span<const Return> returns, const PoseTrack& T_world_sensor, Scan& scan) {
+void add_truth(std::span<const Return> returns,
+               const PoseTrack& T_world_sensor,
+               const SurfelMap* map,
+               Scan& scan) {
   scan.marks.truth = true;
   scan.truth.reserve(scan.points.size());
   const Pose T_start_world = T_world_sensor.at(scan.start).inverse();
@@ -87,7 +102,8 @@ void add_truth(std::span<const Return> returns, const PoseTrack& T_world_sensor,
                           (T_start_seen * point.position_sensor.cast<double>()).cast<float>(),
                           made.origin.surfel,
                           made.origin.sub_ray,
-                          made.parts});
+                          made.parts,
+                          !is_false && is_assumed(map, made.origin.surfel)});
   }
 }
 
@@ -144,19 +160,33 @@ class ReturnChances {
   std::vector<double> normals_, detections_, places_, even_, odd_;
 };
 
-/// `Echoes` or `Hit` of a beam whose ranges times `share` are what the sensor measures.
+/// What a sensor measures of a range: the range times `share`, plus `offset`.
+struct Measured {
+  float share;
+  float offset;  ///< m
+};
+
+/// `Echoes` or `Hit` of a beam with the ranges that the sensor measures.
 ///@{
-Echoes scaled(Echoes echoes, float share) {
-  for (std::size_t k = 0; k < echoes.count; ++k) echoes.all[k].range *= share;
+Echoes measured(Echoes echoes, const Measured& by) {
+  for (std::size_t k = 0; k < echoes.count; ++k) {
+    echoes.all[k].range = echoes.all[k].range * by.share + by.offset;
+  }
   return echoes;
 }
-Hit scaled(Hit hit, float share) {
-  if (hit.is_return()) hit.range *= share;
+Hit measured(Hit hit, const Measured& by) {
+  if (hit.is_return()) hit.range = hit.range * by.share + by.offset;
   return hit;
 }
 ///@}
 
 }  // namespace
+
+RangeOffsets Lidar::offsets_of(const Aimed& aimed) const {
+  const ScanRequest& request = aimed.request;
+  return RangeOffsets(
+      request.noise ? settings_.noise : RangeNoiseSettings{}, request.seed, sensor_, aimed.beams());
+}
 
 /// What the sensor reports of each beam, of which `seen` are the `Echoes` or `Hit`s.
 template <class Seen>
@@ -168,25 +198,28 @@ Lidar::Received Lidar::reported(const Aimed& aimed,
   received.most = most_returns(settings_.detection.returns);
   const std::size_t most = received.most;
   received.returns.resize(beams.size() * most);
+  const RangeOffsets offsets = offsets_of(aimed);
   executor.parallel_for(beams.size(), kReturnsPerChunk, [&](std::size_t begin, std::size_t end) {
     ReturnChances chances(aimed.request, sensor_);
     const std::size_t count = end - begin;
     const std::span<Return> made(received.returns.data() + begin * most, count * most);
-    if (!measures_depth_) {
+    if (!measures_depth_ && offsets.empty()) {
       returns_->measure(seen.subspan(begin, count), chances.of(begin, count), made);
       return;
     }
-    std::vector<Seen> depths;
-    depths.reserve(count);
-    for (std::size_t i = begin; i < end; ++i) {
-      depths.push_back(scaled(seen[i], depth_share(beams[i])));
-    }
-    returns_->measure(std::span<const Seen>(depths), chances.of(begin, count), made);
+    const auto measured_by = [&](std::size_t beam) {
+      return Measured{depth_share(beams[beam]), offsets.of(beams[beam])};
+    };
+    std::vector<Seen> ranges;
+    ranges.reserve(count);
+    for (std::size_t i = begin; i < end; ++i) ranges.push_back(measured(seen[i], measured_by(i)));
+    returns_->measure(std::span<const Seen>(ranges), chances.of(begin, count), made);
     for (std::size_t i = 0; i < made.size(); ++i) {
       if (!made[i].is_return()) continue;
-      const float share = depth_share(beams[begin + i / most]);
-      made[i].range /= share;
-      made[i].true_range /= share;
+      const Measured by = measured_by(begin + i / most);
+      made[i].range /= by.share;
+      if (made[i].parts > 0) made[i].true_range -= by.offset;  // false ones are of no surface
+      made[i].true_range /= by.share;
     }
   });
   return received;
@@ -209,13 +242,17 @@ Lidar::Received Lidar::received_as_ideal(const Aimed& aimed,
   returns.resize(beams.size());
   const RandomStream random(request.seed, StreamId::kLidarRangeNoise, sensor_);
   const auto range_min = static_cast<float>(settings_.range_min);
+  const RangeOffsets offsets = offsets_of(aimed);
   executor.parallel_for(beams.size(), kReturnsPerChunk, [&](std::size_t begin, std::size_t end) {
     BeamNormals normals(random, request.index);
     for (std::size_t i = begin; i < end; ++i) {
       if (!hits[i].is_return()) continue;
       const float share = depth_share(beams[i]);
       float range = hits[i].range;
-      if (request.noise) range = with_noise(range * share, settings_.noise, normals, i) / share;
+      if (request.noise) {
+        const float off = range * share + offsets.of(beams[i]);
+        range = with_noise(off, settings_.noise, normals, i) / share;
+      }
       // noise neither makes nor ends a return at the far limit; it may at the near one
       if (range * share < range_min) continue;
       returns[i] = {.range = range,
@@ -319,7 +356,7 @@ Scan Lidar::written(const Aimed& aimed,
   scan.infrared = std::move(received.infrared);
   scan.marks.echoes = reports_echoes();
   scan.points.reserve(beams.size());
-  std::vector<float> true_ranges;
+  std::vector<MarkedReturn> marked;
   for (std::size_t i = 0; i < received.returns.size(); ++i) {
     const Return& made = received.returns[i];
     if (!made.is_return()) continue;
@@ -333,11 +370,13 @@ Scan Lidar::written(const Aimed& aimed,
                            static_cast<std::uint32_t>(number),
                            made.label});
     scan.points.back().echo = static_cast<std::uint8_t>(i % received.most);
-    if (request.known != nullptr) true_ranges.push_back(made.true_range);
+    if (request.known != nullptr) {
+      marked.push_back({made.true_range, is_assumed(request.map, made.origin.surfel)});
+    }
   }
-  if (request.truth) add_truth(received.returns, T_world_sensor, scan);
+  if (request.truth) add_truth(received.returns, T_world_sensor, request.map, scan);
   if (request.known != nullptr) {
-    mark_unknown(*request.known, aimed.rays, true_ranges, scan, executor);
+    mark_unknown(*request.known, aimed.rays, marked, scan, executor);
   }
   return scan;
 }

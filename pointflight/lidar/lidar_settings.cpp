@@ -152,6 +152,10 @@ void describe_noise(SettingsVisitor& v, RangeNoiseSettings& s) {
           s.range_sigma_per_m2);
   v.value({"range_sigma_at_limit", "m", "added in squares where the signal is at its limit", 0, 10},
           s.range_sigma_at_limit);
+  v.value({"offset_sigma", "m", "of an offset of all ranges that is drawn once for a run", 0, 1},
+          s.offset_sigma);
+  v.value({"ring_offset_sigma", "m", "of an offset of each ring, drawn once for a run", 0, 1},
+          s.ring_offset_sigma);
   v.value({"range_step", "m", "ranges are whole multiples of it; 0: not rounded", 0, 1},
           s.range_step);
 }

@@ -125,6 +125,8 @@ struct RangeNoiseSettings {
   double range_sigma = 0.0;           ///< m
   double range_sigma_per_m2 = 0.0;    ///< m per m^2: stereo cameras.
   double range_sigma_at_limit = 0.0;  ///< m, added in squares at the rated ranges.
+  double offset_sigma = 0.0;          ///< m: deviation of an offset of all ranges of a run.
+  double ring_offset_sigma = 0.0;     ///< m: the same of each ring by itself.
   double range_step = 0.0;            ///< m: ranges are whole multiples; 0: they are not rounded.
 };
 

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <cstddef>
 #include <cstring>
 #include <string_view>
 
@@ -19,13 +20,15 @@ struct TruthRow {
   float true_range, incidence, depth, deskewed[3];
   std::uint32_t surfel;
   std::uint16_t sub_ray, sub_rays;
+  std::uint8_t assumed;
 };
-static_assert(sizeof(TruthRow) == 32);
+constexpr std::size_t kTruthSize = 33;  // without what the compiler adds
+static_assert(offsetof(TruthRow, assumed) + 1 == kTruthSize);
 
 /// Bytes per point.
 constexpr std::size_t row_size(const ScanMarks& marks) {
   return kFloats * sizeof(float) + 2 * sizeof(std::uint16_t) + (marks.unknown ? 1 : 0) +
-         (marks.echoes ? 1 : 0) + (marks.truth ? sizeof(TruthRow) : 0);
+         (marks.echoes ? 1 : 0) + (marks.truth ? kTruthSize : 0);
 }
 
 /// What a file of such a scan has.
@@ -48,6 +51,7 @@ std::vector<PcdField> fields_of(const ScanMarks& marks) {
   fields.push_back({"surfel", 'U', 4});
   fields.push_back({"sub_ray", 'U', 2});
   fields.push_back({"sub_rays", 'U', 2});
+  fields.push_back({"assumed", 'U', 1});
   return fields;
 }
 
@@ -58,7 +62,8 @@ TruthRow row_of(const PointTruth& truth) {
           {truth.deskewed.x(), truth.deskewed.y(), truth.deskewed.z()},
           truth.surfel,
           truth.sub_ray,
-          truth.sub_rays};
+          truth.sub_rays,
+          static_cast<std::uint8_t>(truth.is_assumed ? 1 : 0)};
 }
 
 PointTruth truth_of(const TruthRow& row) {
@@ -68,7 +73,8 @@ PointTruth truth_of(const TruthRow& row) {
           Vector3f(row.deskewed),
           row.surfel,
           row.sub_ray,
-          row.sub_rays};
+          row.sub_rays,
+          row.assumed != 0};
 }
 
 }  // namespace
@@ -93,7 +99,7 @@ void write_scan_pcd(const std::string& path, const Scan& scan) {
     if (scan.marks.echoes) *mark++ = std::byte{point.echo};
     if (scan.marks.truth) {
       const TruthRow truth = row_of(scan.truth[i]);
-      std::memcpy(mark, &truth, sizeof truth);
+      std::memcpy(mark, &truth, kTruthSize);
     }
     at += row;
   }
@@ -131,7 +137,7 @@ void read_scan_points(const std::string& path, std::span<const Beam> beams, Scan
     if (marks.echoes) point.echo = static_cast<std::uint8_t>(*mark++);
     if (marks.truth) {
       TruthRow truth{};
-      std::memcpy(&truth, mark, sizeof truth);
+      std::memcpy(&truth, mark, kTruthSize);
       scan.truth[i] = truth_of(truth);
     }
     at += row;

@@ -44,6 +44,7 @@ struct PointTruth {
   std::uint32_t surfel = kNoSurfel;  ///< What gave most of the light: `Hit::surfel`.
   std::uint16_t sub_ray = 0;         ///< Which sub-ray of the beam hit it.
   std::uint16_t sub_rays = 0;        ///< How many sub-rays are in the pulse; 0: a false return.
+  bool is_assumed = false;           ///< `SurfelMap::is_assumed` of that surfel.
 };
 
 /// What the points of a scan say beyond what all do.
@@ -79,7 +80,7 @@ struct Scan {
 /// Writes x y z intensity range time (float32; time in seconds after the scan's start), ring
 /// (uint16), label (uint16) and, where the scan marks them, unknown (uint8: 0, 1), echo (uint8:
 /// 0 to 2) and `PointTruth` (true_range incidence depth deskewed_x deskewed_y deskewed_z, float32;
-/// surfel, uint32; sub_ray and sub_rays, uint16) as binary PCD. Throws InputError.
+/// surfel, uint32; sub_ray and sub_rays, uint16; assumed, uint8) as binary PCD. Throws InputError.
 void write_scan_pcd(const std::string& path, const Scan& scan);
 
 /// Fills in the points of such a file, and their truth, of a scan taken with `beams` whose `marks`

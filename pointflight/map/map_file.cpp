@@ -328,6 +328,10 @@ void SurfelMap::attach(std::span<const std::byte> bytes, const std::string& name
     known_ = KnownSpace::from_section(known);
     if (!known_) corrupt(KnownSpace::kSection, known);
   }
+  assumed_ = section(kAssumedSection);
+  if (!assumed_.empty() && assumed_.size() != (words_.size() + 7) / 8) {
+    corrupt(kAssumedSection, assumed_);
+  }
   levels_ = IntensityLevels::linear(properties_.intensity_offset, properties_.intensity_step);
   if (const auto levels = section(kLevelsSection); !levels.empty()) {
     if (levels.size() != sizeof levels_.of_code) corrupt(kLevelsSection, levels);

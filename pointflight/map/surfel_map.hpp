@@ -51,6 +51,9 @@ inline std::string_view section_name(const MapSection& section) {
 /// Name of the section that says what reflectivity an intensity stands for.
 inline constexpr char kReflectivitySection[] = "reflectivity";
 
+/// Name of the section that marks surfels that no survey saw: for word w bit w % 8 of byte w / 8.
+inline constexpr char kAssumedSection[] = "assumed";
+
 /// The nearest thing to a point.
 struct Nearest {
   double distance;        ///< To the surfel's box, m; 0 inside it.
@@ -132,6 +135,16 @@ class SurfelMap {
            resolution() * (Vector3d(leaf.x, leaf.y, leaf.z) + center_voxels(word).cast<double>());
   }
 
+  /// True if some surfels are marked as assumed.
+  [[nodiscard]] bool has_assumed() const { return !assumed_.empty(); }
+  /// True of a surfel that no survey saw: it closes a hole in a plane that was seen around it.
+  /// False of `kNoSurfel` and whatever else is no index.
+  [[nodiscard]] bool is_assumed(std::uint32_t word) const {
+    const std::size_t byte = word / 8;
+    return byte < assumed_.size() &&
+           (assumed_[byte] & (std::byte{1} << (word % 8))) != std::byte{0};
+  }
+
   /// What the codes of intensities stand for.
   [[nodiscard]] const IntensityLevels& intensity_levels() const { return levels_; }
   /// Codes of the intensities beside `words`, empty without.
@@ -174,6 +187,7 @@ class SurfelMap {
   std::span<const Bvh8Node> nodes_;
   std::span<const SurfelWord> words_;
   std::span<const std::uint8_t> intensity_;
+  std::span<const std::byte> assumed_;
   std::string_view metadata_;
   std::optional<KnownSpace> known_;
   MapProperties properties_;

@@ -16,9 +16,11 @@ struct Color {
   double b;  ///< Blue.
 };
 
-inline constexpr Color kPaper{1.0, 1.0, 1.0};    ///< Background of pages.
-inline constexpr Color kInk{0.15, 0.15, 0.18};   ///< Text and axes.
-inline constexpr Color kDim{0.55, 0.55, 0.6};    ///< Secondary text, grids.
+inline constexpr Color kPaper{1.0, 1.0, 1.0};   ///< Background of pages.
+inline constexpr Color kInk{0.15, 0.15, 0.18};  ///< Text and axes.
+inline constexpr Color kDim{0.55, 0.55, 0.6};   ///< Secondary text, grids.
+/// Surfels that are assumed.
+inline constexpr Color kAssumedColor{0.78, 0.24, 0.72};
 inline constexpr Color kNight{0.07, 0.07, 0.1};  ///< Background if nothing was measured.
 
 /// Viridis-like scale from dark blue through green to yellow for a fraction from 0 to 1: equal

@@ -32,8 +32,9 @@ std::unique_ptr<Canvas> map_page(const SurfelMap& map, const std::string& title)
   const auto color_at = [&](double z) { return ramp((z - low) / (high - low)); };
 
   auto canvas = std::make_unique<Canvas>(page.width, page.height, kPaper);
-  paint(*canvas, page.top, views.top, [&](float z, int, int) -> std::optional<Color> {
+  paint(*canvas, page.top, views.top, [&](float z, int x, int y) -> std::optional<Color> {
     if (z == kEmpty) return std::nullopt;
+    if (*views.assumed.at(x, y) == z) return kAssumedColor;
     return color_at(static_cast<double>(z));
   });
   const double usual = usual_density(views.density);
@@ -63,12 +64,13 @@ std::unique_ptr<Canvas> map_page(const SurfelMap& map, const std::string& title)
   const Vector3d size = map.bounds_world().empty() ? Vector3d::Zero() : map.bounds_world().size();
   canvas->text_within(page.top.left,
                       kTopMargin + 40.0,
-                      fmt::format("{} surfels at {:.4g} m, {:.1f} x {:.1f} x {:.1f} m",
+                      fmt::format("{} surfels at {:.4g} m, {:.1f} x {:.1f} x {:.1f} m{}",
                                   map.surfel_count(),
                                   map.resolution(),
                                   size.x(),
                                   size.y(),
-                                  size.z()),
+                                  size.z(),
+                                  map.has_assumed() ? "; violet: assumed" : ""),
                       kLabelText,
                       room,
                       kInk);

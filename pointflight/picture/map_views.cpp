@@ -69,10 +69,10 @@ Views render(const SurfelMap& map,
   const auto raster_of = [](const Plot& plot, float fill) {
     return Raster(static_cast<int>(plot.width), static_cast<int>(plot.height), fill);
   };
-  Views views{raster_of(page.top, kEmpty), raster_of(page.side, 0.0f)};
+  Views views{raster_of(page.top, kEmpty), raster_of(page.top, kEmpty), raster_of(page.side, 0.0f)};
   const double scale = page.top.width / page.shown.size().x();
   const int side = std::max(1, static_cast<int>(std::ceil(map.resolution() * scale + 0.5)));
-  map.for_each_surfel([&](const Vector3d& p, const Vector3d&, double, std::uint32_t) {
+  map.for_each_surfel([&](const Vector3d& p, const Vector3d&, double, std::uint32_t word) {
     if ((p - page.shown.min).head<2>().minCoeff() < 0.0 ||
         (page.shown.max - p).head<2>().minCoeff() < 0.0) {
       return;
@@ -80,7 +80,9 @@ Views render(const SurfelMap& map,
     splat(views.density, page.side, page.on_side(p), side, [](float& n) { n += 1.0f; });
     if (!shown_on_top(p)) return;
     const auto z = static_cast<float>(p.z());
-    splat(views.top, page.top, page.on_top(p), side, [&](float& top) { top = std::max(top, z); });
+    const auto raise = [&](float& top) { top = std::max(top, z); };
+    splat(views.top, page.top, page.on_top(p), side, raise);
+    if (map.is_assumed(word)) splat(views.assumed, page.top, page.on_top(p), side, raise);
   });
   return views;
 }

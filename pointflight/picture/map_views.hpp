@@ -88,6 +88,7 @@ inline constexpr float kEmpty = -std::numeric_limits<float>::infinity();
 /// Both views of a map.
 struct Views {
   Raster top;      ///< Of the highest thing that is shown: its height, m; kEmpty where nothing is.
+  Raster assumed;  ///< Of the highest assumed surfel that is shown, the same.
   Raster density;  ///< Surfels along the line of sight, from the side.
 };
 

@@ -82,6 +82,7 @@ void Perspective::render(const SurfelMap& map, double cut, const MovingThings& t
   cosines_.resize(count);
   heights_.resize(count);
   labels_.assign(count, kMapLabel);
+  assumed_.assign(count, false);
   // not owned: it outlives the renderer
   const std::shared_ptr<const SurfelMap> shared(std::shared_ptr<void>(), &map);
   const auto renderer = make_renderer("beam", Scene{shared});
@@ -120,6 +121,7 @@ void Perspective::render(const SurfelMap& map, double cut, const MovingThings& t
       heights_[first + i] = static_cast<float>(rays[i].origin_world.z()) +
                             hits[i].range * rays[i].direction_world.z();
       labels_[first + i] = hits[i].label;
+      assumed_[first + i] = map.is_assumed(hits[i].surfel);
     }
   }
 }
@@ -135,7 +137,9 @@ void Perspective::paint(Canvas& canvas,
       if (ranges_[i] < 0.0f) continue;
       const double light = 0.35 + 0.65 * static_cast<double>(cosines_[i]);
       const bool moves = labels_[i] != kMapLabel && color_of;
-      const Color c = moves ? color_of(labels_[i]) : color_at(static_cast<double>(heights_[i]));
+      const Color c = moves         ? color_of(labels_[i])
+                      : assumed_[i] ? kAssumedColor
+                                    : color_at(static_cast<double>(heights_[i]));
       canvas.put(static_cast<int>(frame_.left) + x,
                  static_cast<int>(frame_.top) + y,
                  {light * c.r, light * c.g, light * c.b},

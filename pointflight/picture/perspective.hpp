@@ -51,7 +51,8 @@ class Perspective {
               const Frame& frame,
               const MovingThings& things);
 
-  /// Draws it, light falling from the eye; `color_at(z)`: of the map at a height;
+  /// Draws it, light falling from the eye; `color_at(z)`: of the map at a height
+  /// (what is assumed has a colour of its own);
   /// `color_of(label)`: of what moves.
   void paint(Canvas& canvas,
              const std::function<Color(double z)>& color_at,
@@ -79,6 +80,7 @@ class Perspective {
   std::vector<float> ranges_;                         ///< From the eye, m; negative: nothing.
   std::vector<float> cosines_, heights_;
   std::vector<Label> labels_;
+  std::vector<bool> assumed_;  ///< Is it a surfel that no survey saw?
 };
 
 /// Height (m) below which a map has to be cut so that its inside is seen from above: infinite

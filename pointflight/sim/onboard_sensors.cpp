@@ -84,6 +84,7 @@ MountedLidar::MountedLidar(const LidarMount& mount,
       noise_(mount.noise),
       truth_(mount.truth),
       own_airframe_(mount.own_airframe),
+      map_(&map),
       known_(mount.mark_unknown ? &known_space_of(map) : nullptr),
       faults_(faults) {
   const Vector3d rpy = mount.rotation_rpy_deg * kDegree;
@@ -109,6 +110,7 @@ std::unique_ptr<IntervalMeasurement> MountedLidar::begin(const IntervalInput& in
   request.snapshot = snapshot_;
   request.noise = noise_;
   request.known = known_;
+  request.map = map_;
   request.truth = truth_;
   request.seed = site_.seed;
   request.bodies = input.bodies;

@@ -98,6 +98,7 @@ class MountedLidar : public IntervalSensor {
   bool noise_;
   bool truth_;
   bool own_airframe_;
+  const SurfelMap* map_;
   const KnownSpace* known_ = nullptr;  ///< Null: points are not marked.
   const Faults& faults_;
 };

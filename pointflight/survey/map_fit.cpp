@@ -14,9 +14,9 @@
 
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/math.hpp"
-#include "pointflight/map/edit/internal/surfel_gathering.hpp"
 #include "pointflight/map/known_space.hpp"
 #include "pointflight/map/map_file.hpp"
+#include "pointflight/survey/surfel_changes.hpp"
 #include "pointflight/survey/surfel_evidence.hpp"
 #include "pointflight/survey/survey_hits.hpp"
 
@@ -85,24 +85,6 @@ SurfelWord resized(SurfelWord word, const std::array<double, 3>& factors) {
   return (encode(surfel) & ~kPlaceBits) | (word & kPlaceBits);
 }
 
-/// The map with `change(leaf, index in words)` for each of its words; nothing removes it.
-EditedMap changed(
-    const SurfelMap& map,
-    const std::function<std::optional<SurfelWord>(const LeafHeader&, std::size_t)>& change,
-    const EditOptions& options,
-    const Executor& executor) {
-  std::size_t count = 0;
-  for_each_surfel(map.words(), [&](const LeafHeader&, std::size_t) { ++count; });
-  SurfelGathering all(map.origin_world(), map.resolution(), count, options);
-  for_each_surfel(map.words(), [&](const LeafHeader& leaf, std::size_t word) {
-    const auto codes = map.intensity_codes();
-    if (const auto now = change(leaf, word)) {
-      all.add_as_is(leaf, *now, codes.empty() ? std::uint8_t{0} : codes[word]);
-    }
-  });
-  return all.build(description_of(map), true, "the map", executor);
-}
-
 // ---- pass 1
 
 constexpr std::size_t kPassed = 0;
@@ -134,6 +116,7 @@ EditedMap shrink_by_passes(const SurfelMap& map,
   report.rays = report.before.returns + report.before.empty;
   const auto change = [&](const LeafHeader& leaf, std::size_t at) -> std::optional<SurfelWord> {
     const SurfelWord word = map.words()[at];
+    if (map.is_assumed(static_cast<std::uint32_t>(at))) return word;  // judged when it was made
     const double passes = evidence.sum(at, kPassed);
     const double hits = evidence.sum(at, kHit);
     if (passes + hits <= 0.0) {
@@ -279,6 +262,7 @@ EditedMap correct_by_blame(const SurfelMap& map,
       map, survey, fit.right, executor, "fitting sizes to rendered rays", progress, visit);
   before = fates.rays();
   const auto change = [&](const LeafHeader&, std::size_t at) -> std::optional<SurfelWord> {
+    if (map.is_assumed(static_cast<std::uint32_t>(at))) return map.words()[at];
     const auto factors = factors_of(evidence, at, fit);
     if (factors) return resized(map.words()[at], *factors);
     ++report.blamed;

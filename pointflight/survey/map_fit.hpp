@@ -16,7 +16,7 @@ namespace pointflight {
 /// Parameters of a fit.
 struct FitOptions {
   double right = 0.1;        ///< A return is right so near, m.
-  double exponent = 0.5;     ///< Pass 1: sizes times (hits / (hits + passes))^exponent.
+  double exponent = 0.8;     ///< Pass 1: sizes times (hits / (hits + passes))^exponent.
   double step = 0.7;         ///< Pass 2: of ln(size) for blame alone.
   double doubt = 0.3;        ///< Pass 2: evidence below this weight changes little.
   double leak_weight = 3.0;  ///< A ray that leaks counts as so many early ones.

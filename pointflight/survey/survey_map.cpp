@@ -30,54 +30,55 @@ std::shared_ptr<const SurfelMap> opened(const Bvh8& tree, const MapDescription& 
   return SurfelMap::from_bytes(map_bytes(tree, description), "the survey's map");
 }
 
-/// The points of a cloud beside which a survey saw something.
-class SeenCloud : public CloudReader {
- public:
-  SeenCloud(std::unique_ptr<CloudReader> cloud, const SurveyedCells& seen)
-      : cloud_(std::move(cloud)), seen_(seen) {}
+ImportedMap import_returns(const SurveyOpener& survey,
+                           const ImportOptions& options,
+                           const Executor& executor,
+                           const Progress& progress) {
+  const auto returns = [&](std::size_t) { return cloud_of(survey()); };
+  return build_map({"the scans"}, returns, options, executor, progress);
+}
 
-  bool read(std::vector<CloudPoint>& batch) override {
-    while (cloud_->read(batch)) {
-      std::erase_if(batch, [&](const CloudPoint& p) { return !seen_.has(p.position); });
-      if (!batch.empty()) return true;
-    }
-    return false;
-  }
-  [[nodiscard]] bool has_intensity() const override { return cloud_->has_intensity(); }
-  [[nodiscard]] bool has_color() const override { return cloud_->has_color(); }
-  [[nodiscard]] std::optional<FileUnit> unit() const override { return cloud_->unit(); }
-  [[nodiscard]] double share_read() const override { return cloud_->share_read(); }
-
- private:
-  std::unique_ptr<CloudReader> cloud_;
-  const SurveyedCells& seen_;
-};
-
-/// Of the points, or of the survey's returns; with `seen` of those that lie beside its positions.
+/// At the options' resolution, but not finer than the points support if it was tried with the
+/// returns, of which there are more.
 ImportedMap import_points(const SurveyPoints& points,
                           const SurveyOpener& survey,
-                          const SurveyedCells* seen,
-                          const ImportOptions& options,
+                          ImportOptions& options,
                           const Executor& executor,
                           const Progress& progress) {
-  if (points.names.empty()) {
-    const auto returns = [&](std::size_t) { return cloud_of(survey()); };
-    return build_map({"the scans"}, returns, options, executor, progress);
-  }
-  const auto cloud = [&](std::size_t i) -> std::unique_ptr<CloudReader> {
-    if (seen == nullptr) return points.open(i);
-    return std::make_unique<SeenCloud>(points.open(i), *seen);
-  };
-  return build_map(points.names, cloud, options, executor, progress);
+  if (points.names.empty()) return import_returns(survey, options, executor, progress);
+  ImportedMap made = build_map(points.names, points.open, options, executor, progress);
+  const double supported = made.report.supported_resolution;
+  if (!options.resolution_is_tried || supported <= made.report.resolution) return made;
+  made = {};
+  options.resolution.reset();
+  options.resolution_is_tried = false;
+  return build_map(points.names, points.open, options, executor, progress);
 }
 
 }  // namespace
 
+EditedMap fit_and_close(const SurfelMap& map,
+                        const SurveyOpener& survey,
+                        const FitOptions& fit,
+                        const std::optional<ClosingOptions>& closing,
+                        const EditOptions& options,
+                        const Executor& executor,
+                        FitReport& fitted,
+                        ClosingReport& closed,
+                        const Progress& progress) {
+  closed = {};
+  EditedMap made = fit_map(map, survey, fit, options, executor, fitted, progress);
+  if (!closing) return made;
+  const auto with_holes = opened(made.tree, made.description);
+  made = {};  // room for the next
+  made = close_holes(*with_holes, survey, *closing, options, executor, closed, progress);
+  made.surfels_before = map.surfel_count();
+  return made;
+}
+
 std::vector<TriedResolution> try_resolutions(const ScanOpener& survey,
                                              std::size_t scan_count,
-                                             const SurveyPoints& points,
-                                             const ImportOptions& options,
-                                             const FitOptions& fit,
+                                             const SurveyMapOptions& options,
                                              const Executor& executor,
                                              const Progress& progress) {
   require_argument(scan_count >= 2, "try_resolutions: two scans at least are wanted");
@@ -92,24 +93,27 @@ std::vector<TriedResolution> try_resolutions(const ScanOpener& survey,
   const auto counts = [&](const SurveyRay& ray) {
     return !ray.is_return || seen.has(ray.point_world());
   };
-  ImportOptions chosen = options;
+  ImportOptions chosen = options.import;
   chosen.quality = TreeQuality::kNormal;  // of use for minutes
-  FitOptions quick = fit;
+  FitOptions quick = options.fit;
   quick.known_space = false;
   quick.blame_passes = 1;  // a second one would take half as long again
   const auto try_one = [&](const std::optional<double>& resolution) {
     chosen.resolution = resolution;
-    const ImportedMap imported = import_points(points, learnt, &seen, chosen, executor, progress);
+    const ImportedMap imported = import_returns(learnt, chosen, executor, progress);
     FitReport report;
-    const EditedMap fitted = fit_map(*opened(imported.tree, imported.description),
-                                     learnt,
-                                     quick,
-                                     edit_options_of(chosen),
-                                     executor,
-                                     report,
-                                     progress);
+    ClosingReport closed;
+    const EditedMap fitted = fit_and_close(*opened(imported.tree, imported.description),
+                                           learnt,
+                                           quick,
+                                           options.closing,
+                                           edit_options_of(chosen),
+                                           executor,
+                                           report,
+                                           closed,
+                                           progress);
     const OwnRays rays = measure_rays(
-        *opened(fitted.tree, fitted.description), judges, fit.right, counts, executor, progress);
+        *opened(fitted.tree, fitted.description), judges, quick.right, counts, executor, progress);
     return TriedResolution{
         imported.report.resolution, rays.right_share(), rays.returns + rays.empty};
   };
@@ -118,34 +122,41 @@ std::vector<TriedResolution> try_resolutions(const ScanOpener& survey,
 
 SurveyMap map_survey(const SurveySource& survey,
                      const SurveyPoints& points,
-                     const ImportOptions& options,
-                     const FitOptions& fit,
+                     const SurveyMapOptions& options,
                      const Executor& executor,
                      const Progress& progress) {
   SurveyMap made;
-  ImportOptions chosen = options;
+  ImportOptions chosen = options.import;
   const ScanOpener some = [&](const auto& accept) { return survey.open(accept); };
   const SurveyOpener all = [&] { return survey.open(); };
   if (!chosen.resolution && survey.scan_count() > 1) {
-    made.tried =
-        try_resolutions(some, survey.scan_count(), points, options, fit, executor, progress);
+    made.tried = try_resolutions(some, survey.scan_count(), options, executor, progress);
     chosen.resolution = best_resolution(made.tried, kLevel);
     chosen.resolution_is_tried = made.tried.front().rays > 0;
   }
-  ImportedMap imported = import_points(points, all, nullptr, chosen, executor, progress);
+  ImportedMap imported = import_points(points, all, chosen, executor, progress);
   made.imported = imported.report;
-  // by the spacing, if no scans were left out to judge
-  made.imported.resolution_was_chosen = !options.resolution && made.tried.empty();
+  // by the spacing, if no scans were left out to judge or the clouds support none so fine
+  made.imported.resolution_was_chosen =
+      !options.import.resolution && (made.tried.empty() || !chosen.resolution);
   made.imported.warnings =
-      import_warnings(made.imported, options, imported.description.bounds_world);
+      import_warnings(made.imported, options.import, imported.description.bounds_world);
   made.outliers = std::move(imported.outliers);
   const auto map = opened(imported.tree, imported.description);
   imported = {};  // room for the fit
-  made.map = fit_map(*map, all, fit, edit_options_of(chosen), executor, made.fit, progress);
+  made.map = fit_and_close(*map,
+                           all,
+                           options.fit,
+                           options.closing,
+                           edit_options_of(chosen),
+                           executor,
+                           made.fit,
+                           made.closed,
+                           progress);
   append_note(made.map,
               fmt::format("fit to {} rays of {} scans", made.fit.rays, survey.scan_count()));
   made.after = measure_rays(
-      *opened(made.map.tree, made.map.description), all, fit.right, {}, executor, progress);
+      *opened(made.map.tree, made.map.description), all, options.fit.right, {}, executor, progress);
   return made;
 }
 

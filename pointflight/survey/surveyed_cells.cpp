@@ -1,6 +1,6 @@
 #include "pointflight/survey/surveyed_cells.hpp"
 
-#include "pointflight/survey/grid_cells.hpp"
+#include "pointflight/geometry/internal/grid_cells.hpp"
 
 namespace pointflight {
 namespace {

@@ -213,8 +213,9 @@ void Imu::add_steady_errors(std::uint64_t number,
     sample.accel +=
         accel_flicker_.step(is_first, memory.accel_flicker, flicker(StreamId::kImuAccelFlicker));
   }
+  const std::int64_t accel_bits = errors_.accel_bits > 0 ? errors_.accel_bits : errors_.bits;
   sample.gyro = read_out(sample.gyro, errors_.gyro.range, errors_.bits);
-  sample.accel = read_out(sample.accel, errors_.accel.range, errors_.bits);
+  sample.accel = read_out(sample.accel, errors_.accel.range, accel_bits);
   if (errors_.clock_errs()) {
     const RandomStream random(seed_, StreamId::kImuClock, vehicle_);
     sample.stamp +=

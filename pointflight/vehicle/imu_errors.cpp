@@ -45,6 +45,8 @@ void describe_beyond_noise(SettingsVisitor& v, ImuErrors& e) {
   v.value({"accel_range", "m/s^2", "the same of the accelerometer", 0, 1e5}, e.accel.range);
   v.value({"bits", "", "that a range from minus to plus is read out with; 0: not rounded", 0, 32},
           e.bits);
+  v.value({"accel_bits", "", "of the accelerometer, if it has others; 0: as bits", 0, 32},
+          e.accel_bits);
   v.value({"clock_offset", "s", "time stamps are late by this", -1, 1}, e.clock_offset);
   v.value({"clock_jitter", "s", "deviation of each time stamp", 0, 0.1}, e.clock_jitter);
 }

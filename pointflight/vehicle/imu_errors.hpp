@@ -26,8 +26,9 @@ struct ImuErrors {
   double gyro_g_sensitivity = 0.0;  ///< Deviation of the gyro's bias per force, rad/s per m/s^2.
   /// Of both outputs, over their ranges; 0: not rounded.
   std::int64_t bits = 0;
-  double clock_offset = 0.0;  ///< Time stamps are late by this, s.
-  double clock_jitter = 0.0;  ///< Deviation of each time stamp, s.
+  std::int64_t accel_bits = 0;  ///< Of the accelerometer, if it has others; 0: as `bits`.
+  double clock_offset = 0.0;    ///< Time stamps are late by this, s.
+  double clock_jitter = 0.0;    ///< Deviation of each time stamp, s.
 
   /// True if time stamps are not the times of the samples.
   [[nodiscard]] bool clock_errs() const { return clock_offset != 0.0 || clock_jitter > 0.0; }

@@ -70,6 +70,67 @@ TEST(Lidar, Statistics_AScanTakenWhileFlyingUsesThePoseOfEachBeam) {
   EXPECT_LT(mean_one_pose, 0.003);
 }
 
+/// Mean of measured minus true range by ring, m.
+std::vector<double> ring_errors(const LidarSettings& settings, std::uint64_t seed, bool as_lines) {
+  ShapeScene scene;
+  scene.add_box({-6, -6, -2}, {6, 6, 4});
+  const auto renderer = make_renderer("beam", Scene{map_of(scene, 0.1)});
+  LidarSettings chosen = settings;
+  if (as_lines) chosen.optics.sub_rays = 1;
+  const Lidar lidar(chosen, 0, nullptr, Surroundings{});
+  ScanRequest request;
+  request.seed = seed;
+  request.truth = true;
+  const Scan scan = lidar.take(request, PoseTrack(Pose{}), *renderer, Executor(2));
+  std::vector<double> sums;
+  std::vector<double> counts;
+  for (std::size_t i = 0; i < scan.points.size(); ++i) {
+    if (scan.truth[i].sub_rays == 0) continue;
+    const std::size_t ring = scan.points[i].ring;
+    sums.resize(std::max(sums.size(), ring + 1));
+    counts.resize(sums.size());
+    sums[ring] += static_cast<double>(scan.points[i].range - scan.truth[i].range);
+    counts[ring] += 1.0;
+  }
+  for (std::size_t ring = 0; ring < sums.size(); ++ring) {
+    if (counts[ring] > 0.0) sums[ring] /= counts[ring];
+  }
+  return sums;
+}
+
+TEST(Lidar, Statistics_OffsetsAreDrawnOnceForEachRingAndRun) {
+  LidarSettings settings = load_lidar("vlp16");
+  settings.noise = {};
+  settings.noise.ring_offset_sigma = 0.02;
+  const auto first = ring_errors(settings, 1, false);
+  ASSERT_EQ(first.size(), 16u);
+  double square = 0.0;
+  double whole = 0.0;
+  double runs = 0.0;
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    settings.noise.offset_sigma = 0.0;
+    const auto errors = ring_errors(settings, seed, true);
+    for (const double error : errors) square += error * error / (20.0 * 16.0);
+    settings.noise.offset_sigma = 0.05;
+    const auto moved = ring_errors(settings, seed, true);
+    for (std::size_t ring = 1; ring < 16; ++ring) {
+      EXPECT_NEAR(moved[ring] - errors[ring], moved[0] - errors[0], 1e-5);
+    }
+    whole += std::pow(moved[0] - errors[0], 2) / 20.0;
+    runs += 1.0;
+  }
+  EXPECT_EQ(runs, 20.0);
+  EXPECT_NEAR(std::sqrt(square), 0.02, 0.002);
+  EXPECT_NEAR(std::sqrt(whole), 0.05, 0.02);
+  // wide beams and lines are off by the same
+  settings.noise.offset_sigma = 0.0;
+  const auto lines = ring_errors(settings, 1, true);
+  for (std::size_t ring = 0; ring < 16; ++ring) EXPECT_NEAR(first[ring], lines[ring], 1e-5);
+  // no noise, no offsets
+  settings.noise = {};
+  for (const double error : ring_errors(settings, 1, true)) EXPECT_NEAR(error, 0.0, 1e-5);
+}
+
 /// Share of a D455's pixels that see a wall across its axis at `depth`; their depths are checked.
 double share_of_pixels(double depth, bool noise) {
   ShapeScene scene;

@@ -279,6 +279,11 @@ TEST(Imu, SaturatesAndRoundsAsItsConverterDoes) {
   EXPECT_NEAR(s.gyro.y(), -10.0, 1e-12);
   EXPECT_EQ(s.gyro.z(), 0.0);
   EXPECT_NEAR(s.accel.z(), 0.15625 * 63, 1e-12);  // 9.81 / (40 / 256) = 62.8
+  errors.accel_bits = 6;
+  Imu::Memory other;
+  const ImuSample coarse = Imu(with(errors), 1, 0).sample(0, SimTime{}, body(state), {}, other);
+  EXPECT_NEAR(coarse.accel.z(), 0.625 * 16, 1e-12);  // 9.81 / (40 / 64) = 15.7
+  EXPECT_EQ(coarse.gyro, s.gyro);
 }
 
 TEST(Imu, ItsClockIsLateAndJitters) {
@@ -346,7 +351,7 @@ TEST(ImuParts, AreShippedAndSaidWhereTheyAreNot) {
     }
     EXPECT_EQ(part.errors.bits, 16);
   }
-  EXPECT_EQ(load_vehicle("quad_330").imu.in_use().gyro.noise_density, 6.63e-5);
+  EXPECT_EQ(load_vehicle("quad_330").imu.in_use().gyro.noise_density, 7.85e-5);
   const std::string text = testing::read_file(load_vehicle("quad_330").path);
   const auto changed = [&](const std::string& from, const std::string& to) {
     std::string mine = text;

@@ -26,16 +26,13 @@ std::size_t count_surfels(const SurfelMap& map) {
   return count;
 }
 
-std::uint8_t intensity_code(const SurfelMap& map, std::size_t word) {
-  return map.has_intensity() ? map.intensity_codes()[word] : std::uint8_t{0};
-}
-
 Surfel turned(Surfel surfel, const Quaterniond& rotation) {
   surfel.axes = (rotation.toRotationMatrix() * surfel.axes.cast<double>()).cast<float>();
   return surfel;
 }
 
-/// True if a surfel of `map` stands for the position already: its cell, turned as it is, holds it.
+/// True if a surfel of `map` that was seen stands for the position already: its cell, turned as it
+/// is, holds it.
 bool covers(const SurfelMap& map, const Vector3d& p_map) {
   const double r = map.resolution();
   const Vector3d half(0.5 * r, 0.6 * r, 0.6 * r);  // centroids lie anywhere in their cells
@@ -43,7 +40,8 @@ bool covers(const SurfelMap& map, const Vector3d& p_map) {
   const double reach = half.norm();
   visit_near(map, {p_map, p_map}, reach, [&](const SurfelBox& box) {
     const Vector3d p_box = box.T_world_box.inverse() * p_map;
-    found = found || (p_box.cwiseAbs().array() <= half.array()).all();
+    const bool is_inside = (p_box.cwiseAbs().array() <= half.array()).all();
+    found = found || (is_inside && !map.is_assumed(box.word));
     return found ? -1.0 : reach;
   });
   return found;
@@ -73,6 +71,8 @@ EditedMap shifted(const SurfelMap& map, const Vector3d& by, const EditOptions& o
   copy(map.words(), edited.tree.words);
   copy(map.intensity_codes(), edited.tree.intensity);
   edited.description = description_of(map);
+  const auto assumed = map.section(kAssumedSection);
+  set_section(edited.description, kAssumedSection, {assumed.begin(), assumed.end()});
   edited.description.origin_world += by;
   edited.description.bounds_world.min += by;
   edited.description.bounds_world.max += by;
@@ -194,7 +194,7 @@ EditedMap crop_map(const SurfelMap& map,
       if (map.known_space() != nullptr) gone.push_back(map.center_world(leaf, map.words()[word]));
       return;
     }
-    gathering.add_as_is(leaf, map.words()[word], intensity_code(map, word));
+    gathering.add_as_is(leaf, map.words()[word], marks_of(map, word));
   });
   EditedMap edited = gathering.build(description_of(map), true, "crop", executor);
   edited.surfels_before = kept.size();
@@ -218,8 +218,7 @@ EditedMap transform_map(const SurfelMap& map,
   for_each_surfel(map.words(), [&](const LeafHeader& leaf, std::size_t word) {
     const Surfel surfel = decode(map.words()[word]);
     const Vector3d center = T_new_old * map.center_world(leaf, map.words()[word]);
-    const std::uint8_t code = intensity_code(map, word);
-    if (!gathering.add(center, turned(surfel, T_new_old.rotation), code)) {
+    if (!gathering.add(center, turned(surfel, T_new_old.rotation), marks_of(map, word))) {
       refuse_width(map.resolution());
     }
   });
@@ -266,12 +265,12 @@ EditedMap merge_maps(const std::vector<PlacedMap>& maps,
       if (done++ % 65536 == 0) {
         report(progress, "merging", static_cast<double>(m) / static_cast<double>(maps.size()));
       }
-      const std::uint8_t code =
-          description.has_intensity
-              ? levels.code_of(map.intensity(static_cast<std::uint32_t>(word)))
-              : std::uint8_t{0};
+      SurfelMarks marks = marks_of(map, word);
+      if (description.has_intensity) {
+        marks.intensity = levels.code_of(map.intensity(static_cast<std::uint32_t>(word)));
+      }
       if (m == 0 && first_stays) {
-        gathering.add_as_is(leaf, map.words()[word], code);
+        gathering.add_as_is(leaf, map.words()[word], marks);
         return;
       }
       const Surfel surfel = decode(map.words()[word]);
@@ -284,7 +283,7 @@ EditedMap merge_maps(const std::vector<PlacedMap>& maps,
                       });
       if (taken) {
         ++doubles;
-      } else if (!gathering.add(center, turned(surfel, T.rotation), code)) {
+      } else if (!gathering.add(center, turned(surfel, T.rotation), marks)) {
         refuse_width(first.resolution());
       }
     });

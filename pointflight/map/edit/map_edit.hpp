@@ -32,8 +32,8 @@ struct EditOptions {
   std::string note = {};  ///< What was done, appended to the metadata's list "edited".
 };
 
-/// What `write_map` needs to write the same map again; of further sections the known space and the
-/// scale of reflectivities.
+/// What `write_map` needs to write the same map again; of further sections the known space and what
+/// intensities stand for, not the marks of surfels, which go with the tree.
 MapDescription description_of(const SurfelMap& map);
 
 /// Says what reflectivity a unit of the map's intensity stands for; 0: that it is not known.

@@ -2,7 +2,52 @@
 
 #include <fmt/format.h>
 
+#include <vector>
+
 namespace pointflight {
+namespace {
+
+constexpr SurfelWord kPlaceBits = (SurfelWord{1} << 30) - 1;
+
+bool before(const BuildSurfel& a, const BuildSurfel& b) {
+  return a.morton != b.morton ? a.morton < b.morton : a.word < b.word;
+}
+
+/// A bit for each word of a tree whose voxel (0, 0, 0) is `base` of those that `marked` lie in.
+std::vector<std::byte> bits_of(std::span<const SurfelWord> words,
+                               const std::array<std::int32_t, 3>& base,
+                               std::vector<BuildSurfel> marked) {
+  if (marked.empty()) return {};
+  std::ranges::sort(marked, before);
+  std::vector<std::byte> bits((words.size() + 7) / 8);
+  for_each_surfel(words, [&](const LeafHeader& leaf, std::size_t at) {
+    PlacedSurfel placed = placed_surfel(leaf, words[at]);
+    for (std::size_t axis = 0; axis < 3; ++axis) placed.voxel[axis] += base[axis];
+    const BuildSurfel surfel{voxel_key(placed.voxel), placed.word};
+    if (std::ranges::binary_search(marked, surfel, before)) {
+      bits[at / 8] |= std::byte{1} << (at % 8);
+    }
+  });
+  return bits;
+}
+
+}  // namespace
+
+PlacedSurfel placed_surfel(const LeafHeader& leaf, SurfelWord word) {
+  const std::array<std::uint32_t, 3> corner = {leaf.x, leaf.y, leaf.z};
+  PlacedSurfel placed{{}, word & ~kPlaceBits};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto steps = static_cast<std::uint32_t>(word >> (10 * axis)) & 1023u;
+    placed.voxel[axis] = static_cast<std::int32_t>(corner[axis] + (steps >> 6));
+    placed.word |= static_cast<SurfelWord>(steps & 63u) << (10 * axis);
+  }
+  return placed;
+}
+
+SurfelMarks marks_of(const SurfelMap& map, std::size_t word) {
+  return {map.has_intensity() ? map.intensity_codes()[word] : std::uint8_t{0},
+          map.is_assumed(static_cast<std::uint32_t>(word))};
+}
 
 EditedMap SurfelGathering::build(const MapDescription& description,
                                  bool keeps_base,
@@ -29,6 +74,35 @@ EditedMap SurfelGathering::build(const MapDescription& description,
         return n > 8;
       });
   return finish(description, static_cast<std::size_t>(crowd - entries.begin()), base, executor);
+}
+
+EditedMap SurfelGathering::finish(const MapDescription& description,
+                                  std::size_t count,
+                                  const std::array<std::int32_t, 3>& base,
+                                  const Executor& executor) {
+  EditedMap edited;
+  edited.description = description;
+  edited.description.origin_world = base_ + resolution_ * Vector3d(base[0], base[1], base[2]);
+  edited.description.surfel_count = count;
+  edited.surfels = count;
+  ScratchArray<BuildSurfel> surfels(scratch_, count);
+  ScratchArray<std::uint8_t> intensity(scratch_, description.has_intensity ? count : 0);
+  std::vector<BuildSurfel> assumed;
+  for (std::size_t i = 0; i < count; ++i) {
+    surfels[i] = entries_[i].surfel;
+    if (description.has_intensity) intensity[i] = entries_[i].marks.intensity;
+    if (entries_[i].marks.is_assumed) assumed.push_back(entries_[i].surfel);
+  }
+  edited.description.bounds_world = bounds_of(surfels.span(), base_, resolution_);
+  TreeInput input{surfels, intensity, {}, resolution_};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    input.low[axis] = static_cast<std::uint32_t>(base[axis] + kMaxVoxel);
+  }
+  edited.tree = build_bvh8(input, options_.quality, executor, scratch_);
+  set_section(edited.description,
+              kAssumedSection,
+              bits_of(edited.tree.words.span(), base, std::move(assumed)));
+  return edited;
 }
 
 }  // namespace pointflight
