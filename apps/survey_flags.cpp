@@ -234,7 +234,7 @@ std::optional<ClosingOptions> closing_options(const FitFlags& flags) {
 void print_closed(const FitFlags& flags, const ClosingReport& report) {
   if (flags.no_assume) return;
   log(fmt::format(
-      "holes         {} surfels assumed in {} large planes; {} places were passed by rays, {} lie "
+      "holes         {} surfels assumed in {} large planes; {} cells were passed by rays, {} lie "
       "beside openings",
       short_count(static_cast<double>(report.assumed)),
       report.planes,

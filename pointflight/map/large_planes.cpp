@@ -94,25 +94,18 @@ std::vector<PlanePatch> find_patches(const SurfelMap& map, const Executor& execu
     if (!is_planar(map.words()[word]) || map.is_assumed(at)) return;
     const Vector3d center = map.center_world(leaf, map.words()[word]);
     const GridCell cell = grid_cell(center, width);
-    const Vector3d corner = width * Vector3d(static_cast<double>(cell[0]),
-                                             static_cast<double>(cell[1]),
-                                             static_cast<double>(cell[2]));
     blocks[cell].push_back(
-        {(center - corner).cast<float>(), decode(map.words()[word]).axes.col(0)});
+        {(center - grid_corner(cell, width)).cast<float>(), decode(map.words()[word]).axes.col(0)});
   });
   std::vector<std::pair<const GridCell, std::vector<PlaneFacet>>*> in_order;
   for (auto& block : blocks) in_order.push_back(&block);
   std::vector<std::vector<PlanePatch>> found(in_order.size());
   executor.parallel_for(in_order.size(), 16, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
-      const GridCell& cell = in_order[i]->first;
-      const Vector3d corner = width * Vector3d(static_cast<double>(cell[0]),
-                                               static_cast<double>(cell[1]),
-                                               static_cast<double>(cell[2]));
       PatchFinder finder(std::move(in_order[i]->second), map.resolution());
       PlanePatch patch;
       while (found[i].size() < kPatchesMost && finder.next(patch)) {
-        patch.middle_world += corner;
+        patch.middle_world += grid_corner(in_order[i]->first, width);
         found[i].push_back(patch);
       }
     }
@@ -129,22 +122,20 @@ class PlaneGrower {
       : patches_(std::move(patches)),
         taken_(patches_.size(), false),
         options_(options),
+        near_(options.gap),
         offset_(options.offset + 0.5 * resolution),
         cos_patch_(math::cos(options.patch_tilt / 180.0 * std::numbers::pi)),
         cos_plane_(math::cos(options.plane_tilt / 180.0 * std::numbers::pi)) {
     for (std::size_t i = 0; i < patches_.size(); ++i) {
-      cells_[grid_cell(patches_[i].middle_world, options_.gap)].push_back(i);
+      near_.add(patches_[i].middle_world, i);
+      order_.push_back(i);
     }
+    std::ranges::stable_sort(
+        order_, [&](std::size_t a, std::size_t b) { return patches_[a].area > patches_[b].area; });
   }
 
   /// The plane around the largest patch that is left; false if none is.
   bool next(LargePlane& plane) {
-    if (order_.empty()) {
-      for (std::size_t i = 0; i < patches_.size(); ++i) order_.push_back(i);
-      std::ranges::stable_sort(order_, [&](std::size_t a, std::size_t b) {
-        return patches_[a].area > patches_[b].area;
-      });
-    }
     while (at_ < order_.size() && taken_[order_[at_]]) ++at_;
     if (at_ == order_.size()) return false;
     plane = {};
@@ -161,7 +152,7 @@ class PlaneGrower {
       area += patch.area;
       plane.patches.push_back(patch);
       const Vector3d mean = normals.normalized();
-      for_each_near(patch, [&](std::size_t other) {
+      near_.for_each_around(patch.middle_world, [&](std::size_t other) {
         const PlanePatch& next = patches_[other];
         if (taken_[other] || !continues(patch, next)) return;
         if (std::abs(mean.dot(next.normal_world)) < cos_plane_) return;
@@ -175,16 +166,6 @@ class PlaneGrower {
   }
 
  private:
-  template <class Visit>
-  void for_each_near(const PlanePatch& patch, const Visit& visit) const {
-    const GridCell middle = grid_cell(patch.middle_world, options_.gap);
-    for (std::int64_t i = 0; i < 27; ++i) {
-      const auto found = cells_.find(neighbour(middle, i));
-      if (found == cells_.end()) continue;
-      for (const std::size_t other : found->second) visit(other);
-    }
-  }
-
   [[nodiscard]] bool continues(const PlanePatch& a, const PlanePatch& b) const {
     const Vector3d between = b.middle_world - a.middle_world;
     return between.norm() < options_.gap &&
@@ -195,10 +176,10 @@ class PlaneGrower {
 
   std::vector<PlanePatch> patches_;
   std::vector<bool> taken_;
-  std::vector<std::size_t> order_;
+  std::vector<std::size_t> order_;  ///< The largest first.
   std::size_t at_ = 0;
-  std::map<GridCell, std::vector<std::size_t>> cells_;
   LargePlaneOptions options_;
+  GridIndex<std::size_t> near_;
   double offset_;
   double cos_patch_;
   double cos_plane_;

@@ -1,7 +1,6 @@
 // Floors, walls, ceilings: the large flat surfaces of a map.
 #pragma once
 
-#include <cstdint>
 #include <vector>
 
 #include "pointflight/core/parallel.hpp"

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
-#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -18,17 +17,16 @@ namespace pointflight {
 namespace {
 
 constexpr float kTile = 0.32f;      // r: deviations of a surfel that goes on to all sides
-constexpr double kApart = 0.7;      // r: nearer to another surfel there is no hole
+constexpr double kApart = 0.7;      // r: between tiles of planes that overlap
 constexpr double kNeighbour = 1.6;  // r: between neighbours
 
 /// Positions, found by what they are near to.
 class NearPositions {
  public:
-  explicit NearPositions(double radius) : radius_(radius) {}
+  explicit NearPositions(double radius) : radius_(radius), index_(radius) {}
 
   void add(const Vector3d& position) {
-    cells_[grid_key(grid_cell(position, radius_))].push_back(
-        static_cast<std::uint32_t>(positions_.size()));
+    index_.add(position, static_cast<std::uint32_t>(positions_.size()));
     positions_.push_back(position);
   }
   [[nodiscard]] const std::vector<Vector3d>& positions() const { return positions_; }
@@ -36,14 +34,9 @@ class NearPositions {
   /// Calls `visit(index)` for those within the radius.
   template <class Visit>
   void for_each_near(const Vector3d& position, const Visit& visit) const {
-    const GridCell middle = grid_cell(position, radius_);
-    for (std::int64_t i = 0; i < 27; ++i) {
-      const auto found = cells_.find(grid_key(neighbour(middle, i)));
-      if (found == cells_.end()) continue;
-      for (const std::uint32_t index : found->second) {
-        if ((positions_[index] - position).squaredNorm() < radius_ * radius_) visit(index);
-      }
-    }
+    index_.for_each_around(position, [&](std::uint32_t index) {
+      if ((positions_[index] - position).squaredNorm() < radius_ * radius_) visit(index);
+    });
   }
   [[nodiscard]] bool has_near(const Vector3d& position) const {
     bool any = false;
@@ -54,7 +47,7 @@ class NearPositions {
  private:
   double radius_;
   std::vector<Vector3d> positions_;
-  std::unordered_map<std::uint64_t, std::vector<std::uint32_t>> cells_;
+  GridIndex<std::uint32_t> index_;
 };
 
 /// The surfel of a cell: flat, as wide as those of a surface that goes on to all sides.
@@ -68,7 +61,7 @@ Surfel tile_of(const HoleCell& cell) {
   return surfel;
 }
 
-/// The map with tiles in all cells where it has nothing.
+/// The map with tiles in all cells.
 EditedMap tiled(const SurfelMap& map,
                 const std::vector<HoleCell>& cells,
                 const EditOptions& options,

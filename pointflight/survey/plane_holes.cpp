@@ -5,7 +5,6 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <map>
 #include <numbers>
 #include <optional>
 #include <utility>
@@ -58,11 +57,11 @@ struct PlaneContent {
 /// Which planes go through where.
 class PatchIndex {
  public:
-  PatchIndex(const std::vector<LargePlane>& planes, double near) : planes_(planes), near_(near) {
+  PatchIndex(const std::vector<LargePlane>& planes, double near)
+      : planes_(planes), near_(near), patches_(kNeighbourhood) {
     for (std::uint32_t plane = 0; plane < planes.size(); ++plane) {
       for (std::uint32_t i = 0; i < planes[plane].patches.size(); ++i) {
-        const Vector3d& middle = planes[plane].patches[i].middle_world;
-        cells_[grid_cell(middle, kNeighbourhood)].push_back({plane, i});
+        patches_.add(planes[plane].patches[i].middle_world, {plane, i});
       }
     }
   }
@@ -70,20 +69,15 @@ class PatchIndex {
   /// Calls `visit(plane)` once for each plane that a position lies in.
   template <class Visit>
   void for_each_plane(const Vector3d& position, const Visit& visit) const {
-    const GridCell middle = grid_cell(position, kNeighbourhood);
     std::vector<std::uint32_t> seen;
-    for (std::int64_t i = 0; i < 27; ++i) {
-      const auto found = cells_.find(neighbour(middle, i));
-      if (found == cells_.end()) continue;
-      for (const Entry& entry : found->second) {
-        if (std::ranges::find(seen, entry.plane) != seen.end()) continue;
-        const PlanePatch& patch = planes_[entry.plane].patches[entry.patch];
-        const Vector3d d = position - patch.middle_world;
-        if (std::abs(d.dot(patch.normal_world)) > near_) continue;
-        seen.push_back(entry.plane);
-        visit(entry.plane);
-      }
-    }
+    patches_.for_each_around(position, [&](const Entry& entry) {
+      if (std::ranges::find(seen, entry.plane) != seen.end()) return;
+      const PlanePatch& patch = planes_[entry.plane].patches[entry.patch];
+      const Vector3d d = position - patch.middle_world;
+      if (std::abs(d.dot(patch.normal_world)) > near_) return;
+      seen.push_back(entry.plane);
+      visit(entry.plane);
+    });
   }
 
  private:
@@ -92,7 +86,7 @@ class PatchIndex {
   };
   const std::vector<LargePlane>& planes_;
   double near_;
-  std::map<GridCell, std::vector<Entry>> cells_;
+  GridIndex<Entry> patches_;
 };
 
 std::vector<PlaneContent> contents_of(const SurfelMap& map, const std::vector<LargePlane>& planes) {

@@ -36,6 +36,7 @@ Surroundings reflecting(double reflectivity) {
 class SensorComparisonTest : public ::testing::Test {
  protected:
   SensorComparisonTest() {
+    sensor_.optics.angle_sigma_deg = 0.01;  // more takes beams across the limits of bins
     for (int i = 0; i < 3; ++i) {
       // tilted, so that rings of beams do not lie on the limits of bins
       const Pose pose{quaternion_from_rpy(0.03, 0.02, 0.4 * i), {-12.0 + 11.0 * i, 1.0, 1.5}};
@@ -65,12 +66,12 @@ class SensorComparisonTest : public ::testing::Test {
 TEST_F(SensorComparisonTest, Statistics_AModelFindsItself) {
   const SensorComparison same = against(reflecting(0.2));
   EXPECT_EQ(same.beams, 3.0 * 32768.0);
-  EXPECT_LT(same.blocked, 0.06 * same.beams);
+  EXPECT_LT(same.blocked, 0.05 * same.beams);
   EXPECT_LT(same.share_distance().modelled, 0.02);
   EXPECT_GT(same.share_distance().plain, 0.1);
   EXPECT_EQ(same.share_distance().real, 0.0);
   EXPECT_LT(same.edge_distance().modelled, 0.1);
-  EXPECT_GT(same.edge_distance().plain, 0.2);
+  EXPECT_GT(same.edge_distance().plain, 0.25);
   double real = 0.0;
   double fired = 0.0;
   for (const auto& row : same.shares) {

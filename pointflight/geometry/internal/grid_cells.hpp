@@ -2,7 +2,10 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
+#include <unordered_map>
+#include <vector>
 
 #include "pointflight/core/math.hpp"
 #include "pointflight/geometry/internal/morton.hpp"
@@ -32,5 +35,43 @@ inline std::uint64_t grid_key(const GridCell& cell) {
 inline GridCell neighbour(const GridCell& cell, std::int64_t i) {
   return {cell[0] + i % 3 - 1, cell[1] + i / 3 % 3 - 1, cell[2] + i / 9 - 1};
 }
+
+/// Low corner of a cube, m.
+inline Vector3d grid_corner(const GridCell& cell, double width) {
+  return width * Vector3d(static_cast<double>(cell[0]),
+                          static_cast<double>(cell[1]),
+                          static_cast<double>(cell[2]));
+}
+
+/// Items at positions, to be found by what they are near to while more are added.
+template <class Item>
+class GridIndex {
+ public:
+  /// Of the cubes, m.
+  explicit GridIndex(double width) : width_(width) {}
+
+  void add(const Vector3d& position, const Item& item) {
+    cells_[grid_cell(position, width_)].push_back(item);
+  }
+
+  /// Calls `visit(item)` for those in the position's cube and the 26 around it: all that are nearer
+  /// than the width, and others. The order depends on that of adding alone.
+  template <class Visit>
+  void for_each_around(const Vector3d& position, const Visit& visit) const {
+    const GridCell middle = grid_cell(position, width_);
+    for (std::int64_t i = 0; i < 27; ++i) {
+      const auto found = cells_.find(neighbour(middle, i));
+      if (found == cells_.end()) continue;
+      for (const Item& item : found->second) visit(item);
+    }
+  }
+
+ private:
+  struct Hash {
+    std::size_t operator()(const GridCell& cell) const { return grid_key(cell); }
+  };
+  double width_;
+  std::unordered_map<GridCell, std::vector<Item>, Hash> cells_;
+};
 
 }  // namespace pointflight
