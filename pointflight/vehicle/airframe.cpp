@@ -228,6 +228,8 @@ void describe(SettingsVisitor& v, VehicleSettings& s) {
   describe_solid(v, &*s.shape, s.hull_size, 100.0);
   v.value({"intensity", "", "of LiDAR returns from it", 0, 1e6}, s.intensity);
   v.value({"drag_area", "m^2", "c_d A along each body axis", 0, 100}, s.drag_area);
+  v.value({"rotational_drag", "N m s^2", "K about each body axis: torque = -K |w| w", 0, 10},
+          s.rotational_drag);
   v.section(required({"rotor", "", "all rotors are alike"}),
             [&](SettingsVisitor& w) { describe_rotor(w, s.rotor); });
   v.list(required({"rotors", "", "where they sit"}),

@@ -140,6 +140,7 @@ struct VehicleSettings {
   SolidSize hull_size = {0.3, 1.0, {0.5, 0.5, 0.2}};  ///< Of the hull.
   double intensity = 100.0;                           ///< Of LiDAR returns from it.
   Vector3d drag_area = Vector3d::Zero();              ///< c_d A along each body axis, m^2.
+  Vector3d rotational_drag = Vector3d::Zero();        ///< K_d about each body axis, N m s^2.
   RotorModel rotor;                                   ///< One for all rotors.
   /// Four or more; commands and states count them in this order.
   std::vector<RotorPlacement> rotors;

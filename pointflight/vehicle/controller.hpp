@@ -37,6 +37,8 @@ struct ControllerMemory {
   /// all of it.
   std::vector<double> rotor_shares;
   bool spins = false;  ///< The rotors that are left cannot hold a heading.
+  /// Of the rotors that are left about body z by the last commands, while it spins, kg m^2/s.
+  double rotor_momentum = 0.0;
 };
 
 /// Turns setpoints into rotor speeds. It sees the true state.

@@ -135,7 +135,9 @@ Multirotor::Rate Multirotor::rate(const RigidBodyState& body,
   rate.a_world = body.q_world_body * force / settings_.mass - Vector3d(0, 0, kGravity);
   const Vector3d momentum = settings_.inertia_diagonal.cwiseProduct(body.omega_body) +
                             Vector3d(0, 0, rotor_momentum(rotors, &RotorState::speed));
-  rate.torque_body = torque - body.omega_body.cross(momentum);
+  const Vector3d drag_torque =
+      body.omega_body.norm() * settings_.rotational_drag.cwiseProduct(body.omega_body);
+  rate.torque_body = torque - drag_torque - body.omega_body.cross(momentum);
   const Quaterniond omega(0.0, body.omega_body.x(), body.omega_body.y(), body.omega_body.z());
   rate.q_dot = 0.5 * (body.q_world_body * omega).coeffs();
   return rate;

@@ -23,14 +23,16 @@ struct FlightConditions {
 /// torque added):
 ///
 ///   m dv/dt = R (sum_i T_i e3 + F_rotor_drag + F_body_drag) - m g e3
-///   J dw/dt = sum_i (r_i x F_i + s_i (k_m w_i^2 + J_r dw_i/dt) e3 + s_i J_r w_i w x e3) - w x J w
+///   J dw/dt = sum_i (r_i x F_i + s_i (k_m w_i^2 + J_r dw_i/dt) e3 + s_i J_r w_i w x e3)
+///             - K_d |w| w - w x J w
 ///   d2w_i/dt2 = wn^2 (w_cmd - w_i) - 2 z wn dw_i/dt
 ///
 /// s_i is the sign of the rotor's reaction torque: a rotor with s = +1 turns in the -z sense. Drag
 /// is against the air, which moves with the wind. T_i = k_f w_i^2 C_T(J) / C_T(0), and k_m with C_P
-/// in the same way, J the advance ratio along the rotor's axis (`RotorModel`). Near the ground
-/// thrust grows by 1 / (1 - (R / 4h)^2), h the rotor's height, at least R / 2 (Cheeseman, Bennett,
-/// ARC R&M 3021, 1955).
+/// in the same way, J the advance ratio along the rotor's axis (`RotorModel`). Rotational drag is
+/// that of Mueller and D'Andrea (Relaxed hover solutions for multicopters, IJRR 35, 2016). Near the
+/// ground thrust grows by 1 / (1 - (R / 4h)^2), h the rotor's height, at least R / 2 (Cheeseman,
+/// Bennett, ARC R&M 3021, 1955).
 class Multirotor {
  public:
   /// Throws InputError if a figure is not finite or beyond what a vehicle file may say.

@@ -63,6 +63,20 @@ TEST(Multirotor, TorqueFreeSpinConservesMomentumAndEnergy) {
   EXPECT_NEAR(energy() / energy0, 1.0, 1e-11);
 }
 
+TEST(Multirotor, RotationalDragSlowsASpinAsTheClosedFormSays) {
+  VehicleSettings settings = bare();
+  settings.rotational_drag = {0.0, 0.0, 2e-4};
+  const Multirotor vehicle(settings);
+  VehicleState state = at_rest(settings);
+  state.body.omega_body = {0.0, 0.0, 30.0};
+  const std::vector<double> off(4, 0.0);
+  for (int i = 0; i < 5000; ++i) vehicle.step(state, off, 1e-3);
+  // J dw/dt = -K |w| w
+  const double expected = 30.0 / (1.0 + 2e-4 * 30.0 * 5.0 / settings.inertia_diagonal.z());
+  EXPECT_LT(expected, 25.0);
+  EXPECT_NEAR(state.body.omega_body.z(), expected, 1e-9);
+}
+
 TEST(Multirotor, RungeKuttaShowsItsOrder) {
   // everything on: lag, drag, gyroscopic torque, tumbling
   VehicleSettings settings = load_vehicle("quad_330");

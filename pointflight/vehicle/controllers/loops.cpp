@@ -9,7 +9,11 @@
 namespace pointflight {
 namespace {
 
-constexpr double kSpinningAxisRate = 0.5;  // of the attitude loop's natural frequency
+// Of the attitude loop's natural frequency and damping. The rotor across from the lost one can only
+// push, so that half of a fast loop's torque is not to be had: with 0.5 and 1 quad_330 tumbles at
+// 50 rad/s.
+constexpr double kSpinningAxisRate = 0.25;
+constexpr double kSpinningDamping = 0.2;
 // Of a spinning body's nutation, whose damping is to be right for wobbles that keep still in the
 // body as well: between -0.3 and -0.6 all shipped quadrotors that spin up are stable.
 constexpr double kDampingLead = -0.45;
@@ -63,7 +67,8 @@ std::vector<double> LoopController::update(const RigidBodyState& state,
       return self.speeds(state, demand.thrust, torque(demand), dt, memory);
     }
     [[nodiscard]] Vector3d torque(const AttitudeDemand& demand) const {
-      if (memory.spins) return self.spinning_torque(state, demand.R_world_body.col(2));
+      if (memory.spins)
+        return self.spinning_torque(state, memory.rotor_momentum, demand.R_world_body.col(2));
       return self.demanded_torque(state, demand, dt, memory);
     }
     std::vector<double> operator()(const RotorSpeedCommand& c) const { return c.speeds; }
@@ -125,9 +130,21 @@ std::vector<double> LoopController::speeds(const RigidBodyState& state,
   std::vector<double> speeds =
       rotors_fail(memory) ? mixer_.speeds_with_failed_rotors(wanted, motion, memory.rotor_shares)
                           : mixer_.speeds(wanted, motion);
+  memory.rotor_momentum = memory.spins ? momentum_of(speeds, memory.rotor_shares) : 0.0;
   memory.limits.rotors =
       std::abs(thrust_of(speeds, state, memory) - thrust) > 1e-3 * settings_.mass * kGravity;
   return speeds;
+}
+
+/// Of rotors that turn with their shares of these speeds, about body z.
+double LoopController::momentum_of(const std::vector<double>& speeds,
+                                   const std::vector<double>& shares) const {
+  double momentum = 0.0;
+  for (std::size_t i = 0; i < speeds.size(); ++i) {
+    momentum -= settings_.rotors[i].yaw_sign * settings_.rotor.inertia *
+                std::max(0.0, speeds[i] * shares[i]);
+  }
+  return momentum;
 }
 
 bool LoopController::rotors_fail(const ControllerMemory& memory) const {
@@ -146,29 +163,30 @@ double LoopController::thrust_of(const std::vector<double>& commands,
 }
 
 /// The axis follows a rate that falls with its angle to b3, w_d = k e, by J c (w_d - w), and a body
-/// that spins at r has to be made to precess: J_z r (w_d x z). Both errors die out, with rates k
-/// and c, however fast it spins. To the rotors what stands still in the world turns at -r: the
-/// torque is turned ahead by their phase at that. Damping has to suit nutation, which turns at
-/// (J_z / J - 1) r in the body, and wobbles that do not. (Primary-axis control as in Sun, Sijbers,
-/// Wang, de Visser, High-speed flight of quadrotor despite loss of single rotor, RA-L 2018, here
-/// for a body that is about round.)
+/// that spins at r has to be made to precess: H (w_d x z), H = J_z r + h, h of the rotors, which
+/// turn against the spin. Both errors die out, with rates k and c, however fast it spins. To the
+/// rotors what stands still in the world turns at -r: the torque is turned ahead by their phase at
+/// that. Damping has to suit nutation, which turns at H / J - r in the body, and wobbles that do
+/// not. (Primary-axis control as in Sun, Sijbers, Wang, de Visser, High-speed flight of quadrotor
+/// despite loss of single rotor, RA-L 2018, here for a body that is about round.)
 Vector3d LoopController::spinning_torque(const RigidBodyState& state,
+                                         double rotor_momentum,
                                          const Vector3d& b3_world) const {
   const Vector3d b3 = state.q_world_body.conjugate() * b3_world;
   const double sine = std::hypot(b3.x(), b3.y());
   const Vector3d axis =
       sine > 1e-9 ? Vector3d(-b3.y() / sine, b3.x() / sine, 0.0) : Vector3d::UnitX();
   const double wn = attitude_frequency().x();
-  const double c = 2.0 * attitude_damping().x() * wn;
+  const double c = kSpinningDamping * 2.0 * attitude_damping().x() * wn;
   const Vector3d wanted = kSpinningAxisRate * wn * math::atan2(sine, b3.z()) * axis;
   const Vector3d& inertia = settings_.inertia_diagonal;
   const double r = state.omega_body.z();
   const double round = 0.5 * (inertia.x() + inertia.y());
+  const double momentum = inertia.z() * r + rotor_momentum;
   const Vector3d moving =
-      c * inertia.cwiseProduct(wanted) + inertia.z() * r * wanted.cross(Vector3d::UnitZ());
+      c * inertia.cwiseProduct(wanted) + momentum * wanted.cross(Vector3d::UnitZ());
   const Vector3d damping = -c * inertia.cwiseProduct(state.omega_body);
-  const Vector3d torque =
-      ahead(moving, -r) + ahead(damping, kDampingLead * (inertia.z() / round - 1.0) * r);
+  const Vector3d torque = ahead(moving, -r) + ahead(damping, kDampingLead * (momentum / round - r));
   return {torque.x(), torque.y(), 0.0};
 }
 

@@ -32,6 +32,7 @@ class LoopController : public Controller {
   /// Torque (N m, body) that turns the thrust's axis to `b3_world` while the body spins about it,
   /// as one that has lost a rotor does.
   [[nodiscard]] Vector3d spinning_torque(const RigidBodyState& state,
+                                         double rotor_momentum,
                                          const Vector3d& b3_world) const;
 
   [[nodiscard]] const VehicleSettings& settings() const { return settings_; }
@@ -54,6 +55,8 @@ class LoopController : public Controller {
                                   double specific_thrust,
                                   const Vector3d& jerk_world,
                                   double yaw_rate) const;
+  [[nodiscard]] double momentum_of(const std::vector<double>& speeds,
+                                   const std::vector<double>& shares) const;
   [[nodiscard]] Vector3d ahead(const Vector3d& torque, double rate) const;
   [[nodiscard]] Vector3d position_loop(const RigidBodyState& state,
                                        const PositionCommand& command,
