@@ -25,9 +25,31 @@ struct LidarFlags {
   bool force = false;
 };
 
+nlohmann::ordered_json json_of(const GroundsSettings& grounds) {
+  return {{"pattern", to_string(grounds.pattern)},
+          {"ranges", to_string(grounds.ranges)},
+          {"range_noise", to_string(grounds.range_noise)},
+          {"direction_noise", to_string(grounds.direction_noise)},
+          {"beam_width", to_string(grounds.beam_width)}};
+}
+
 void list_lidars(const LidarFlags& flags) {
   nlohmann::ordered_json json = nlohmann::ordered_json::array();
-  for (const std::string& name : model_names("lidars")) {
+  const std::vector<std::string> names = model_names("lidars");
+  if (!flags.json) {
+    fmt::print("{:<15} {:<8} {:>7} {:>7}   {:<8}  {:<8}  {:<8}  {:<9}  {:<8}  {}\n",
+               "name",
+               "kind",
+               "Hz",
+               "m",
+               "pattern",
+               "ranges",
+               "noise",
+               "direction",
+               "width",
+               "what its figures rest on (columns 5 to 9), and what it is");
+  }
+  for (const std::string& name : names) {
     const LidarSettings s = load_lidar(name);
     if (flags.json) {
       json.push_back({{"name", name},
@@ -35,14 +57,20 @@ void list_lidars(const LidarFlags& flags) {
                       {"pattern", to_string(s.pattern)},
                       {"rate", s.rate},
                       {"range_max", s.range_max},
+                      {"grounds", json_of(s.grounds)},
                       {"path", s.path}});
       continue;
     }
-    fmt::print("{:<16}  {:<9} {:>5.1f} Hz  {:>5.1f} m  {}\n",
+    fmt::print("{:<15} {:<8} {:>7.1f} {:>7.1f}   {:<8}  {:<8}  {:<8}  {:<9}  {:<8}  {}\n",
                name,
                to_string(s.pattern),
                s.rate,
                s.range_max,
+               to_string(s.grounds.pattern),
+               to_string(s.grounds.ranges),
+               to_string(s.grounds.range_noise),
+               to_string(s.grounds.direction_noise),
+               to_string(s.grounds.beam_width),
                s.title);
   }
   if (flags.json) print_json(json);
@@ -58,6 +86,7 @@ nlohmann::ordered_json json_of(const picture::ScanStatistics& scan) {
   json["elevation_deg"] = {scan.elevation_min, scan.elevation_max};
   json["spacing_along_ring_deg"] = scan.along_ring;
   json["spacing_nearest_deg"] = scan.nearest;
+  if (scan.blocked > 0.0) json["blocked"] = scan.blocked;
   if (scan.between_rings) {
     json["spacing_between_rings_deg"] = {scan.between_rings->first, scan.between_rings->second};
   }
@@ -89,6 +118,30 @@ void print_statistics(const LidarSettings& s, const picture::ScanStatistics& sca
                                               fixed_text(scan.between_rings->second, 3))
                                 : std::string(),
              fixed_text(scan.nearest, 3));
+  if (scan.blocked > 0.0) {
+    fmt::print("# in the way: what carries it takes {:.1f} % of the beams, on average\n",
+               100.0 * scan.blocked);
+  }
+}
+
+/// What nobody measured or published.
+void print_grounds(const GroundsSettings& grounds) {
+  const std::pair<const char*, Ground> all[] = {{"pattern", grounds.pattern},
+                                                {"ranges", grounds.ranges},
+                                                {"range noise", grounds.range_noise},
+                                                {"direction noise", grounds.direction_noise},
+                                                {"beam width", grounds.beam_width}};
+  std::string said;
+  for (const Ground ground :
+       {Ground::kMeasured, Ground::kSheet, Ground::kQuoted, Ground::kAssumed}) {
+    std::string names;
+    for (const auto& [name, its] : all) {
+      if (its == ground) names += (names.empty() ? "" : ", ") + std::string(name);
+    }
+    if (names.empty()) continue;
+    said += fmt::format("{}{}: {}", said.empty() ? "" : "; ", to_string(ground), names);
+  }
+  fmt::print("# figures: {}\n", said);
 }
 
 void print_cost(const LidarCostClass& cost) {
@@ -132,6 +185,7 @@ void show_lidar(const LidarFlags& flags) {
     fmt::print("# {}\n", s.path);
     print_statistics(s, scan);
     print_cost(cost);
+    print_grounds(s.grounds);
     SettingsWriter writer;
     describe(writer, s);
     fmt::print("{}", writer.text());

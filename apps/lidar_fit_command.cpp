@@ -9,7 +9,9 @@
 #include "apps/cli.hpp"
 #include "apps/commands.hpp"
 #include "apps/flags.hpp"
+#include "apps/lidar_blockage.hpp"
 #include "apps/settings_json.hpp"
+#include "apps/surroundings_flags.hpp"
 #include "apps/survey_flags.hpp"
 #include "apps/terminal.hpp"
 #include "pointflight/core/constants.hpp"
@@ -27,6 +29,9 @@ constexpr double kRestless = 1.5;  // `SensorFit::unrest` from here on is said
 
 struct SensorFitFlags {
   std::string input;
+  std::string map;
+  ScansFlags posed;
+  Surroundings surroundings;
   std::string like;
   std::string topic;
   std::int64_t scans = 100;
@@ -38,6 +43,21 @@ struct SensorFitFlags {
   int threads = 0;
 };
 
+/// A figure with its standard error, or what it would have to be to show.
+void print_sigma(const char* name, const FittedSigma& fitted, double scale, const char* unit) {
+  if (fitted.shows()) {
+    fmt::print(
+        "{:<16} {:.3g} ± {:.1g} {}\n", name, scale * fitted.sigma, scale * fitted.error, unit);
+  } else if (std::isfinite(fitted.error)) {
+    fmt::print("{:<16} does not show: less than {:.2g} {}\n",
+               name,
+               scale * (fitted.sigma + 2.0 * fitted.error),
+               unit);
+  } else {
+    fmt::print("{:<16} does not show\n", name);
+  }
+}
+
 void print_fit_of(const SensorFit& fit) {
   fmt::print("{} scans, {} returns; noise on {} flat patches of {:g} degrees with {} of them\n",
              fit.scans,
@@ -45,10 +65,11 @@ void print_fit_of(const SensorFit& fit) {
              fit.patches,
              fit.patch_deg,
              short_count(static_cast<double>(fit.on_patches)));
-  fmt::print("range noise      {:.2f} mm\n", 1e3 * fit.range_sigma);
-  fmt::print("direction noise  {:.4f} deg about each of two axes{}\n",
-             fit.angle_sigma / kDegree,
-             fit.angle_sigma > 0.0 ? "" : " (it does not show)");
+  print_sigma("range noise", fit.noise.range, 1e3, "mm");
+  print_sigma("direction noise", fit.noise.angle, 1.0 / kDegree, "deg about each of two axes");
+  print_sigma(
+      "at the limit", fit.noise.at_limit, 1e3, "mm more where signals are at their weakest");
+  if (fit.turn) print_sigma("ring offsets", fit.ring_offset, 1e3, "mm from ring to ring");
   fmt::print("range step       {}\n",
              fit.range_step > 0.0 ? fmt::format("{:g} mm", 1e3 * fit.range_step) : "none");
   if (fit.rate) fmt::print("rate             {:.3f} scans per second\n", *fit.rate);
@@ -60,7 +81,7 @@ void print_fit_of(const SensorFit& fit) {
                fit.turn->cycle_us);
   }
   fmt::print("\n range (m)   incidence (deg)   noise (mm)   fitted (mm)   points\n");
-  for (const NoiseBin& bin : fit.noise) {
+  for (const NoiseBin& bin : fit.bins) {
     fmt::print(
         "{:>4g} to {:<4.0f}      {:>2.0f} to {:<2.0f}      {:>8.2f}      {:>8.2f}     {:>7}\n",
         bin.range_from,
@@ -68,7 +89,7 @@ void print_fit_of(const SensorFit& fit) {
         bin.incidence_from / kDegree,
         bin.incidence_to / kDegree,
         1e3 * bin.sigma,
-        1e3 * std::hypot(fit.range_sigma, fit.angle_sigma * bin.tangent),
+        1e3 * bin.fitted,
         short_count(static_cast<double>(bin.points)));
   }
   if (!fit.turn) return;
@@ -88,25 +109,31 @@ nlohmann::ordered_json json_of(const SensorFit& fit) {
   json["scans"] = fit.scans;
   json["points"] = fit.points;
   json["patches"] = fit.patches;
-  json["range_sigma"] = fit.range_sigma;
-  json["angle_sigma_deg"] = fit.angle_sigma / kDegree;
+  json["range_sigma"] = fit.noise.range.sigma;
+  json["range_sigma_error"] = fit.noise.range.error;
+  json["angle_sigma_deg"] = fit.noise.angle.sigma / kDegree;
+  json["angle_sigma_error_deg"] = fit.noise.angle.error / kDegree;
+  json["range_sigma_at_limit"] = fit.noise.at_limit.sigma;
+  json["range_sigma_at_limit_error"] = fit.noise.at_limit.error;
   json["range_step"] = fit.range_step;
   json["range"] = {fit.range_min, fit.range_max};
   json["unrest"] = fit.unrest;
   if (fit.rate) json["rate"] = *fit.rate;
-  for (const NoiseBin& bin : fit.noise) {
+  for (const NoiseBin& bin : fit.bins) {
     json["noise"].push_back(
         {{"range", {bin.range_from, bin.range_to}},
          {"incidence_deg", {bin.incidence_from / kDegree, bin.incidence_to / kDegree}},
          {"sigma", bin.sigma},
-         {"fitted", std::hypot(fit.range_sigma, fit.angle_sigma * bin.tangent)},
+         {"fitted", bin.fitted},
          {"patches", bin.patches},
          {"points", bin.points}});
   }
   if (!fit.turn) return json;
   json["turn"] = {{"rate", fit.turn->rate},
                   {"clockwise", fit.turn->is_clockwise},
-                  {"cycle_us", fit.turn->cycle_us}};
+                  {"cycle_us", fit.turn->cycle_us},
+                  {"ring_offset_sigma", fit.ring_offset.sigma},
+                  {"ring_offset_sigma_error", fit.ring_offset.error}};
   for (const RingFit& ring : fit.turn->rings) {
     json["turn"]["rings"].push_back({{"ring", ring.ring},
                                      {"elevation_deg", ring.elevation_deg},
@@ -170,11 +197,27 @@ void write_sensor(const SensorFitFlags& flags, const SensorFit& fit) {
 }
 
 void fit_lidar(const SensorFitFlags& flags) {
+  if (!flags.map.empty()) {
+    ScansFlags posed = flags.posed;
+    posed.files.scans = flags.input;
+    posed.files.time_unit = flags.time_unit;
+    posed.scan_topic = flags.topic;
+    fit_blockage_of({posed,
+                     flags.map,
+                     flags.like,
+                     flags.surroundings,
+                     flags.output,
+                     flags.png,
+                     flags.json,
+                     flags.force,
+                     flags.threads});
+    return;
+  }
   check_outputs({flags.output, flags.png}, {flags.input}, flags.force);
   if (!flags.output.empty() && !flags.output.ends_with(".yaml")) {
     throw InputError(fmt::format("-o {}: a sensor file ends in .yaml", flags.output));
   }
-  if (!flags.like.empty()) static_cast<void>(load_lidar(flags.like));
+  const LidarSettings like = flags.like.empty() ? LidarSettings{} : load_lidar(flags.like);
   const Progress progress = interruptible_progress();
   const auto source = open_scans(flags.input, flags.topic, progress);
   std::vector<RecordedScan> scans =
@@ -184,7 +227,8 @@ void fit_lidar(const SensorFitFlags& flags) {
   if (!said.empty()) log(said);
   const SensorFit fit = [&] {
     try {
-      return fit_sensor(scans, Executor(flags.threads), progress);
+      return fit_sensor(
+          scans, Executor(flags.threads), progress, like.detection, flags.surroundings.sun_klx);
     } catch (const InputError& error) {
       throw InputError(fmt::format("{}: {}", flags.input, error.what()));
     }
@@ -218,8 +262,10 @@ void fit_lidar(const SensorFitFlags& flags) {
 }  // namespace
 
 void add_lidar_fit_command(CLI::App& parent) {
-  auto* app = parent.add_subcommand(
-      "fit", "Noise, rate and rings of your own sensor, from scans that it took standing still");
+  auto* app = parent.add_subcommand("fit",
+                                    "Noise, rate and rings of your own sensor, from scans that it "
+                                    "took standing still; with --map "
+                                    "what is in its way, from scans with poses");
   auto flags = std::make_shared<SensorFitFlags>();
   app->add_option("input",
                   flags->input,
@@ -231,6 +277,27 @@ void add_lidar_fit_command(CLI::App& parent) {
                   flags->topic,
                   "Topic of the clouds in a recording (PointCloud2, CustomMsg); needed only if "
                   "there are several");
+  auto* map =
+      app->add_option(
+             "--map",
+             flags->map,
+             "Map (.pfmap) of what the scans saw: finds in which directions what carries the "
+             "sensor blocks its beams (with --poses, --like)")
+          ->check(CLI::ExistingFile);
+  app->add_option("--poses", flags->posed.files.poses, "Poses of a folder's clouds: TUM or KITTI")
+      ->check(CLI::ExistingFile)
+      ->needs(map);
+  app->add_option("--pose-topic", flags->posed.pose_topic, "Topic of the poses in a recording")
+      ->needs(map);
+  app->add_option("--sensor-pose",
+                  flags->posed.sensor_pose,
+                  "x,y,z,roll,pitch,yaw of the sensor in the frame that the poses are of (m, deg)")
+      ->needs(map);
+  app->add_flag("--deskewed",
+                flags->posed.files.is_deskewed,
+                "Ignore times of points: motion within the scans was compensated already")
+      ->needs(map);
+  for (CLI::Option* option : add_surroundings_flags(*app, flags->surroundings)) option->needs(map);
   app->add_option("--scans", flags->scans, "Use at most this many scans, from the first")
       ->check(CLI::Range(1, 100000))
       ->capture_default_str();
@@ -246,7 +313,10 @@ void add_lidar_fit_command(CLI::App& parent) {
   app->add_flag("--json", flags->json, "JSON on stdout");
   add_force_flag(*app, flags->force);
   app->add_option("--threads", flags->threads, "0: all cores")->check(CLI::Range(0, 1024));
-  app->footer("Example: pointflight lidar fit still.mcap --like mid360 -o mine.yaml");
+  app->footer(
+      "Examples:\n  pointflight lidar fit still.mcap --like mid360 -o mine.yaml\n  pointflight "
+      "lidar "
+      "fit scans/ --map place.pfmap --poses poses.tum --like os0_64_2048 -o carried.yaml");
   app->callback([flags] { fit_lidar(*flags); });
 }
 

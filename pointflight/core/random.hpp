@@ -41,6 +41,7 @@ enum class StreamId : std::uint32_t {
   kStudy = 30,            ///< values drawn for a campaign; entity: key, index: draw
   kLeftOutPoints = 31,    ///< entity: 0 positions, index: try; 1, 2 ends of rays: point
   kLidarOffset = 32,      ///< of ranges; entity: vehicle << 8 | lidar, index: 0 all, 1 + ring
+  kLidarBlockage = 33,    ///< entity: vehicle << 8 | lidar, index: second of the run
   kTest = 1000,           ///< inputs of tests and benchmarks
 };
 

@@ -7,6 +7,7 @@
 
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/math.hpp"
+#include "pointflight/fidelity/real_beams.hpp"
 #include "pointflight/fidelity/sensor_lines.hpp"
 #include "pointflight/geometry/internal/point_tree-inl.hpp"
 #include "pointflight/lidar/lidar.hpp"
@@ -14,18 +15,15 @@
 namespace pointflight {
 namespace {
 
-constexpr double kCell = 5.0;         // deg, of directions
-constexpr std::size_t kColumns = 72;  // of cells
-constexpr std::size_t kRows = 36;
-constexpr double kBlocked = 0.15;        // share of returns below which a direction is
-constexpr double kLeastQuantile = 1e-3;  // of real ranges: nothing is reported from nearer
-constexpr double kMargin = 0.1;          // m, of what is too near
-constexpr double kOffPlane = 0.3;        // m
-constexpr double kLeastWidth = 0.1;      // deg, about lines
+constexpr double kBlocked = 0.15;    // share of returns below which a direction is
+constexpr double kMargin = 0.1;      // m, of what is too near
+constexpr double kOffPlane = 0.3;    // m
+constexpr double kLeastWidth = 0.1;  // deg, about lines
 constexpr double kFwhmPerSigma = 2.3548;
-constexpr std::size_t kRim = 8;       // lines around a beam
-constexpr double kBesideEdge = 0.03;  // rad
-constexpr double kOffMap = 0.15;      // m: farther off is something else
+constexpr std::chrono::seconds kApart{10};  // of scans: what is in the way differs
+constexpr std::size_t kRim = 8;             // lines around a beam
+constexpr double kBesideEdge = 0.03;        // rad
+constexpr double kOffMap = 0.15;            // m: farther off is something else
 
 /// Beams of one scan that were given.
 class GivenBeams : public BeamPattern {
@@ -40,15 +38,6 @@ class GivenBeams : public BeamPattern {
  private:
   std::vector<Beam> beams_;
 };
-
-std::size_t cell_of(const Vector3f& direction_sensor) {
-  const Vector3d d = direction_sensor.cast<double>();
-  const double azimuth = math::atan2(d.y(), d.x()) / kDegree + 180.0;
-  const double elevation = math::asin(std::clamp(d.z(), -1.0, 1.0)) / kDegree + 90.0;
-  const auto column = std::min(static_cast<std::size_t>(azimuth / kCell), kColumns - 1);
-  const auto row = std::min(static_cast<std::size_t>(elevation / kCell), kRows - 1);
-  return row * kColumns + column;
-}
 
 template <class Limits>
 std::size_t bin_of(const Limits& limits, double value) {
@@ -69,25 +58,6 @@ ReturnShare* share_of(SensorComparison& made, const Hit& hit) {
                SensorComparison::kIncidences.size() - 1);
   return &made.shares[range - 1][incidence - 1];
 }
-
-double least_range_of(const std::vector<RealScan>& scans) {
-  std::vector<float> ranges;
-  for (const RealScan& scan : scans) {
-    for (const SurveyRay& ray : scan.rays) ranges.push_back(ray.range);
-  }
-  if (ranges.empty()) return 0.0;
-  const auto at = ranges.begin() +
-                  static_cast<std::ptrdiff_t>(kLeastQuantile * static_cast<double>(ranges.size()));
-  std::nth_element(ranges.begin(), at, ranges.end());
-  return static_cast<double>(*at);
-}
-
-/// The beams that real returns came along.
-struct RealBeams {
-  std::vector<Vector3f> origins_sensor;
-  std::vector<Vector3f> directions_sensor;
-  std::vector<float> ranges;
-};
 
 /// How far real returns lie off the map where there is no edge: what noise, poses and map make of a
 /// range.
@@ -140,7 +110,8 @@ class Counter {
         surroundings_(surroundings),
         renderer_(renderer),
         executor_(executor),
-        modelled_(lidar, 0, nullptr, surroundings) {
+        modelled_(lidar, 0, nullptr, surroundings),
+        origins_(modelled_, scans.size(), executor) {
     settings_.detection.returns = lidar.detection.returns == ReturnMode::kFirst ||
                                           lidar.detection.returns == ReturnMode::kLast
                                       ? lidar.detection.returns
@@ -161,46 +132,22 @@ class Counter {
   [[nodiscard]] const SensorComparison& made() const { return made_; }
 
  private:
+  /// Where next to nothing comes back, unless the sensor's file says what is in its way.
   void find_blocked() {
-    std::vector<double> fired(kColumns * kRows);
-    std::vector<double> real(fired.size());
-    origins_.resize(fired.size(), Vector3f::Zero());
-    for (std::size_t i = 0; i < scans_.size(); ++i) {
-      for (const Beam& beam : modelled_.beams(modelled_.pattern_scan(i, 0), executor_)) {
-        const std::size_t cell = cell_of(beam.direction_sensor);
-        fired[cell] += 1.0;
-        origins_[cell] += beam.origin_sensor;
-        made_.beams += 1.0;
-      }
-    }
-    for (std::size_t i = 0; i < fired.size(); ++i) {
-      if (fired[i] > 0.0) origins_[i] /= static_cast<float>(fired[i]);
-    }
+    std::vector<double> real(DirectionCells::kCount);
     for (const RealScan& scan : scans_) {
-      for (const Vector3f& direction : beams_of(scan).directions_sensor) {
-        real[cell_of(direction)] += 1.0;
+      for (const Vector3f& direction : origins_.of(scan).directions_sensor) {
+        real[DirectionCells::of(direction)] += 1.0;
       }
       made_.returns += scan.rays.size();
     }
-    blocked_.resize(fired.size());
-    for (std::size_t i = 0; i < fired.size(); ++i) {
-      blocked_[i] = real[i] < kBlocked * fired[i];
-      if (blocked_[i]) made_.blocked += fired[i];
+    made_.beams = origins_.beams();
+    blocked_.resize(DirectionCells::kCount);
+    if (!settings_.blocked.empty()) return;
+    for (std::size_t i = 0; i < blocked_.size(); ++i) {
+      blocked_[i] = real[i] < kBlocked * origins_.fired(i);
+      if (blocked_[i]) made_.blocked += origins_.fired(i);
     }
-  }
-
-  /// Where beams leave the sensor changes little within a cell.
-  [[nodiscard]] RealBeams beams_of(const RealScan& scan) const {
-    RealBeams real;
-    for (std::size_t i = 0; i < scan.rays.size(); ++i) {
-      const Vector3f point = scan.point_sensor(i);
-      const Vector3f& origin = origins_[cell_of(point.normalized())];
-      const Vector3f way = point - origin;
-      real.origins_sensor.push_back(origin);
-      real.ranges.push_back(way.norm());
-      real.directions_sensor.push_back(way / real.ranges.back());
-    }
-    return real;
   }
 
   [[nodiscard]] std::vector<Hit> lines(const Pose& T_world_sensor,
@@ -211,10 +158,17 @@ class Counter {
         T_world_sensor, origins_sensor, directions_sensor, far, renderer_, executor_);
   }
 
+  /// True if a line that comes back from whatever it hits within the sensor's range does.
+  [[nodiscard]] bool is_seen(const Hit& hit) const {
+    const auto range = static_cast<double>(hit.range);
+    return range >= made_.least_range && range <= settings_.range_max;
+  }
+
   void count_returns(std::size_t scan) {
     const Pose& pose = scans_[scan].T_world_sensor;
     ScanRequest request;
     request.index = scan;
+    request.start = SimTime(kApart * scan);
     const std::vector<Beam> beams = modelled_.beams(modelled_.pattern_scan(scan, 0), executor_);
     std::vector<Vector3f> origins;
     std::vector<Vector3f> directions;
@@ -225,23 +179,24 @@ class Counter {
     const std::vector<Hit> fired = lines(pose, origins, directions);
     std::vector<ReturnShare*> of_beam(beams.size());
     for (std::size_t i = 0; i < beams.size(); ++i) {
-      if (blocked_[cell_of(directions[i])]) continue;
+      if (fired[i].is_return() && is_seen(fired[i])) made_.back.plain += 1.0;
+      if (blocked_[DirectionCells::of(directions[i])]) continue;
       of_beam[i] = share_of(made_, fired[i]);
       if (of_beam[i] == nullptr) continue;
       of_beam[i]->beams += 1.0;
-      if (static_cast<double>(fired[i].range) <= settings_.range_max) {
-        of_beam[i]->returns.plain += 1.0;
-      }
+      if (is_seen(fired[i])) of_beam[i]->returns.plain += 1.0;
     }
     const Scan modelled = modelled_.take(request, PoseTrack(pose), renderer_, executor_);
     for (const ScanPoint& point : modelled.points) {
-      ReturnShare* share = of_beam[point.beam];
-      if (share != nullptr && point.echo == 0) share->returns.modelled += 1.0;
+      if (point.echo != 0) continue;
+      if (static_cast<double>(point.range) >= made_.least_range) made_.back.modelled += 1.0;
+      if (ReturnShare* share = of_beam[point.beam]) share->returns.modelled += 1.0;
     }
-    const RealBeams real = beams_of(scans_[scan]);
+    const RealBeams real = origins_.of(scans_[scan]);
+    made_.back.real += static_cast<double>(real.ranges.size());
     const std::vector<Hit> met = lines(pose, real.origins_sensor, real.directions_sensor);
     for (std::size_t i = 0; i < met.size(); ++i) {
-      const bool blocked = blocked_[cell_of(real.directions_sensor[i])];
+      const bool blocked = blocked_[DirectionCells::of(real.directions_sensor[i])];
       ReturnShare* share = blocked ? nullptr : share_of(made_, met[i]);
       if (share != nullptr) share->returns.real += 1.0;
     }
@@ -292,7 +247,7 @@ class Counter {
 
   void count_edges(std::size_t scan) {
     const RealScan& real = scans_[scan];
-    const RealBeams all = beams_of(real);
+    const RealBeams all = origins_.of(real);
     const std::vector<Hit> middles =
         lines(real.T_world_sensor, all.origins_sensor, all.directions_sensor);
     const std::vector<bool> edges = at_edges(real.T_world_sensor, all, middles);
@@ -314,6 +269,7 @@ class Counter {
     const auto count = [&](double Sides::*side, const std::optional<Surroundings>& surroundings) {
       LidarSettings settings = settings_;
       settings.noise = {};  // it is in what is added
+      settings.blocked.clear();
       const Lidar lidar(settings, 0, beams, surroundings);
       ScanRequest request;
       request.index = scan;
@@ -338,8 +294,8 @@ class Counter {
   const Executor& executor_;
   Lidar modelled_;
   float radius_ = 0.0f;  // tangent of what a beam's edge is off its middle
-  std::vector<bool> blocked_;
-  std::vector<Vector3f> origins_;  // of beams, mean of each cell, m in the sensor frame
+  BeamOrigins origins_;
+  std::vector<bool> blocked_;  // by cell of directions
   SensorComparison made_;
 };
 

@@ -52,6 +52,7 @@ struct SensorComparison {
   /// what noise, poses and map make of a range.
   std::array<Sides, kErrors.size() + 1> edges{};
   double beams = 0.0;         ///< That the sensor fired, in all scans.
+  Sides back;                 ///< Of these: how many came back from `least_range` on.
   double blocked = 0.0;       ///< Of these: in directions where next to nothing ever comes back.
   double least_range = 0.0;   ///< m: nothing is reported from nearer.
   std::uint64_t returns = 0;  ///< Of the real scans.
@@ -71,7 +72,8 @@ struct SensorComparison {
 /// beam's width hits something more than 0.3 m off the plane that others hit. Real scans must be
 /// whole and of that sensor: beams without a return are those of the pattern that the scan lacks.
 /// Directions in which next to nothing comes back over all scans (what carries the sensor) are left
-/// out, ranges below the real scans' least as well. The pattern is of a sensor that stands still,
+/// out of the shares unless the sensor's file says what is in its way (`LidarSettings::blocked`),
+/// ranges below the real scans' least as well. The pattern is of a sensor that stands still,
 /// which changes shares by how much it turns meanwhile.
 SensorComparison compare_sensor(const std::vector<RealScan>& scans,
                                 const LidarSettings& lidar,

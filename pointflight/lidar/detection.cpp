@@ -67,6 +67,13 @@ void describe(SettingsVisitor& v, DetectionSettings& s) {
   v.value({"probability", "", "of a return at the rated ranges", 0.01, 0.999}, s.probability);
   v.value({"false_alarm", "", "share of beams that report what is not there", 0, 0.1},
           s.false_alarm);
+  v.value({"air_filter",
+           "",
+           "share of returns of fog, dust and drops that the sensor itself tells from surfaces and "
+           "takes out",
+           0,
+           1},
+          s.air_filter);
   v.list({"near", "", "what is seen of signals from nearer than the receiver is made for"},
          s.near,
          [](SettingsVisitor& w, NearShare& near) {

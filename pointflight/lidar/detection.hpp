@@ -48,6 +48,7 @@ struct DetectionSettings {
   std::vector<RatedRange> rated;  ///< None: whatever a beam hits comes back.
   double probability = 0.5;       ///< Of a return at the rated ranges.
   double false_alarm = 1e-4;      ///< Share of beams that report what is not there.
+  double air_filter = 0.0;        ///< Share of returns of fog, dust and drops that it takes out.
   /// By ascending range; straight lines between, the first one's share below, all beyond.
   std::vector<NearShare> near;
   double range_limit = 0.0;  ///< m, nothing farther is reported however bright; 0: no limit.

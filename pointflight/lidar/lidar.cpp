@@ -48,6 +48,9 @@ Lidar::Lidar(const LidarSettings& settings,
       footprint_(settings.optics),
       measures_depth_(settings.pattern == ScanPattern::kGrid &&
                       settings.grid.projection == GridProjection::kPinhole) {
+  if (!settings.blocked.empty()) {
+    blockage_ = std::make_shared<const Blockage>(read_blocked_sectors(settings));
+  }
   if (!surroundings) return;
   returns_.emplace(settings, *surroundings);
   if (measures_depth_ && settings.grid.stereo.baseline > 0.0) stereo_.emplace(settings);
@@ -195,6 +198,7 @@ class Lidar::OneScan : public Exposure {
     Received received = is_wide_
                             ? lidar_.received(aimed_, std::span<const Echoes>(echoes_), executor)
                             : lidar_.received(aimed_, std::span<const Hit>(hits_), executor);
+    lidar_.take_out_blocked(aimed_, received, executor);
     return lidar_.written(aimed_, T_world_sensor_, std::move(received), executor);
   }
 

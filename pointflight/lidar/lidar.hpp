@@ -6,6 +6,7 @@
 #include "pointflight/core/parallel.hpp"
 #include "pointflight/geometry/motion.hpp"
 #include "pointflight/lidar/beam_pattern.hpp"
+#include "pointflight/lidar/blockage.hpp"
 #include "pointflight/lidar/exposure.hpp"
 #include "pointflight/lidar/footprint.hpp"
 #include "pointflight/lidar/lidar_settings.hpp"
@@ -42,7 +43,8 @@ class Lidar {
   /// `sensor` numbers it within the run: the entity of its random streams. LiDARs of the same
   /// settings may share their beams; null: it has its own. With `surroundings` returns are modelled
   /// (`ReturnModel`, `Footprint`, directions with noise); without, whatever a beam hits within the
-  /// sensor's range comes back with the map's intensity and Gaussian noise of the range.
+  /// sensor's range comes back with the map's intensity and Gaussian noise of the range. Throws
+  /// InputError if the file of what is blocked cannot be read.
   Lidar(const LidarSettings& settings,
         std::uint32_t sensor,
         std::shared_ptr<const ScanBeams> beams = nullptr,
@@ -92,6 +94,9 @@ class Lidar {
   void add_direction_noise(Aimed& aimed, const Executor& executor) const;
   [[nodiscard]] RayBatch batch_of(const Aimed& aimed) const;
 
+  struct Received;
+  void take_out_blocked(const Aimed& aimed, Received& received, const Executor& executor) const;
+
   /// What came back of a scan's beams.
   struct Received {
     std::vector<Return> returns;         ///< `most` for each beam, in its order.
@@ -130,6 +135,7 @@ class Lidar {
   std::shared_ptr<const ScanBeams> beams_;
   std::optional<ReturnModel> returns_;
   Footprint footprint_;
+  std::shared_ptr<const Blockage> blockage_;  ///< Null: nothing is blocked.
   std::optional<StereoCamera> stereo_;
   bool measures_depth_ = false;  ///< Limits and noise are of the depth along the axis.
 };

@@ -338,6 +338,22 @@ Lidar::Received Lidar::received(const Aimed& aimed,
   return made;
 }
 
+/// Beams that do not leave the sensor's carrier bring nothing back.
+void Lidar::take_out_blocked(const Aimed& aimed,
+                             Received& received,
+                             const Executor& executor) const {
+  if (blockage_ == nullptr) return;
+  const ScanRequest& request = aimed.request;
+  const double level = request.noise ? blockage_level(request.seed, sensor_, request.start) : 0.5;
+  const std::vector<Beam>& beams = aimed.beams();
+  executor.parallel_for(beams.size(), kReturnsPerChunk, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      if (blockage_->share(beams[i].direction_sensor) <= level) continue;
+      for (std::size_t k = 0; k < received.most; ++k) received.returns[i * received.most + k] = {};
+    }
+  });
+}
+
 /// The returns as points.
 Scan Lidar::written(const Aimed& aimed,
                     const PoseTrack& T_world_sensor,

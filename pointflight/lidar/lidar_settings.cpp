@@ -23,6 +23,18 @@ constexpr Named<RingConvention> kConventions[] = {{RingConvention::kVelodyne, "v
                                                   {RingConvention::kOuster, "ouster"}};
 constexpr Named<GridProjection> kProjections[] = {{GridProjection::kAngular, "angular"},
                                                   {GridProjection::kPinhole, "pinhole"}};
+constexpr Named<Ground> kGrounds[] = {{Ground::kMeasured, "measured"},
+                                      {Ground::kSheet, "sheet"},
+                                      {Ground::kQuoted, "quoted"},
+                                      {Ground::kAssumed, "assumed"}};
+
+void describe_grounds(SettingsVisitor& v, GroundsSettings& s) {
+  v.choice({"pattern", "", "directions and times of beams"}, s.pattern, kGrounds);
+  v.choice({"ranges", "", "how far it sees"}, s.ranges, kGrounds);
+  v.choice({"range_noise", "", "noise.range_sigma"}, s.range_noise, kGrounds);
+  v.choice({"direction_noise", "", "optics.angle_sigma_deg"}, s.direction_noise, kGrounds);
+  v.choice({"beam_width", "", "the optics' divergence"}, s.beam_width, kGrounds);
+}
 
 void describe_rotor(SettingsVisitor& v, RotorSettings& s) {
   v.value({"shot_rate", "Hz", "all lines fire together at this rate", 1, 1e7}, s.shot_rate);
@@ -193,6 +205,8 @@ LidarSettings read(SettingsReader& reader, const std::string& path) {
 void describe(SettingsVisitor& v, LidarSettings& s) {
   v.value({"title", "", "vendor and model"}, s.title);
   v.value({"source", "", "where the figures come from"}, s.source);
+  v.section({"grounds", "", "what its figures rest on"},
+            [&](SettingsVisitor& w) { describe_grounds(w, s.grounds); });
   v.value({"rate", "Hz", "scans per second", 0.01, 10000}, s.rate);
   v.value({"range_min",
            "m",
@@ -217,6 +231,11 @@ void describe(SettingsVisitor& v, LidarSettings& s) {
             [&](SettingsVisitor& w) { describe_optics(w, s.optics); });
   v.section({"detection", "", "which beams come back, by the sheet's ranges"},
             [&](SettingsVisitor& w) { describe(w, s.detection); });
+  v.value({"blocked",
+           "",
+           "CSV of directions in which what carries the sensor is in the way: a path from this "
+           "file's folder"},
+          s.blocked);
   Key pattern{"pattern", "", "scan principle; its figures stand in the section of this name"};
   pattern.required = true;
   v.choice(pattern, s.pattern, kPatterns);
@@ -246,6 +265,10 @@ std::string_view to_string(ScanPattern pattern) {
   return name_in(kPatterns, pattern);
 }
 
+std::string_view to_string(Ground ground) {
+  return name_in(kGrounds, ground);
+}
+
 std::string lidar_reference() {
   LidarSettings defaults;  // with one of each, so that all keys are listed
   defaults.prisms.wedges.resize(1);
@@ -268,9 +291,10 @@ std::vector<std::string*> tables_of(LidarSettings& settings) {
     table = settings.at("rings.table", [&] { return find_table("lidars", table, folder); });
     tables.push_back(&table);
   }
-  if (std::string& file = settings.csv.file; !file.empty()) {
-    file = resolve_path(file, folder);
-    tables.push_back(&file);
+  for (std::string* file : {&settings.csv.file, &settings.blocked}) {
+    if (file->empty()) continue;
+    *file = resolve_path(*file, folder);
+    tables.push_back(file);
   }
   return tables;
 }

@@ -143,19 +143,42 @@ struct OpticsSettings {
   std::int64_t sub_rays = 0;
 };
 
+/// What a figure rests on.
+enum class Ground {
+  kMeasured,  ///< On scans of the sensor or a table of its maker's that was measured or computed.
+  kSheet,     ///< Its maker's data sheet, manual, driver or SDK, read.
+  kQuoted,    ///< The sheet as others quote it.
+  kAssumed,   ///< Nobody's figure: what is likely.
+};
+
+/// As files have it: "measured", ...
+std::string_view to_string(Ground ground);
+
+/// What the figures of a sensor file rest on, by what they are of; of several the one that counts
+/// most in a scan.
+struct GroundsSettings {
+  Ground pattern = Ground::kAssumed;          ///< Directions and times of beams.
+  Ground ranges = Ground::kAssumed;           ///< How far it sees: `detection.rated`.
+  Ground range_noise = Ground::kAssumed;      ///< `noise.range_sigma`
+  Ground direction_noise = Ground::kAssumed;  ///< `optics.angle_sigma_deg`
+  Ground beam_width = Ground::kAssumed;       ///< `optics.divergence_...`
+};
+
 /// A sensor file, `data/lidars/<name>.yaml`.
 struct LidarSettings {
-  std::string path;        ///< Of the file, for messages and for files beside it.
-  std::string title;       ///< Maker and model.
-  std::string source;      ///< Where the figures come from.
-  double rate = 10.0;      ///< Scans a second.
-  double range_min = 0.1;  ///< m; nearer returns are lost (a depth camera's: depth).
+  std::string path;         ///< Of the file, for messages and for files beside it.
+  std::string title;        ///< Maker and model.
+  std::string source;       ///< Where the figures come from.
+  GroundsSettings grounds;  ///< The same in a word each.
+  double rate = 10.0;       ///< Scans a second.
+  double range_min = 0.1;   ///< m; nearer returns are lost (a depth camera's: depth).
   /// m; farther returns are lost (a depth camera's: depth), if `detection` does not say more.
   double range_max = 100.0;
   double image_resolution_deg = 0.2;          ///< theta_res of the `paper` renderer.
   RangeNoiseSettings noise;                   ///< Of every return.
   OpticsSettings optics;                      ///< Of every beam.
   DetectionSettings detection;                ///< Which beams come back.
+  std::string blocked;                        ///< CSV: `read_blocked_sectors`. Empty: nothing is.
   ScanPattern pattern = ScanPattern::kUnset;  ///< Which of the sections below counts.
   RotorSettings rotor;                        ///< Where `pattern` says so.
   PrismsSettings prisms;                      ///< Where `pattern` says so.

@@ -94,6 +94,7 @@ ReturnModel::ReturnModel(const LidarSettings& lidar, const Surroundings& surroun
                reach_),
       false_alarm_(detection_.is_ideal() ? 0.0 : lidar.detection.false_alarm),
       intensity_scale_(lidar.detection.intensity_at_100_percent),
+      air_kept_(1.0 - lidar.detection.air_filter),
       range_min_(lidar.range_min),
       mode_(lidar.detection.returns),
       sure_(sure_reflectivities()) {}
@@ -186,12 +187,13 @@ void ReturnModel::take_surface(const Echo& echo,
 
 /// What fog or a drop within `range` gives. Its margin is by the pure link budget from the darkest
 /// rated target on: sheets say nothing of signals so near and so weak, and their own law, which the
-/// sun flattens, would let a sensor see every wisp of haze.
+/// sun flattens, would let a sensor see every wisp of haze. What the sensor's filter takes out
+/// leaves the beam to what is behind it.
 Return ReturnModel::from_air(double range, const EchoChance& chance) const {
   const auto soft = weather_.soft(range, chance.drop, chance.drop_position);
   if (!soft || soft->range < range_min_) return {};
   const double margin = soft->strength / detection_.least_strength();
-  if (chance.detection >= detection_.probability(margin)) return {};
+  if (chance.detection >= air_kept_ * detection_.probability(margin)) return {};
   Return made;
   made.range = rounded(soft->range + range_sigma(soft->range, margin) * chance.normal);
   if (static_cast<double>(made.range) < range_min_) return {};

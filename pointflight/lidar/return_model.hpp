@@ -137,6 +137,7 @@ class ReturnModel : public EchoReceiver {
   Weather weather_;
   double false_alarm_ = 0.0;
   double intensity_scale_ = 0.0;
+  double air_kept_ = 1.0;  ///< Share of returns of the air that no filter takes out.
   double range_min_ = 0.0;
   ReturnMode mode_;
   std::vector<float> sure_;  ///< `SureEchoes::reflectivities`

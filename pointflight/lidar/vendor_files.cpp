@@ -155,6 +155,7 @@ LidarSettings parse_ouster_metadata(std::string_view text, const std::string& pa
                                 std::filesystem::path(path).filename().string(),
                                 base);
   settings.title = fmt::format("Ouster {} (unit's own beams, {} columns)", line, columns);
+  settings.grounds.pattern = Ground::kSheet;
   settings.path = path;
   settings.lines.clear();
   settings.rate = turns;
@@ -191,6 +192,7 @@ LidarSettings load_livox_table(const std::string& path) {
     const std::string name = std::filesystem::path(path).filename().string();
     settings.title = fmt::format("directions of {}", name);
     settings.source = fmt::format("directions: {}; range, noise, optics: as {}", name, known.base);
+    settings.grounds.pattern = Ground::kSheet;
     settings.path = path;
     settings.lines.clear();
     settings.pattern = ScanPattern::kCsv;

@@ -8,6 +8,7 @@
 
 #include "pointflight/core/constants.hpp"
 #include "pointflight/lidar/beam_pattern.hpp"
+#include "pointflight/lidar/blockage.hpp"
 
 namespace pointflight::picture {
 namespace {
@@ -133,6 +134,7 @@ ScanStatistics scan_statistics(const LidarSettings& settings) {
   s.beams_a_second = static_cast<double>(counted) * settings.rate / static_cast<double>(scans);
   s.azimuth_min = s.elevation_min = 360.0;
   s.azimuth_max = s.elevation_max = -360.0;
+  const Blockage blockage(read_blocked_sectors(settings));
   std::map<std::uint16_t, const Beam*> before;
   std::vector<double> steps;
   Duration first = beams.front().time_offset;
@@ -143,6 +145,7 @@ ScanStatistics scan_statistics(const LidarSettings& settings) {
     s.azimuth_max = std::max(s.azimuth_max, static_cast<double>(a.azimuth_deg));
     s.elevation_min = std::min(s.elevation_min, static_cast<double>(a.elevation_deg));
     s.elevation_max = std::max(s.elevation_max, static_cast<double>(a.elevation_deg));
+    s.blocked += blockage.share(beam.direction_sensor) / static_cast<double>(beams.size());
     first = std::min(first, beam.time_offset);
     last = std::max(last, beam.time_offset);
     const Beam*& previous = before[beam.ring];

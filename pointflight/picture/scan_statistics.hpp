@@ -15,6 +15,7 @@ struct ScanStatistics {
   double span = 0.0;            ///< From the first beam to the last, s.
   double beams_a_second = 0.0;  ///< Over a second or, below 1 Hz, a scan.
   std::size_t rings = 0;        ///< Rings, rows or lines.
+  double blocked = 0.0;         ///< Share of the beams that what carries it takes, on average.
   /// Over all beams.
   ///@{
   double azimuth_min = 0.0, azimuth_max = 0.0;
@@ -29,7 +30,7 @@ struct ScanStatistics {
   std::optional<std::pair<double, double>> between_rings;
 };
 
-/// Of a sensor's first scan. Throws InputError if its pattern's files are wrong.
+/// Of a sensor's first scan. Throws InputError if its files are wrong.
 ScanStatistics scan_statistics(const LidarSettings& settings);
 
 /// Where a beam points.

@@ -24,7 +24,7 @@ Color color_of(double incidence) {
 
 std::vector<double> incidences_of(const SensorFit& fit) {
   std::vector<double> all;
-  for (const NoiseBin& bin : fit.noise) {
+  for (const NoiseBin& bin : fit.bins) {
     const bool known = std::any_of(
         all.begin(), all.end(), [&](double incidence) { return incidence == bin.incidence_from; });
     if (!known) all.push_back(bin.incidence_from);
@@ -40,7 +40,7 @@ void draw_sensor_fit(const SensorFit& fit, const std::string& title, const std::
   Plot plot{kLeftRoom + 10.0, kFitTop, kFitWidth - kLeftRoom - 40.0, kFitPlotHeight, {}, {}};
   double farthest = 1.0;
   double most = 1.0;  // mm
-  for (const NoiseBin& bin : fit.noise) {
+  for (const NoiseBin& bin : fit.bins) {
     farthest = std::max(farthest, bin.range);
     most = std::max(most, 1e3 * bin.sigma);
   }
@@ -53,14 +53,13 @@ void draw_sensor_fit(const SensorFit& fit, const std::string& title, const std::
     const Color color = color_of(incidence);
     double to = 0.0;
     std::vector<std::pair<double, double>> model;
-    for (const NoiseBin& bin : fit.noise) {
+    for (const NoiseBin& bin : fit.bins) {
       if (bin.incidence_from != incidence) continue;
       to = bin.incidence_to;
       const double size = 2.5 + std::min(3.5, 0.5 * std::log10(static_cast<double>(bin.points)));
       const auto [x, y] = plot.at(bin.range, 1e3 * bin.sigma);
       canvas.dot(x, y, size, color);
-      const double of_angle = fit.angle_sigma * bin.tangent;
-      model.push_back(plot.at(bin.range, 1e3 * std::hypot(fit.range_sigma, of_angle)));
+      model.push_back(plot.at(bin.range, 1e3 * bin.fitted));
     }
     canvas.line(model, 1.5, color, 0.7);
     entries.push_back({fmt::format("{:.0f}° to {:.0f}°", incidence / kDegree, to / kDegree),

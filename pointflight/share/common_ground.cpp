@@ -53,7 +53,10 @@ std::string rest_of(Scenario scenario) {
   scenario.sections["share"] = share;
   for (VehicleSetup& vehicle : scenario.vehicles) {
     keep_stem(vehicle.model);
-    for (LidarMount& mount : vehicle.lidars) keep_stem(mount.model);
+    for (LidarMount& mount : vehicle.lidars) {
+      keep_stem(mount.model);
+      keep_stem(mount.blocked);
+    }
     for (CommandSettings& command : vehicle.commands) keep_stem(command.file);
   }
   for (ObstacleSettings& obstacles : scenario.obstacles) {

@@ -45,7 +45,7 @@ class Barometer : public InstantSensor {
   [[nodiscard]] Sample measure(const InstantInput& input, std::any& memory) const override {
     auto& drift = *std::any_cast<double>(&memory);
     drift += settings_.drift / std::sqrt(settings_.rate) * draws_.normal(input.index, 0);
-    const double altitude = settings_.origin_altitude + input.state.body.p_world.z();
+    const double altitude = site_.origin.altitude + input.state.body.p_world.z();
     const double pressure = standard_pressure(altitude, settings_.sea_pressure) +
                             settings_.offset * draws_.of_run(0).x() + drift +
                             settings_.noise * draws_.normal(input.index, 1);
@@ -106,7 +106,9 @@ class Gnss : public InstantSensor {
     const RigidBodyState& body = input.state.body;
     const Vector3d seen = body.p_world + slow + s.noise * draws_.normals(input.index, 3);
     const Vector3d v = body.v_world + s.velocity_noise * draws_.normals(input.index, 6);
-    const GeodeticPosition place = geodetic({s.latitude, s.longitude, s.altitude}, seen);
+    const EarthOrigin& o = site_.origin;
+    const GeodeticPosition place =
+        geodetic({o.latitude, o.longitude, o.altitude + o.geoid_height}, seen);
     const double horizontal = std::sqrt(s.horizontal * s.horizontal + s.noise * s.noise);
     const double vertical = std::sqrt(s.vertical * s.vertical + s.noise * s.noise);
     return Measurement{site_.vehicle,
@@ -184,13 +186,20 @@ GeodeticPosition geodetic(const GeodeticPosition& origin, const Vector3d& p_worl
           height};
 }
 
+void describe(SettingsVisitor& v, EarthOrigin& s) {
+  v.value({"latitude", "deg", "WGS 84", -89, 89}, s.latitude);
+  v.value({"longitude", "deg", "WGS 84", -180, 180}, s.longitude);
+  v.value({"altitude", "m", "of z = 0 above sea level", -500, 10000}, s.altitude);
+  v.value({"geoid_height", "m", "of sea level there above the ellipsoid", -120, 120},
+          s.geoid_height);
+}
+
 void describe(SettingsVisitor& v, BarometerSettings& s) {
   v.value({"rate", "Hz", "of measurements", 0.1, 1000}, s.rate);
   v.value({"noise", "Pa", "white", 0, 1000}, s.noise);
   v.value({"offset", "Pa", "deviation from run to run", 0, 10000}, s.offset);
   v.value({"drift", "Pa/sqrt(s)", "random walk", 0, 100}, s.drift);
   v.value({"sea_pressure", "Pa", "at sea level", 5e4, 2e5}, s.sea_pressure);
-  v.value({"origin_altitude", "m", "of the world's z = 0", -500, 10000}, s.origin_altitude);
 }
 
 void describe(SettingsVisitor& v, MagnetometerSettings& s) {
@@ -215,9 +224,6 @@ void describe(SettingsVisitor& v, GnssSettings& s) {
   v.value({"noise", "m", "white, of each coordinate", 0, 100}, s.noise);
   v.value({"velocity_noise", "m/s", "white, of each component", 0, 100}, s.velocity_noise);
   v.value({"latency", "s", "until a fix arrives", 0, 10}, s.latency);
-  v.value({"latitude", "deg", "of the world's origin", -89, 89}, s.latitude);
-  v.value({"longitude", "deg", "of the world's origin", -180, 180}, s.longitude);
-  v.value({"altitude", "m", "of the world's z = 0 above the ellipsoid", -500, 10000}, s.altitude);
   v.list({"outages", "", "no fixes then"}, s.outages, [](SettingsVisitor& w, Outage& outage) {
     w.value({"from", "s", "when it starts", 0, 1e6}, outage.from);
     w.value({"until", "s", "when it ends", 0, 1e6}, outage.until);

@@ -9,15 +9,14 @@
 
 namespace pointflight {
 
-/// Static pressure at the body. Defaults: TE Connectivity MS5611-01BA03 (1.2 Pa RMS at its highest
-/// resolution, 150 Pa absolute accuracy taken as two deviations).
+/// Static pressure at the body, by `EarthOrigin::altitude`. Defaults: TE Connectivity MS5611-01BA03
+/// (1.2 Pa RMS at its highest resolution, 150 Pa absolute accuracy taken as two deviations).
 struct BarometerSettings {
   double rate = 50.0;            ///< Hz
   double noise = 1.2;            ///< White, Pa.
   double offset = 75.0;          ///< Deviation from run to run, Pa.
   double drift = 0.5;            ///< Random walk, Pa/sqrt(s): weather and temperature. Assumed.
   double sea_pressure = 101325;  ///< At sea level, Pa.
-  double origin_altitude = 0.0;  ///< Of the world's z = 0, m.
 };
 /// Its keys.
 void describe(SettingsVisitor& visitor, BarometerSettings& settings);
@@ -46,8 +45,8 @@ struct Outage {
   double until = 0.0;  ///< s
 };
 
-/// Satellite navigation. Defaults: u-blox NEO-M8N (2.5 m CEP, 0.05 m/s, 10 Hz; 2.5 m CEP is a
-/// deviation of 2.1 m on each axis).
+/// Satellite navigation, by `EarthOrigin`. Defaults: u-blox NEO-M8N (2.5 m CEP, 0.05 m/s, 10
+/// Hz; 2.5 m CEP is a deviation of 2.1 m on each axis).
 struct GnssSettings {
   double rate = 10.0;             ///< Hz
   double horizontal = 2.1;        ///< Deviation of the slow error, east and north, m.
@@ -56,9 +55,6 @@ struct GnssSettings {
   double noise = 0.1;             ///< White, of each coordinate, m. Assumed.
   double velocity_noise = 0.05;   ///< White, of each component, m/s.
   double latency = 0.12;          ///< Until a fix arrives, s. Assumed.
-  double latitude = 50.0;         ///< Of the world's origin, degrees (WGS 84).
-  double longitude = 8.0;         ///< The same.
-  double altitude = 0.0;          ///< Of the world's z = 0 above the ellipsoid, m.
   std::vector<Outage> outages{};  ///< No fixes then.
 };
 /// Its keys.

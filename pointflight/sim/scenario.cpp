@@ -51,6 +51,11 @@ void describe_lidar(SettingsVisitor& v, LidarMount& s) {
        -1,
        4096},
       s.sub_rays);
+  v.value({"blocked",
+           "",
+           "CSV of directions in which the vehicle is in its way (docs/sensors.md); empty: as the "
+           "sensor file says"},
+          s.blocked);
   v.value({"mark_unknown",
            "",
            "points say whether their beams crossed space that no survey saw (a map made or fitted "
@@ -205,6 +210,8 @@ void describe(SettingsVisitor& v, Scenario& s) {
   });
   v.section({"surroundings", "", "what the returns of LiDARs depend on"},
             [&](SettingsVisitor& w) { describe(w, s.surroundings); });
+  v.section({"origin", "", "of the world on the earth: x east, y north"},
+            [&](SettingsVisitor& w) { describe(w, s.origin); });
   v.section({"output", "", "what is written"},
             [&](SettingsVisitor& w) { describe_output(w, s.output); });
   for (const ScenarioSection& row : scenario_sections().rows()) {

@@ -41,6 +41,8 @@ struct LidarMount {
   bool snapshot = false;                         ///< One pose per scan, as in the paper.
   bool noise = true;                             ///< Of ranges and directions.
   std::int64_t sub_rays = -1;                    ///< `OpticsSettings::sub_rays`; -1: the file's.
+  /// CSV of directions that the vehicle blocks (`LidarSettings::blocked`); empty: the file's.
+  std::string blocked{};
   bool mark_unknown = false;  ///< Points say whether they came through space no survey saw.
   bool own_airframe = false;  ///< It sees the vehicle that carries it.
   bool truth = false;         ///< Its files say `PointTruth` of each point.
@@ -134,6 +136,7 @@ struct Scenario {
   std::vector<ObstacleSettings> obstacles;  ///< What moves by itself.
   AirSetup air;                             ///< Wind and ground effect.
   Surroundings surroundings;                ///< What LiDARs' returns depend on.
+  EarthOrigin origin;                       ///< Of the world, for barometers and GNSS.
   OutputSetup output;                       ///< What is written.
   /// What other floors and programs read (`scenario_sections`), by name.
   std::map<std::string, std::any> sections;

@@ -99,7 +99,10 @@ template <class Taker>
 void take_files(Scenario& scenario, Taker& inputs) {
   for (VehicleSetup& vehicle : scenario.vehicles) {
     inputs.take_model(vehicle.model);
-    for (LidarMount& mount : vehicle.lidars) inputs.take_lidar(mount.model);
+    for (LidarMount& mount : vehicle.lidars) {
+      inputs.take_lidar(mount.model);
+      inputs.take(mount.blocked);
+    }
     for (CommandSettings& command : vehicle.commands) inputs.take(command.file);
   }
   for (ObstacleSettings& obstacle : scenario.obstacles) {

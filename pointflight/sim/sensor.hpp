@@ -116,11 +116,22 @@ struct SensorColumn {
   std::string unit;  ///< "Pa"; empty for numbers without one.
 };
 
+/// Where the world's origin lies on the earth: `origin` of a scenario. x is east, y north.
+struct EarthOrigin {
+  double latitude = 50.0;     ///< deg, WGS 84
+  double longitude = 8.0;     ///< deg, WGS 84
+  double altitude = 0.0;      ///< Of z = 0 above sea level, m: what barometers go by.
+  double geoid_height = 0.0;  ///< Of sea level there above the ellipsoid, m: GNSS measures from it.
+};
+/// Its keys.
+void describe(SettingsVisitor& visitor, EarthOrigin& origin);
+
 /// Who a new sensor belongs to.
 struct SensorSite {
   std::uint32_t vehicle = 0;  ///< Number in the fleet: the entity of its random streams.
   std::uint32_t sensor = 0;   ///< Number on the vehicle, as in `Measurement`.
   std::uint64_t seed = 0;     ///< Of its random draws.
+  EarthOrigin origin{};       ///< Of the world that it is in.
 };
 
 /// A kind of sensor that scenarios can mount (`sensors: [{kind: NAME, ...}]`): a row of

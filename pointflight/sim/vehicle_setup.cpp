@@ -1,11 +1,13 @@
 // A vehicle as its scenario has it: model, sensors, faults, commands.
 #include <fmt/format.h>
 
+#include <filesystem>
 #include <stdexcept>
 #include <utility>
 
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/input_error.hpp"
+#include "pointflight/core/resources.hpp"
 #include "pointflight/sim/vehicle_agent.hpp"
 #include "pointflight/vehicle/feasibility.hpp"
 #include "pointflight/vehicle/vehicle_shape.hpp"
@@ -97,7 +99,7 @@ void VehicleAgent::mount_sensors(const Scenario& scenario, SharedParts& shared) 
                                  kLidarsMax));
   }
   const auto site = [&](std::size_t sensor) {
-    return SensorSite{number_, static_cast<std::uint32_t>(sensor), seed_};
+    return SensorSite{number_, static_cast<std::uint32_t>(sensor), seed_, scenario.origin};
   };
   mount(nullptr,
         std::make_unique<OdometrySource>(
@@ -125,6 +127,10 @@ void VehicleAgent::mount_sensors(const Scenario& scenario, SharedParts& shared) 
       const Surroundings surroundings = surroundings_in(shared.map(), scenario.surroundings);
       LidarSettings settings = model.settings;
       if (entry.sub_rays >= 0) settings.optics.sub_rays = entry.sub_rays;
+      if (!entry.blocked.empty()) {
+        settings.blocked =
+            std::filesystem::absolute(resolve_path(entry.blocked, scenario.folder())).string();
+      }
       Lidar made(settings, MountedLidar::entity_of(site(i)), model.beams, surroundings);
       return std::make_unique<MountedLidar>(
           entry, std::move(made), site(i), shared.renderer(entry.renderer), shared.map(), faults_);

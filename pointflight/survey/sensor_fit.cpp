@@ -174,56 +174,26 @@ double lever_of(const Patch& patch) {
   return patch.range * math::sin(patch.incidence) / math::cos(patch.incidence);
 }
 
-/// s^2 = sigma_r^2 + lever^2 sigma_a^2 by least squares, each patch by how well its own variance is
-/// known; patches far above it are not flat.
-void fit_noise(std::vector<Patch>& patches, SensorFit& fit) {
-  std::vector<double> variances;
-  variances.reserve(patches.size());
-  for (const Patch& patch : patches) variances.push_back(patch.variance);
-  double of_range = median(variances);
-  double of_angle = 0.0;
-  const auto predicted = [&](const Patch& p) {
-    const double lever = lever_of(p);
-    return of_range + of_angle * lever * lever;
-  };
-  for (int pass = 0; pass < 20; ++pass) {
-    double s0 = 0.0;
-    double s1 = 0.0;
-    double s2 = 0.0;
-    double t0 = 0.0;
-    double t1 = 0.0;
-    for (const Patch& patch : patches) {
-      const double expected = predicted(patch);
-      if (patch.variance > kNotFlat * expected && pass > 2) continue;
-      const double lever = lever_of(patch);
-      const double weight = static_cast<double>(patch.residuals.size()) / (expected * expected);
-      s0 += weight;
-      s1 += weight * lever * lever;
-      s2 += weight * lever * lever * lever * lever;
-      // a patch that is not flat would rule the first passes
-      const double variance = std::min(patch.variance, kNotFlat * expected);
-      t0 += weight * variance;
-      t1 += weight * variance * lever * lever;
-    }
-    const double determinant = s0 * s2 - s1 * s1;
-    double range = determinant > 0.0 ? (t0 * s2 - t1 * s1) / determinant : t0 / s0;
-    double angle = determinant > 0.0 ? (s0 * t1 - s1 * t0) / determinant : 0.0;
-    if (angle < 0.0) {
-      angle = 0.0;
-      range = t0 / s0;
-    } else if (range < 0.0) {
-      range = 0.0;
-      angle = t1 / s2;
-    }
-    of_range = std::max(range, 1e-10);
-    of_angle = angle;
-  }
-  std::erase_if(patches, [&](const Patch& p) { return p.variance > kNotFlat * predicted(p); });
-  fit.range_sigma = std::sqrt(of_range);
-  fit.angle_sigma = std::sqrt(of_angle);
+NoiseSample sample_of(const Patch& patch, const DetectionModel& detection) {
+  return {patch.variance,
+          lever_of(patch),
+          signal_weakness(detection, patch.range, math::cos(patch.incidence)),
+          static_cast<double>(patch.residuals.size())};
 }
 
-void fill_bins(const std::vector<Patch>& patches, SensorFit& fit) {
+/// Patches far above what is fitted are not flat.
+NoiseFit fit_noise_of(std::vector<Patch>& patches, const DetectionModel& detection) {
+  std::vector<NoiseSample> samples;
+  samples.reserve(patches.size());
+  for (const Patch& patch : patches) samples.push_back(sample_of(patch, detection));
+  const NoiseFit noise = fit_noise(samples, kNotFlat);
+  std::erase_if(patches, [&](const Patch& p) {
+    return p.variance > kNotFlat * noise.variance(sample_of(p, detection));
+  });
+  return noise;
+}
+
+void fill_bins(const std::vector<Patch>& patches, const DetectionModel& detection, SensorFit& fit) {
   for (std::size_t r = 0; r + 1 < kRanges.size(); ++r) {
     for (std::size_t i = 0; i + 1 < kIncidences.size(); ++i) {
       NoiseBin bin;
@@ -232,6 +202,7 @@ void fill_bins(const std::vector<Patch>& patches, SensorFit& fit) {
       bin.incidence_from = kIncidences[i] * kDegree;
       bin.incidence_to = kIncidences[i + 1] * kDegree;
       std::vector<double> variances;
+      double fitted = 0.0;  // variances
       for (const Patch& patch : patches) {
         if (patch.range < bin.range_from || patch.range >= bin.range_to) continue;
         if (patch.incidence < bin.incidence_from || patch.incidence >= bin.incidence_to) continue;
@@ -239,6 +210,7 @@ void fill_bins(const std::vector<Patch>& patches, SensorFit& fit) {
         bin.range += patch.range;
         bin.tangent += lever_of(patch) * lever_of(patch);
         bin.points += patch.residuals.size();
+        fitted += fit.noise.variance(sample_of(patch, detection));
       }
       if (variances.size() < 3) continue;
       const auto count = static_cast<double>(variances.size());
@@ -246,8 +218,9 @@ void fill_bins(const std::vector<Patch>& patches, SensorFit& fit) {
       bin.range /= count;
       bin.tangent = std::sqrt(bin.tangent / count);
       bin.sigma = std::sqrt(median(variances));
+      bin.fitted = std::sqrt(fitted / count);
       if (bin.range_to > 100.0) bin.range_to = fit.range_max;
-      fit.noise.push_back(bin);
+      fit.bins.push_back(bin);
     }
   }
 }
@@ -320,11 +293,27 @@ void fill_range_offsets(const std::vector<Patch>& patches,
   }
 }
 
+/// How rings' offsets scatter.
+FittedSigma ring_offset_of(const TurnFit& turn) {
+  const auto count = static_cast<double>(turn.rings.size());
+  if (count < 4.0) return {};
+  double sum = 0.0;
+  double squares = 0.0;
+  for (const RingFit& ring : turn.rings) {
+    sum += ring.range_offset;
+    squares += ring.range_offset * ring.range_offset;
+  }
+  const double sigma = std::sqrt(std::max(0.0, squares - sum * sum / count) / (count - 1.0));
+  return {sigma, sigma / std::sqrt(2.0 * (count - 1.0))};
+}
+
 }  // namespace
 
 SensorFit fit_sensor(std::span<const RecordedScan> scans,
                      const Executor& executor,
-                     const Progress& progress) {
+                     const Progress& progress,
+                     const DetectionSettings& rated,
+                     double sun_klx) {
   SensorFit fit;
   fit.scans = scans.size();
   std::vector<Sight> sights;
@@ -362,11 +351,12 @@ SensorFit fit_sensor(std::span<const RecordedScan> scans,
         patches.size(),
         kLeastPatches));
   }
-  fit_noise(patches, fit);
+  const DetectionModel detection(rated, sun_klx);
+  fit.noise = fit_noise_of(patches, detection);
   fit.patches = patches.size();
   fit.on_patches = points_on(patches);
   fit.unrest = unrest_of(patches, sights);
-  fill_bins(patches, fit);
+  fill_bins(patches, detection, fit);
   fit.range_step = step_of(sights);
   fit.rate = rate_of(scans);
   report(progress, "looking at rings", 0.8);
@@ -375,10 +365,10 @@ SensorFit fit_sensor(std::span<const RecordedScan> scans,
     // over two or three rings a plane takes any offset of one as its slope
     std::vector<Patch> wide = patches_of(sights, kRingsWidth * kDegree, executor);
     std::erase_if(wide, [&](const Patch& p) {
-      const double of_angle = fit.angle_sigma * lever_of(p);
-      return p.variance > kNotFlat * (fit.range_sigma * fit.range_sigma + of_angle * of_angle);
+      return p.variance > kNotFlat * fit.noise.variance(sample_of(p, detection));
     });
     fill_range_offsets(wide, sights, *fit.turn);
+    fit.ring_offset = ring_offset_of(*fit.turn);
   }
   return fit;
 }

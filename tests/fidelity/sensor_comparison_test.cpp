@@ -6,6 +6,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "pointflight/core/constants.hpp"
+#include "pointflight/core/input_error.hpp"
+#include "pointflight/fidelity/blockage_fit.hpp"
 #include "pointflight/geometry/rotation.hpp"
 #include "pointflight/lidar/lidar.hpp"
 #include "pointflight/lidar/lidar_settings.hpp"
@@ -37,20 +40,22 @@ class SensorComparisonTest : public ::testing::Test {
  protected:
   SensorComparisonTest() {
     sensor_.optics.angle_sigma_deg = 0.01;  // more takes beams across the limits of bins
-    for (int i = 0; i < 3; ++i) {
-      // tilted, so that rings of beams do not lie on the limits of bins
-      const Pose pose{quaternion_from_rpy(0.03, 0.02, 0.4 * i), {-12.0 + 11.0 * i, 1.0, 1.5}};
-      ScanRequest request;
-      request.index = static_cast<std::uint64_t>(i);
-      request.seed = 1234;  // not the draws of the comparison
-      const Lidar lidar(sensor_, 0, nullptr, reflecting(0.2));
-      const Scan scan = lidar.take(request, PoseTrack(pose), *renderer_, executor_);
-      RealScan real{"scan", pose, {}};
-      for (const ScanPoint& point : scan.points) {
-        real.rays.push_back(survey_ray(pose, point.position_sensor.cast<double>(), true));
-      }
-      scans_.push_back(std::move(real));
+    for (int i = 0; i < 3; ++i) add_scan(i);
+  }
+
+  void add_scan(int i) {
+    // tilted, so that rings of beams do not lie on the limits of bins
+    const Pose pose{quaternion_from_rpy(0.03, 0.02, 0.4 * i), {-12.0 + 11.0 * (i % 3), 1.0, 1.5}};
+    ScanRequest request;
+    request.index = static_cast<std::uint64_t>(i);
+    request.seed = 1234;  // not the draws of the comparison
+    const Lidar lidar(sensor_, 0, nullptr, reflecting(0.2));
+    const Scan scan = lidar.take(request, PoseTrack(pose), *renderer_, executor_);
+    RealScan real{"scan", pose, {}};
+    for (const ScanPoint& point : scan.points) {
+      real.rays.push_back(survey_ray(pose, point.position_sensor.cast<double>(), true));
     }
+    scans_.push_back(std::move(real));
   }
 
   [[nodiscard]] SensorComparison against(const Surroundings& where) const {
@@ -102,6 +107,45 @@ TEST_F(SensorComparisonTest, Statistics_DirectionsThatSomethingBlocksDoNotCount)
   const SensorComparison made = against(reflecting(0.2));
   EXPECT_NEAR(made.blocked, 0.25 * made.beams, 0.05 * made.beams);
   EXPECT_LT(made.share_distance().modelled, 0.03);
+}
+
+TEST_F(SensorComparisonTest, Statistics_WhatIsInTheWayIsFound) {
+  if (testing::kSanitized) GTEST_SKIP() << "numbers; the code is that of the other tests";
+  const auto is_blocked = [](double azimuth, double elevation) {
+    return std::abs(azimuth) >= 140.0 && elevation < -20.0;  // steeper floor does not tell
+  };
+  for (int i = 3; i < 9; ++i) add_scan(i);
+  for (RealScan& scan : scans_) {
+    std::erase_if(scan.rays, [&](const SurveyRay& ray) {
+      const Vector3d p = scan.T_world_sensor.inverse() * ray.point_world();
+      return is_blocked(std::atan2(p.y(), p.x()) / kDegree, std::asin(p.z() / p.norm()) / kDegree);
+    });
+  }
+  const BlockageFit fit = fit_blockage(scans_, sensor_, reflecting(0.2), *renderer_, executor_);
+  EXPECT_EQ(fit.scans, 9u);
+  EXPECT_GT(fit.told, 0.25);
+  EXPECT_NEAR(fit.explained, fit.returns, 0.015);
+  EXPECT_GT(fit.modelled, fit.returns + 0.04);
+  const Blockage found(fit.sectors);
+  int right = 0;
+  int all = 0;
+  for (double elevation = -42.0; elevation < 40.0; elevation += 4.0) {
+    for (double azimuth = -178.0; azimuth < 180.0; azimuth += 4.0) {
+      const bool truth = is_blocked(azimuth, elevation);
+      const double near_rim =
+          std::min(std::abs(std::abs(azimuth) - 140.0), std::abs(elevation + 20.0));
+      if (near_rim < 5.0) continue;  // cells lie across it
+      const double a = azimuth * kDegree;
+      const double e = elevation * kDegree;
+      const Vector3d d(std::cos(e) * std::cos(a), std::cos(e) * std::sin(a), std::sin(e));
+      right += std::abs(found.share(d.cast<float>()) - (truth ? 1.0 : 0.0)) < 0.25 ? 1 : 0;
+      ++all;
+    }
+  }
+  EXPECT_GT(right, 0.97 * all);
+  scans_.resize(1);
+  scans_[0].rays.clear();
+  EXPECT_THROW(fit_blockage(scans_, sensor_, reflecting(0.2), *renderer_, executor_), InputError);
 }
 
 }  // namespace

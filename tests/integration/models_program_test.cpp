@@ -1,7 +1,11 @@
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "pointflight/core/constants.hpp"
 #include "pointflight/core/resources.hpp"
 #include "tests/integration/program.hpp"
 
@@ -102,10 +106,60 @@ TEST_F(Program, OwnSensorAndVehicleInAScenarioOfAnotherFolder) {
   expect_contains(show.out, "mass: 1.9");
   write_file(folder / "plans/s.yaml",
              fmt::format("map: {}\nduration: 0.3\nvehicle: {{model: ../models/mine.yaml, start: "
-                         "[12, 10, 4]}}\nlidars: [{{model: ../models/my32.yaml}}]\n",
+                         "[12, 10, 4]}}\nlidars: [{{model: ../models/my32.yaml, blocked: "
+                         "../models/legs.csv}}]\n",
                          map()));
-  const Result fly = run(fmt::format("fly {} -o {}", folder / "plans/s.yaml", folder / "run"));
-  EXPECT_EQ(fly.code, 0) << fly.err;
+  const std::string fly = fmt::format("fly {} -o {}", folder / "plans/s.yaml", folder / "run");
+  expect_user_error(run(fly), "legs.csv");
+  write_file(
+      folder / "models/legs.csv",
+      "azimuth_from_deg,azimuth_to_deg,elevation_from_deg,elevation_to_deg\n-180,180,-90,0\n");
+  const Result flown = run(fly);
+  EXPECT_EQ(flown.code, 0) << flown.err;
+  EXPECT_TRUE(std::filesystem::exists(folder / "run/inputs/legs.csv"));
+  const Result again = run(fmt::format("fly {} -o {}", folder / "run/scenario.yaml", folder / "b"));
+  EXPECT_EQ(again.code, 0) << again.err;
+  const auto first_scan = [&](const char* run) {
+    return read_file(folder / run + "/scans/0_000001.pcd");
+  };
+  EXPECT_EQ(first_scan("run"), first_scan("b"));
+}
+
+TEST_F(Program, WhatIsInASensorsWayIsFoundFromScansWithPoses) {
+  const TemporaryFolder folder;
+  std::filesystem::create_directory(folder / "scans");
+  std::string poses;
+  for (int i = 0; i < 8; ++i) {
+    const Result scan = run(fmt::format(
+        "scan {} --lidar os0_32 --seed {} --pose {},10,1.5,0,0,{} -o {}/scans/{:02}.pcd",
+        map(),
+        i,
+        10 + i,
+        20 * i,
+        folder.path(),
+        i));
+    ASSERT_EQ(scan.code, 0) << scan.err;
+    const double half = 0.5 * 20.0 * i * kDegree;
+    poses += fmt::format("{} {} 10 1.5 0 0 {} {}\n", i, 10 + i, std::sin(half), std::cos(half));
+  }
+  write_file(folder / "poses.tum", poses);
+  const std::string fit = fmt::format("lidar fit {} --map {}", folder / "scans", map());
+  expect_user_error(run(fit + " --poses " + (folder / "poses.tum")), "--like");
+  expect_user_error(run(fit + " --like os0_32"), "--poses");
+  const Result found = run(fmt::format("{} --poses {} --like os0_32 -o {} --png {}",
+                                       fit,
+                                       folder / "poses.tum",
+                                       folder / "carried.yaml",
+                                       folder / "blocked.png"));
+  ASSERT_EQ(found.code, 0) << found.err;
+  expect_contains(found.out, "in the way");
+  expect_contains(read_file(folder / "carried.yaml"), "carried_blocked.csv");
+  EXPECT_EQ(read_file(folder / "blocked.png").substr(1, 3), "PNG");
+  EXPECT_EQ(run("lidar show " + (folder / "carried.yaml")).code, 0);
+  expect_user_error(
+      run(fmt::format(
+          "{} --poses {} --like os0_32 -o {}", fit, folder / "poses.tum", folder / "carried.yaml")),
+      "--force");
 }
 
 TEST_F(Program, PicturesOfRunsWithAndWithoutTheirFolder) {

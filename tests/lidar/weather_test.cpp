@@ -142,13 +142,11 @@ TEST(Weather, TheStrongestDropIsAsOfDropsScatteredOneByOne) {
   }
 }
 
-LidarSettings mid360() {
-  return load_lidar("mid360");
-}
-
 /// Share of 20,000 beams at a wall that report it, and share that report the air.
-std::pair<double, double> shares(const Surroundings& around, double range) {
-  const ReturnModel model(mid360(), around);
+std::pair<double, double> shares(const Surroundings& around, double range, double filter = 0.0) {
+  LidarSettings lidar = load_lidar("mid360");
+  lidar.detection.air_filter = filter;
+  const ReturnModel model(lidar, around);
   const RandomStream random(3, StreamId::kTest, 1);
   Hit wall;
   wall.range = static_cast<float>(range);
@@ -180,6 +178,18 @@ TEST(Weather, FogHidesWallsAndReturnsItself) {
   EXPECT_LT(shares(thick, 20.0).first, 0.01);
   EXPECT_GT(shares(thick, 20.0).second, 0.9);
   EXPECT_GT(shares(thick, 2.0).first, 0.99);  // still seen from near
+}
+
+TEST(Weather, AFilterTakesTheAirOutAndLeavesTheWall) {
+  Surroundings fog;
+  fog.weather = {WeatherKind::kFog, 100.0, 0.0};
+  EXPECT_GT(load_lidar("mid360").detection.air_filter, 0.9);
+  const auto [bare_wall, bare_air] = shares(fog, 20.0);
+  EXPECT_LT(bare_wall, 0.05);
+  EXPECT_GT(bare_air, 0.9);
+  const auto [wall, air] = shares(fog, 20.0, 0.95);
+  EXPECT_NEAR(air, 0.05 * bare_air, 0.01);
+  EXPECT_GT(wall, 0.85);  // its own signal is strong enough
 }
 
 TEST(Weather, RainDisturbsAFewBeams) {

@@ -28,8 +28,10 @@ template <class Settings>
 std::vector<Measurement> measured(const char* kind,
                                   const Settings& settings,
                                   double duration = 20.0,
-                                  std::int64_t seed = 1) {
+                                  std::int64_t seed = 1,
+                                  const EarthOrigin& origin = {}) {
   Scenario scenario = hovering();
+  scenario.origin = origin;
   scenario.seed = seed;
   scenario.duration = duration;
   scenario.vehicles[0].sensors = {{sensor_kinds().find(kind), settings}};
@@ -127,7 +129,8 @@ TEST(NavigationSensors, FixesErrSlowlyAreLateAndStopInOutages) {
   EXPECT_NEAR(deviation_of(all, 5), s.velocity_noise, 0.2 * s.velocity_noise);
   double squares = 0.0;
   constexpr int kRuns = 60;
-  const GeodeticPosition truth = geodetic({s.latitude, s.longitude, s.altitude}, {10, 6, 3});
+  const GeodeticPosition truth =
+      geodetic({EarthOrigin{}.latitude, EarthOrigin{}.longitude, 0.0}, {10, 6, 3});
   for (int i = 0; i < kRuns; ++i) {
     const auto fix = measured("gnss", s, 0.3, i).front();
     const double north = (fix.values[0] - truth.latitude) * kDegree * 6.37e6;
@@ -143,6 +146,24 @@ TEST(NavigationSensors, ARangeFinderSeesTheFloorAndNothingBeyondItsReach) {
   EXPECT_NEAR(deviation_of(all, 0), s.noise, 0.1 * s.noise);
   s.range_max = 2.0;
   for (const Measurement& m : measured("range_finder", s, 1.0)) EXPECT_EQ(m.values[0], -1.0);
+}
+
+TEST(NavigationSensors, BarometerAndGnssKnowOneOrigin) {
+  const EarthOrigin origin{47.4, 8.5, 408.0, 47.0};
+  BarometerSettings barometer;
+  barometer.noise = barometer.offset = barometer.drift = 0.0;
+  const Measurement pressure = measured("barometer", barometer, 0.5, 1, origin).front();
+  EXPECT_NEAR(pressure.values[0], standard_pressure(411.0, barometer.sea_pressure), 0.1);
+  GnssSettings gnss;
+  gnss.horizontal = gnss.vertical = gnss.noise = 0.0;
+  const Measurement fix = measured("gnss", gnss, 0.5, 1, origin).front();
+  EXPECT_NEAR(fix.values[2], 458.0, 0.01);  // of the ellipsoid
+  EXPECT_NEAR(fix.values[0], 47.4, 1e-3);
+  EXPECT_NEAR(fix.values[1], 8.5, 1e-3);
+  const Scenario read = parse_scenario(
+      "map: m.pfmap\norigin: {latitude: 47.4, altitude: 408, geoid_height: 47}\n", "s.yaml");
+  EXPECT_EQ(read.origin.altitude, 408.0);
+  EXPECT_EQ(read.origin.geoid_height, 47.0);
 }
 
 TEST(NavigationSensors, ScenariosNameThemWithTheirKeys) {

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "pointflight/core/constants.hpp"
+#include "pointflight/core/random.hpp"
 #include "pointflight/geometry/rotation.hpp"
 #include "pointflight/io/csv_table.hpp"
 #include "pointflight/lidar/lidar.hpp"
@@ -60,8 +61,9 @@ TEST(SensorFit, Statistics_FindsTheNoiseThatASensorWasGiven) {
     settings.optics.sub_rays = 1;
     settings.detection.false_alarm = 0.0;
     const SensorFit fit = fit_sensor(recorded(settings, c.model[0] == 'o' ? 4 : 20), Executor(2));
-    EXPECT_NEAR(fit.range_sigma, c.range_sigma, 0.04 * c.range_sigma) << c.model;
-    EXPECT_NEAR(fit.angle_sigma / kDegree, c.angle_sigma_deg, 0.1 * c.angle_sigma_deg) << c.model;
+    EXPECT_NEAR(fit.noise.range.sigma, c.range_sigma, 0.04 * c.range_sigma) << c.model;
+    EXPECT_NEAR(fit.noise.angle.sigma / kDegree, c.angle_sigma_deg, 0.1 * c.angle_sigma_deg)
+        << c.model;
     // an Ouster's ranges are whole steps from where its beams begin, beside the origin
     EXPECT_EQ(fit.range_step, c.model[0] == 'o' ? 0.0 : 0.002) << c.model;
     EXPECT_GT(2 * fit.on_patches, fit.points) << c.model;
@@ -70,14 +72,66 @@ TEST(SensorFit, Statistics_FindsTheNoiseThatASensorWasGiven) {
     EXPECT_NEAR(*fit.rate, settings.rate, 1e-3 * settings.rate);
     EXPECT_NEAR(fit.unrest, 1.0, 0.1) << c.model;
     // each bin by itself: what the two figures give at its ranges and incidences
-    EXPECT_GE(fit.noise.size(), 3u);
-    for (const NoiseBin& bin : fit.noise) {
+    EXPECT_GE(fit.bins.size(), 3u);
+    for (const NoiseBin& bin : fit.bins) {
       if (bin.patches < 20) continue;
       const double expected = std::hypot(c.range_sigma, c.angle_sigma_deg * kDegree * bin.tangent);
       EXPECT_NEAR(bin.sigma, expected, 0.15 * expected)
           << c.model << " at " << bin.range << " m, " << bin.incidence_from / kDegree << " deg";
     }
   }
+}
+
+TEST(SensorFit, Statistics_WhatWeakSignalsJitterShowsWithItsError) {
+  LidarSettings settings = load_lidar("os0_32");
+  settings.optics.sub_rays = 1;
+  settings.optics.angle_sigma_deg = 0.0;
+  settings.detection.false_alarm = 0.0;
+  settings.noise = {};
+  settings.noise.range_sigma = 0.005;
+  for (const double at_limit : {0.0, 0.03, 0.06}) {
+    settings.noise.range_sigma_at_limit = at_limit;
+    const std::vector<RecordedScan> scans = recorded(settings, 10);
+    const SensorFit fit = fit_sensor(scans, Executor(2), {}, settings.detection);
+    EXPECT_NEAR(fit.noise.range.sigma, 0.005, 0.0015) << at_limit;
+    EXPECT_NEAR(fit.noise.at_limit.sigma, at_limit, 0.2 * at_limit + 0.003) << at_limit;
+    EXPECT_EQ(fit.noise.at_limit.shows(), at_limit > 0.0);
+    EXPECT_LT(fit.noise.at_limit.error, 0.004);
+    LidarSettings like = settings;
+    like.noise.range_sigma_at_limit = 0.05;  // of its sheet
+    EXPECT_NEAR(with_fit(like, fit, "").noise.range_sigma_at_limit, fit.noise.at_limit.sigma, 1e-4);
+  }
+  // nothing was near its limit: what the sheet says stays
+  settings.detection.rated = {{0.1, 200.0, 100.0}};
+  const SensorFit strong = fit_sensor(recorded(settings, 4), Executor(2), {}, settings.detection);
+  EXPECT_FALSE(strong.noise.at_limit.shows());
+  settings.noise.range_sigma_at_limit = 0.05;
+  EXPECT_EQ(with_fit(settings, strong, "").noise.range_sigma_at_limit, 0.05);
+}
+
+TEST(NoiseFit, FindsPartsByTheirShapeAndSaysHowWell) {
+  const RandomStream random(9, StreamId::kTest, 0);
+  std::vector<NoiseSample> samples;
+  constexpr double kPoints = 60.0;
+  for (std::uint64_t i = 0; i < 400; ++i) {
+    const auto [u, v] = random.uniform2(2 * i);
+    NoiseSample sample{0.0, 20.0 * u * u, v * v * v, kPoints};
+    const double truth = 1e-4 + sample.lever * sample.lever * 1e-6 + sample.weakness * 9e-4;
+    // a chi square of many degrees is about normal
+    sample.variance = truth * (1.0 + std::sqrt(2.0 / (kPoints - 3.0)) * random.normal(2 * i + 1));
+    samples.push_back(sample);
+  }
+  const NoiseFit fit = fit_noise(samples, 2.5);
+  EXPECT_NEAR(fit.range.sigma, 0.01, 3.0 * fit.range.error);
+  EXPECT_NEAR(fit.angle.sigma, 0.001, 3.0 * fit.angle.error);
+  EXPECT_NEAR(fit.at_limit.sigma, 0.03, 3.0 * fit.at_limit.error);
+  EXPECT_LT(fit.range.error, 0.0005);
+  EXPECT_LT(fit.at_limit.error, 0.001);
+  EXPECT_TRUE(fit.at_limit.shows());
+  for (NoiseSample& sample : samples) sample.weakness = 0.0;
+  const NoiseFit blind = fit_noise(samples, 10.0);
+  EXPECT_FALSE(blind.at_limit.shows());
+  EXPECT_EQ(blind.at_limit.sigma, 0.0);
 }
 
 TEST(SensorFit, Slow_FindsTheRingsOfASpinningSensor) {

@@ -1,0 +1,109 @@
+#include "apps/lidar_blockage.hpp"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "apps/cli.hpp"
+#include "apps/input_kind.hpp"
+#include "apps/settings_json.hpp"
+#include "apps/terminal.hpp"
+#include "pointflight/core/input_error.hpp"
+#include "pointflight/fidelity/blockage_fit.hpp"
+#include "pointflight/map/surfel_map.hpp"
+#include "pointflight/picture/sensor_picture.hpp"
+
+namespace pointflight::apps {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The sensor as it is carried: its file, and a table beside it.
+void write_carried_sensor(const BlockageFlags& flags, const BlockageFit& fit) {
+  const fs::path path(flags.output);
+  const std::string table = path.stem().string() + "_blocked.csv";
+  const std::string table_path = (path.parent_path() / table).string();
+  check_outputs({table_path}, {flags.output, flags.png, flags.map}, flags.force);
+  LidarSettings settings = load_lidar(flags.like);
+  // tables under names that hold from anywhere
+  static_cast<void>(tables_of(settings));
+  settings.title += ", as carried";
+  settings.source = fmt::format("what is in its way: {} scans in {} beside {}; the rest is {}'s",
+                                fit.scans,
+                                fs::path(flags.scans.files.scans).filename().string(),
+                                fs::path(flags.map).filename().string(),
+                                flags.like);
+  settings.blocked = table;
+  OutputFile sectors(table_path);
+  sectors.write(blocked_sectors_csv(fit.sectors));
+  SettingsWriter writer;
+  describe(writer, settings);
+  OutputFile output(flags.output);
+  output.write(writer.text());
+  sectors.commit();
+  output.commit();
+  log(fmt::format("sensor: {} and {}", flags.output, table));
+}
+
+nlohmann::ordered_json json_of(const BlockageFit& fit) {
+  nlohmann::ordered_json json = {{"scans", fit.scans},
+                                 {"told", fit.told},
+                                 {"blocked", fit.blocked},
+                                 {"returns", fit.returns},
+                                 {"modelled", fit.modelled},
+                                 {"explained", fit.explained},
+                                 {"sectors", nlohmann::ordered_json::array()}};
+  for (const BlockedSector& s : fit.sectors) {
+    json["sectors"].push_back({{"azimuth_deg", {s.azimuth_from, s.azimuth_to}},
+                               {"elevation_deg", {s.elevation_from, s.elevation_to}},
+                               {"share", s.share}});
+  }
+  return json;
+}
+
+void print_blockage(const BlockageFit& fit) {
+  fmt::print("{} scans; the map tells it for {:.0f} % of the beams\n", fit.scans, 100.0 * fit.told);
+  fmt::print("in the way       {:.1f} % of all beams are lost to it\n", 100.0 * fit.blocked);
+  fmt::print(
+      "beams that return {:.1f} %; by the model {:.1f} %, with what is in the way {:.1f} %\n",
+      100.0 * fit.returns,
+      100.0 * fit.modelled,
+      100.0 * fit.explained);
+}
+
+}  // namespace
+
+void fit_blockage_of(const BlockageFlags& flags) {
+  if (flags.like.empty()) {
+    throw InputError("--map: which sensor took the scans? Name it: --like os0_64_2048");
+  }
+  check_outputs({flags.output, flags.png}, {flags.scans.files.scans, flags.map}, flags.force);
+  require_kind(flags.map, {InputKind::kMap}, "a map (.pfmap)");
+  const LidarSettings lidar = load_lidar(flags.like);
+  const auto map = SurfelMap::open(flags.map);
+  const Progress progress = interruptible_progress();
+  const auto scans = read_real_scans(*open_survey(flags.scans, progress), progress);
+  end_progress();
+  const auto renderer = make_renderer("beam", Scene{map});
+  const BlockageFit fit = fit_blockage(scans,
+                                       lidar,
+                                       surroundings_in(*map, flags.surroundings),
+                                       *renderer,
+                                       Executor(flags.threads),
+                                       progress);
+  end_progress();
+  if (!flags.output.empty()) write_carried_sensor(flags, fit);
+  if (!flags.png.empty()) {
+    picture::draw_blockage(fit, "In the way of " + flags.like, flags.png);
+    log("picture: " + flags.png);
+  }
+  if (flags.json) {
+    print_json(json_of(fit));
+  } else {
+    print_blockage(fit);
+  }
+}
+
+}  // namespace pointflight::apps
