@@ -21,8 +21,10 @@
 #include "pointflight/fidelity/scan_noise.hpp"
 #include "pointflight/fidelity/sensor_comparison.hpp"
 #include "pointflight/lidar/lidar.hpp"
+#include "pointflight/map/fitted_scans.hpp"
 #include "pointflight/picture/error_picture.hpp"
 #include "pointflight/picture/sensor_picture.hpp"
+#include "pointflight/survey/scan_fingerprint.hpp"
 
 namespace pointflight::apps {
 namespace {
@@ -97,6 +99,7 @@ nlohmann::ordered_json sensor_json(const SensorComparison& made) {
   const Sides edge = made.edge_distance();
   return {{"beams", made.beams},
           {"returns", made.returns},
+          {"back", of_sides(made.back)},
           {"blocked_beams", made.blocked},
           {"least_range", made.least_range},
           {"share_distance", {{"modelled", share.modelled}, {"plain", share.plain}}},
@@ -164,6 +167,13 @@ void print_sensor(const SensorComparison& made) {
     }
     fmt::print("\n");
   }
+  const auto percent = [&](double back) { return 100.0 * back / std::max(1.0, made.beams); };
+  fmt::print(
+      "of {} beams {:.1f} % come back in reality, {:.1f} % by the model, {:.1f} % without it\n",
+      short_count(made.beams),
+      percent(made.back.real),
+      percent(made.back.modelled),
+      percent(made.back.plain));
   const Sides share = made.share_distance();
   const Sides edge = made.edge_distance();
   double at_edges = 0.0;
@@ -189,6 +199,15 @@ void print_sensor(const SensorComparison& made) {
   }
 }
 
+/// How many of the scans the map was fitted to.
+std::size_t count_fitted(const std::vector<RealScan>& scans, const SurfelMap& map) {
+  const std::vector<std::uint64_t> fitted = fitted_scans(map);
+  return static_cast<std::size_t>(
+      std::count_if(scans.begin(), scans.end(), [&](const RealScan& scan) {
+        return std::binary_search(fitted.begin(), fitted.end(), scan_fingerprint(scan.rays));
+      }));
+}
+
 void compare(const CompareFlags& flags) {
   const PictureFolder pictures(flags.png, flags.force);
   const Executor executor(flags.threads);
@@ -199,14 +218,22 @@ void compare(const CompareFlags& flags) {
   const Progress progress = interruptible_progress();
   const auto scans = read_real_scans(*open_survey(flags.scans, progress), progress);
   end_progress();
-  std::optional<SupportCloud> cloud;
-  if (!flags.cloud.empty()) cloud.emplace(flags.cloud);
+  std::optional<SupportedCells> cloud;
+  if (!flags.cloud.empty()) cloud = supported_by_cloud(flags.cloud);
   const auto renderer = make_renderer(flags.renderer, Scene{map});
   ErrorCollector all;
   ErrorCollector supported;
   ErrorCollector assumed;
   nlohmann::ordered_json rows = nlohmann::ordered_json::array();
   const ErrorTable table;
+  const std::size_t fitted = count_fitted(scans, *map);
+  if (fitted > 0) {
+    log(
+        fmt::format("{} of the {} scans are among those that the map was fitted to: of these the "
+                    "figures say how well it was fitted, not how true it is",
+                    fitted,
+                    scans.size()));
+  }
   if (!flags.json) table.print_heading();
   for (std::size_t i = 0; i < scans.size(); ++i) {
     report(progress, "comparing", static_cast<double>(i) / static_cast<double>(scans.size()));
@@ -241,7 +268,8 @@ void compare(const CompareFlags& flags) {
     nlohmann::ordered_json json = {{"overall",
                                     {{"all", table.json(all.statistics())},
                                      {"supported", table.json(supported.statistics())}}},
-                                   {"scans", rows}};
+                                   {"scans", rows},
+                                   {"fitted_scans", fitted}};
     if (map->has_assumed()) json["overall"]["assumed"] = table.json(assumed.statistics());
     if (floor) json["floor"] = table.json(floor->statistics());
     if (sensor) json["sensor"] = sensor_json(*sensor);
@@ -268,7 +296,7 @@ void add_compare_command(CLI::App& parent, int& /*exit_code*/) {
   app->add_option("--cloud",
                   flags->cloud,
                   "The cloud that the map was made from: also restricts the comparison to rays "
-                  "that it supports");
+                  "that it supports: one of its points lies within 0.1 m of the return");
   app->add_option("--renderer", flags->renderer, "How ranges are made")
       ->check(CLI::IsMember(renderer_names()))
       ->capture_default_str();

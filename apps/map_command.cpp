@@ -16,6 +16,7 @@
 #include "pointflight/core/number_text.hpp"
 #include "pointflight/geometry/shape_scene.hpp"
 #include "pointflight/io/pcd_writer.hpp"
+#include "pointflight/map/fitted_scans.hpp"
 #include "pointflight/map/import/map_builder.hpp"
 #include "pointflight/picture/pictures.hpp"
 
@@ -150,6 +151,7 @@ nlohmann::ordered_json info_json(const SurfelMap& map,
   json["max"] = {b.max.x(), b.max.y(), b.max.z()};
   json["planar_share"] = count.planar_share();
   json["assumed"] = count.assumed;
+  json["fitted_scans"] = fitted_scans(map).size();
   json["bytes"] = map.file_size();
   json["bytes_per_surfel"] = count.bytes_each(map);
   json["has_intensity"] = map.has_intensity();
@@ -197,6 +199,9 @@ void print_info(const SurfelMap& map, const SurfelCount& count, const InfoFlags&
         100.0 * known->known_share(),
         100.0 * (1.0 - known->known_share()),
         known->grid().cell);
+  }
+  if (const std::size_t fitted = fitted_scans(map).size(); fitted > 0) {
+    fmt::print("  fitted      to the rays of {} scans\n", fitted);
   }
   if (count.assumed > 0) {
     fmt::print(

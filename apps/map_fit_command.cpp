@@ -9,6 +9,8 @@
 #include "apps/survey_flags.hpp"
 #include "apps/terminal.hpp"
 #include "pointflight/core/input_error.hpp"
+#include "pointflight/map/fitted_scans.hpp"
+#include "pointflight/survey/scan_fingerprint.hpp"
 
 namespace pointflight::apps {
 namespace {
@@ -40,6 +42,7 @@ void run_fit(const MapFitFlags& flags) {
                                    report,
                                    closed,
                                    progress);
+  add_fitted_scans(fitted.description, scan_fingerprints(rays));
   append_note(fitted, fit_note(*survey, report));
   paint_by_signal(fitted, flags.fit, *survey, edit_options(flags, {}), executor, progress);
   const auto written =

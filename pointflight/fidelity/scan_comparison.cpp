@@ -1,22 +1,18 @@
 #include "pointflight/fidelity/scan_comparison.hpp"
 
-#include <fmt/format.h>
-
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
-#include "pointflight/core/input_error.hpp"
 #include "pointflight/geometry/internal/point_tree-inl.hpp"
-#include "pointflight/io/cloud_reader.hpp"
 
 namespace pointflight {
 namespace {
 
-constexpr double kSupportRadius = 0.25;  // m
-constexpr std::size_t kSupportPoints = 16;
-constexpr float kRangeMax = 1000.0f;  // a late hit must be seen as late
+constexpr double kPlaneRadius = 0.25;  // m, of points of other scans
+constexpr double kPlanePoints = 16.0;  // at least
+constexpr float kRangeMax = 1000.0f;   // a late hit must be seen as late
 
 using FloatTree = PointTree<Vector3f>;
 
@@ -39,37 +35,10 @@ std::vector<RealScan> read_real_scans(const SurveySource& survey, const Progress
   return scans;
 }
 
-struct SupportCloud::Tree {
-  Vector3d origin;  ///< World; the points are given from here.
-  FloatTree points;
-};
-
-SupportCloud::SupportCloud(const std::string& path) {
-  const auto reader = open_cloud(path);
-  std::vector<CloudPoint> batch;
-  Vector3d origin = Vector3d::Zero();
-  std::vector<Vector3f> points;
-  while (reader->read(batch)) {
-    for (const CloudPoint& point : batch) {
-      if (!point.position.allFinite()) continue;
-      if (points.empty()) origin = point.position;
-      points.emplace_back((point.position - origin).cast<float>());
-    }
-  }
-  if (points.empty()) throw InputError(fmt::format("{}: no points", path));
-  tree_ = std::make_unique<Tree>(Tree{origin, FloatTree(std::move(points))});
-}
-
-SupportCloud::~SupportCloud() = default;
-
-bool SupportCloud::supports(const Vector3d& point_world) const {
-  return tree_->points.has_within(point_world - tree_->origin, kSupportRadius, kSupportPoints);
-}
-
 std::vector<ComparedRay> compare_scan(const RealScan& scan,
                                       const Renderer& renderer,
                                       const SurfelMap& map,
-                                      const SupportCloud* cloud,
+                                      const SupportedCells* cloud,
                                       const Executor& executor) {
   std::vector<Ray> rays;
   std::vector<ComparedRay> compared(scan.rays.size());
@@ -89,7 +58,7 @@ std::vector<ComparedRay> compare_scan(const RealScan& scan,
       if (hits[i].is_return()) compared[i].rendered = hits[i].range;
       compared[i].assumed = map.is_assumed(hits[i].surfel);
       if (cloud == nullptr) continue;
-      compared[i].supported = cloud->supports(scan.rays[i].point_world());
+      compared[i].supported = cloud->has(scan.rays[i].point_world());
     }
   });
   return compared;
@@ -131,14 +100,14 @@ ErrorCollector ScanPlanes::compare(std::size_t scan, const Executor& executor) c
       Vector3d sum = Vector3d::Zero();
       Matrix3d products = Matrix3d::Zero();
       double n = 0.0;
-      for (const auto& [index, squared] : tree_->points.within(position, kSupportRadius)) {
+      for (const auto& [index, squared] : tree_->points.within(position, kPlaneRadius)) {
         if (tree_->scan[index] == scan) continue;
         const Vector3d q = tree_->points.points()[index].cast<double>() - position;
         sum += q;
         products += q * q.transpose();
         n += 1.0;
       }
-      if (n < static_cast<double>(kSupportPoints)) continue;
+      if (n < kPlanePoints) continue;
       const Vector3d mean = sum / n;
       const Eigen::SelfAdjointEigenSolver<Matrix3d> axes(products / n - mean * mean.transpose());
       if (axes.eigenvalues()[0] > kFlat * axes.eigenvalues()[1]) continue;

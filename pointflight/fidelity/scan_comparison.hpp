@@ -10,6 +10,7 @@
 #include "pointflight/fidelity/error_statistics.hpp"
 #include "pointflight/geometry/types.hpp"
 #include "pointflight/render/renderer.hpp"
+#include "pointflight/survey/supported_cells.hpp"
 #include "pointflight/survey/survey_rays.hpp"
 
 namespace pointflight {
@@ -29,25 +30,11 @@ struct RealScan {
 /// All scans of a survey. Throws InputError.
 std::vector<RealScan> read_real_scans(const SurveySource& survey, const Progress& progress = {});
 
-/// Which positions a cloud supports: those with 16 or more of its points within 25 cm.
-class SupportCloud {
- public:
-  /// Reads the whole cloud. Throws InputError.
-  explicit SupportCloud(const std::string& path);
-  ~SupportCloud();
-  /// Callable from several threads.
-  [[nodiscard]] bool supports(const Vector3d& point_world) const;
-
- private:
-  struct Tree;
-  std::unique_ptr<Tree> tree_;
-};
-
 /// One real return and what was rendered along its ray.
 struct ComparedRay {
   float range = 0.0f;      ///< Measured, m.
   float rendered = -1.0f;  ///< m; negative if nothing was hit.
-  bool supported = false;  ///< By the cloud that was given: `SupportCloud`.
+  bool supported = false;  ///< By the cloud that was given: `Support`.
   bool assumed = false;    ///< Rendered on a surfel that no survey saw.
 };
 
@@ -56,7 +43,7 @@ struct ComparedRay {
 std::vector<ComparedRay> compare_scan(const RealScan& scan,
                                       const Renderer& renderer,
                                       const SurfelMap& map,
-                                      const SupportCloud* cloud,
+                                      const SupportedCells* cloud,
                                       const Executor& executor);
 
 /// Real scans beside each other: how well a ray's range is known from the other scans.

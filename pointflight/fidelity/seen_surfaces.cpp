@@ -9,11 +9,7 @@ namespace {
 
 constexpr double kReach = 1e4;  // m from the origin: whole numbers of cells
 
-Vector3d corner_of(const GridCell& cell) {
-  return SeenSurfaces::kNear * Vector3d(static_cast<double>(cell[0]),
-                                        static_cast<double>(cell[1]),
-                                        static_cast<double>(cell[2]));
-}
+constexpr double kNear = Support::kRadius;  // and the width of cells
 
 /// Eighth of a cell that a position lies in, and quarter of a face of the cube around that a
 /// direction goes through: 0 to 191.
@@ -22,7 +18,7 @@ std::uint8_t kind_of(const Vector3f& from_corner, const Vector3f& direction) {
   direction.cwiseAbs().maxCoeff(&axis);
   auto kind = static_cast<unsigned>(axis);
   for (int k = 0; k < 3; ++k) kind = 2 * kind + (direction[k] < 0.0f ? 1 : 0);
-  constexpr auto kHalf = static_cast<float>(0.5 * SeenSurfaces::kNear);
+  constexpr auto kHalf = static_cast<float>(Support::kCell);
   for (int k = 0; k < 3; ++k) kind = 2 * kind + (from_corner[k] < kHalf ? 1 : 0);
   return static_cast<std::uint8_t>(kind);
 }
@@ -38,7 +34,7 @@ void SeenSurfaces::add(const SurveyRay& ray) {
   const Vector3d p = ray.point_world();
   if (!is_in_reach(p)) return;
   const GridCell cell = grid_cell(p, kNear);
-  const Vector3f from_corner = (p - corner_of(cell)).cast<float>();
+  const Vector3f from_corner = (p - grid_corner(cell, kNear)).cast<float>();
   const std::uint8_t kind = kind_of(from_corner, ray.direction_world);
   std::vector<Return>& returns = cells_[grid_key(cell)];
   const bool known = std::any_of(
@@ -53,7 +49,7 @@ bool SeenSurfaces::has(const Vector3d& point_world, const Vector3f& normal_world
     const GridCell near = neighbour(middle, i);
     const auto cell = cells_.find(grid_key(near));
     if (cell == cells_.end()) continue;
-    const Vector3f p = (point_world - corner_of(near)).cast<float>();
+    const Vector3f p = (point_world - grid_corner(near, kNear)).cast<float>();
     const bool seen =
         std::any_of(cell->second.begin(), cell->second.end(), [&](const Return& known) {
           return (known.from_corner - p).norm() <= static_cast<float>(kNear) &&

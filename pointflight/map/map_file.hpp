@@ -21,6 +21,7 @@
 ///   ...         section: known_space  which space a survey saw (known_space.hpp); optional
 ///   ...         section: reflectivity  f64: reflectivity per unit of intensity; optional
 ///   ...         section: assumed    a bit per word: surfels that no survey saw; optional
+///   ...         section: fitted     u64[]: the scans that it was fitted to; optional
 ///   ...         section: levels     f32[256]: intensity of each byte, if steps are not equal;
 ///   optional
 ///   ...         any others, which readers that do not know them leave alone

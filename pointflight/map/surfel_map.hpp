@@ -54,6 +54,9 @@ inline constexpr char kReflectivitySection[] = "reflectivity";
 /// Name of the section that marks surfels that no survey saw: for word w bit w % 8 of byte w / 8.
 inline constexpr char kAssumedSection[] = "assumed";
 
+/// Name of the section with the scans that the map was fitted to (fitted_scans.hpp): u64[].
+inline constexpr char kFittedSection[] = "fitted";
+
 /// The nearest thing to a point.
 struct Nearest {
   double distance;        ///< To the surfel's box, m; 0 inside it.

@@ -7,9 +7,11 @@
 #include <utility>
 
 #include "pointflight/core/argument.hpp"
+#include "pointflight/map/fitted_scans.hpp"
 #include "pointflight/map/import/import_check.hpp"
 #include "pointflight/map/map_file.hpp"
-#include "pointflight/survey/surveyed_cells.hpp"
+#include "pointflight/survey/scan_fingerprint.hpp"
+#include "pointflight/survey/supported_cells.hpp"
 
 namespace pointflight {
 namespace {
@@ -89,7 +91,7 @@ std::vector<TriedResolution> try_resolutions(const ScanOpener& survey,
     return survey([&](std::size_t scan) { return !is_left_out(scan); });
   };
   const SurveyOpener judges = [&] { return survey(is_left_out); };
-  const SurveyedCells seen = surveyed_cells(learnt);
+  const SupportedCells seen = supported_by(learnt);
   const auto counts = [&](const SurveyRay& ray) {
     return !ray.is_return || seen.has(ray.point_world());
   };
@@ -153,6 +155,7 @@ SurveyMap map_survey(const SurveySource& survey,
                            made.fit,
                            made.closed,
                            progress);
+  add_fitted_scans(made.map.description, scan_fingerprints(all));
   append_note(made.map,
               fmt::format("fit to {} rays of {} scans", made.fit.rays, survey.scan_count()));
   made.after = measure_rays(

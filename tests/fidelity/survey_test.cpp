@@ -3,11 +3,13 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <set>
 
 #include "pointflight/core/constants.hpp"
+#include "pointflight/core/random.hpp"
 #include "pointflight/fidelity/scene_renderer.hpp"
 #include "pointflight/fidelity/survey_report.hpp"
 #include "pointflight/io/pose_files.hpp"
@@ -239,6 +241,35 @@ TEST(SeenSurfaces, OneReturnStandsForOthersOfItsDirectionAlone) {
   seen.add({{2, 0, 0}, -Vector3f::UnitX(), 1.0f});  // the same position from behind
   EXPECT_TRUE(seen.has({1, 0, 0}, -Vector3f::UnitX()));
   EXPECT_TRUE(seen.has({1, 0, 0}, Vector3f::UnitX()));
+}
+
+TEST(SupportedCells, AreThoseNearACellWithAPoint) {
+  SupportedCells cells;
+  std::vector<Vector3d> middles;  // of cells that have points
+  const RandomStream random(5, StreamId::kTest, 0);
+  for (std::uint64_t i = 0; i < 600; ++i) {
+    const auto [x, y] = random.uniform2(2 * i);
+    const Vector3d point(2.0 * x - 1.0, 2.0 * y - 1.0, random.uniform(2 * i + 1) - 0.5);
+    cells.add(point);
+    middles.emplace_back((point / 0.05).array().floor() * 0.05 + 0.025);
+  }
+  int supported = 0;
+  for (std::uint64_t i = 0; i < 3000; ++i) {
+    const auto [x, y] = random.uniform2(10000 + 2 * i);
+    const Vector3d point(2.4 * x - 1.2, 2.4 * y - 1.2, 1.4 * random.uniform(10001 + 2 * i) - 0.7);
+    const bool is_near = std::any_of(middles.begin(), middles.end(), [&](const Vector3d& middle) {
+      return (middle - point).norm() <= 0.1;
+    });
+    ASSERT_EQ(cells.has(point), is_near) << i;
+    supported += is_near ? 1 : 0;
+  }
+  EXPECT_GT(supported, 300);
+  EXPECT_LT(supported, 2700);
+  EXPECT_FALSE(cells.has({std::nan(""), 0, 0}));
+  EXPECT_FALSE(cells.has({1e12, 0, 0}));
+  cells.add({5e6, 4e5, 100});  // in UTM
+  EXPECT_TRUE(cells.has({5e6, 4e5, 100.02}));
+  EXPECT_FALSE(cells.has({5e6, 4e5 + 1.0, 100}));
 }
 
 /// The true ranges, moved.

@@ -8,7 +8,7 @@
 
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/survey/posed_scans.hpp"
-#include "pointflight/survey/surveyed_cells.hpp"
+#include "pointflight/survey/supported_cells.hpp"
 #include "tests/fuzz/temporary_folder.hpp"
 
 namespace pointflight {
@@ -58,7 +58,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     const SurveyFolder survey(folder.files());
     const auto reader = survey.open();
     std::vector<SurveyRay> batch;
-    SurveyedCells places;
+    SupportedCells places;
     while (reader->read(batch)) {
       for (const SurveyRay& ray : batch) {
         if (!ray.origin_world.allFinite() || !std::isfinite(ray.range)) __builtin_trap();

@@ -13,6 +13,7 @@
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/geometry/internal/morton.hpp"
 #include "pointflight/map/edit/internal/surfel_gathering.hpp"
+#include "pointflight/map/fitted_scans.hpp"
 #include "pointflight/map/internal/near_surfels.hpp"
 #include "pointflight/map/internal/voxel_moments.hpp"
 
@@ -150,7 +151,8 @@ MapDescription description_of(const SurfelMap& map) {
   static_cast<MapProperties&>(d) = map.properties();
   d.has_intensity = map.has_intensity();
   d.metadata = std::string(map.metadata());
-  for (const char* name : {KnownSpace::kSection, kReflectivitySection, kLevelsSection}) {
+  for (const char* name :
+       {KnownSpace::kSection, kReflectivitySection, kLevelsSection, kFittedSection}) {
     const auto bytes = map.section(name);
     if (!bytes.empty()) d.extra.push_back({name, {bytes.begin(), bytes.end()}});
   }
@@ -292,6 +294,9 @@ EditedMap merge_maps(const std::vector<PlacedMap>& maps,
   edited.surfels_before = most;
   edited.doubles = doubles;
   join_known_space(maps, edited);
+  for (const PlacedMap& placed : maps) {
+    add_fitted_scans(edited.description, fitted_scans(*placed.map));
+  }
   append_note(edited, options.note);
   return edited;
 }
