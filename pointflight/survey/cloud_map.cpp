@@ -178,11 +178,20 @@ double share_right(const ImportedMap& imported,
                    const Executor& executor) {
   const auto map =
       SurfelMap::from_bytes(map_bytes(imported.tree, imported.description), "a map of points");
+  const auto renderer = make_renderer("beam", Scene{map});
   std::vector<Hit> hits(rays.size());
-  RayBatch batch;
-  batch.rays = rays;
-  batch.range_max = rays.front().range_max;
-  make_renderer("beam", Scene{map})->render(batch, hits, executor);
+  // position by position: neighbours in direction go down the tree together, which took three
+  // quarters of an import's time if they started far apart
+  for (std::size_t begin = 0; begin < rays.size();) {
+    std::size_t end = begin + 1;
+    while (end < rays.size() && rays[end].origin_world == rays[begin].origin_world) ++end;
+    RayBatch batch;
+    batch.rays = rays.subspan(begin, end - begin);
+    batch.T_world_sensor.translation = rays[begin].origin_world;
+    batch.range_max = rays[begin].range_max;
+    renderer->render(batch, std::span(hits).subspan(begin, end - begin), executor);
+    begin = end;
+  }
   std::size_t right = 0;
   for (std::size_t i = 0; i < hits.size(); ++i) {
     const double off = static_cast<double>(hits[i].range - judges[i].range);
