@@ -4,9 +4,9 @@
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
-#include <optional>
 
 #include "apps/cli.hpp"
+#include "apps/flags.hpp"
 #include "apps/input_kind.hpp"
 #include "apps/settings_json.hpp"
 #include "apps/terminal.hpp"
@@ -32,7 +32,7 @@ void write_carried_sensor(const BlockageFlags& flags, const BlockageFit& fit) {
   settings.title += ", as carried";
   settings.source = fmt::format("what is in its way: {} scans in {} beside {}; the rest is {}'s",
                                 fit.scans,
-                                fs::path(flags.scans.files.scans).filename().string(),
+                                fs::path(flags.posed.files.scans).filename().string(),
                                 fs::path(flags.map).filename().string(),
                                 flags.like);
   settings.blocked = table;
@@ -79,12 +79,12 @@ void fit_blockage_of(const BlockageFlags& flags) {
   if (flags.like.empty()) {
     throw InputError("--map: which sensor took the scans? Name it: --like os0_64_2048");
   }
-  check_outputs({flags.output, flags.png}, {flags.scans.files.scans, flags.map}, flags.force);
+  check_outputs({flags.output, flags.png}, {flags.posed.files.scans, flags.map}, flags.force);
   require_kind(flags.map, {InputKind::kMap}, "a map (.pfmap)");
   const LidarSettings lidar = load_lidar(flags.like);
   const auto map = SurfelMap::open(flags.map);
   const Progress progress = interruptible_progress();
-  const auto scans = read_real_scans(*open_survey(flags.scans, progress), progress);
+  const auto scans = read_real_scans(*open_survey(flags.posed, progress), progress);
   end_progress();
   const auto renderer = make_renderer("beam", Scene{map});
   const BlockageFit fit = fit_blockage(scans,
@@ -94,11 +94,13 @@ void fit_blockage_of(const BlockageFlags& flags) {
                                        Executor(flags.threads),
                                        progress);
   end_progress();
+  OutputSet outputs;
   if (!flags.output.empty()) write_carried_sensor(flags, fit);
   if (!flags.png.empty()) {
     picture::draw_blockage(fit, "In the way of " + flags.like, flags.png);
     log("picture: " + flags.png);
   }
+  outputs.commit();
   if (flags.json) {
     print_json(json_of(fit));
   } else {

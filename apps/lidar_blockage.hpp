@@ -9,7 +9,7 @@ namespace pointflight::apps {
 
 /// `lidar fit --map`: what carries a sensor and is in its way.
 struct BlockageFlags {
-  ScansFlags scans;           ///< With poses.
+  ScansFlags posed;           ///< Scans with poses.
   std::string map;            ///< Of what they saw.
   std::string like;           ///< The sensor.
   Surroundings surroundings;  ///< Of the scans.

@@ -25,12 +25,19 @@ struct LidarFlags {
   bool force = false;
 };
 
+/// Under the names of their keys.
+std::vector<std::pair<std::string, Ground>> named(const GroundsSettings& grounds) {
+  return {{"pattern", grounds.pattern},
+          {"ranges", grounds.ranges},
+          {"range_noise", grounds.range_noise},
+          {"direction_noise", grounds.direction_noise},
+          {"beam_width", grounds.beam_width}};
+}
+
 nlohmann::ordered_json json_of(const GroundsSettings& grounds) {
-  return {{"pattern", to_string(grounds.pattern)},
-          {"ranges", to_string(grounds.ranges)},
-          {"range_noise", to_string(grounds.range_noise)},
-          {"direction_noise", to_string(grounds.direction_noise)},
-          {"beam_width", to_string(grounds.beam_width)}};
+  nlohmann::ordered_json json;
+  for (const auto& [name, ground] : named(grounds)) json[name] = to_string(ground);
+  return json;
 }
 
 void list_lidars(const LidarFlags& flags) {
@@ -124,19 +131,14 @@ void print_statistics(const LidarSettings& s, const picture::ScanStatistics& sca
   }
 }
 
-/// What nobody measured or published.
+/// What its figures rest on, what is surest first.
 void print_grounds(const GroundsSettings& grounds) {
-  const std::pair<const char*, Ground> all[] = {{"pattern", grounds.pattern},
-                                                {"ranges", grounds.ranges},
-                                                {"range noise", grounds.range_noise},
-                                                {"direction noise", grounds.direction_noise},
-                                                {"beam width", grounds.beam_width}};
   std::string said;
   for (const Ground ground :
        {Ground::kMeasured, Ground::kSheet, Ground::kQuoted, Ground::kAssumed}) {
     std::string names;
-    for (const auto& [name, its] : all) {
-      if (its == ground) names += (names.empty() ? "" : ", ") + std::string(name);
+    for (const auto& [name, its] : named(grounds)) {
+      if (its == ground) names += (names.empty() ? "" : ", ") + name;
     }
     if (names.empty()) continue;
     said += fmt::format("{}{}: {}", said.empty() ? "" : "; ", to_string(ground), names);

@@ -27,20 +27,11 @@ namespace fs = std::filesystem;
 
 constexpr double kRestless = 1.5;  // `SensorFit::unrest` from here on is said
 
-struct SensorFitFlags {
+struct SensorFitFlags : BlockageFlags {
   std::string input;
-  std::string map;
-  ScansFlags posed;
-  Surroundings surroundings;
-  std::string like;
   std::string topic;
   std::int64_t scans = 100;
   std::optional<TimeUnit> time_unit;  ///< Nothing: recognised.
-  std::string output;
-  std::string png;
-  bool json = false;
-  bool force = false;
-  int threads = 0;
 };
 
 /// A figure with its standard error, or what it would have to be to show.
@@ -198,19 +189,11 @@ void write_sensor(const SensorFitFlags& flags, const SensorFit& fit) {
 
 void fit_lidar(const SensorFitFlags& flags) {
   if (!flags.map.empty()) {
-    ScansFlags posed = flags.posed;
-    posed.files.scans = flags.input;
-    posed.files.time_unit = flags.time_unit;
-    posed.scan_topic = flags.topic;
-    fit_blockage_of({posed,
-                     flags.map,
-                     flags.like,
-                     flags.surroundings,
-                     flags.output,
-                     flags.png,
-                     flags.json,
-                     flags.force,
-                     flags.threads});
+    BlockageFlags carried = flags;
+    carried.posed.files.scans = flags.input;
+    carried.posed.files.time_unit = flags.time_unit;
+    carried.posed.scan_topic = flags.topic;
+    fit_blockage_of(carried);
     return;
   }
   check_outputs({flags.output, flags.png}, {flags.input}, flags.force);
@@ -297,10 +280,13 @@ void add_lidar_fit_command(CLI::App& parent) {
                 flags->posed.files.is_deskewed,
                 "Ignore times of points: motion within the scans was compensated already")
       ->needs(map);
-  for (CLI::Option* option : add_surroundings_flags(*app, flags->surroundings)) option->needs(map);
+  for (CLI::Option* option : add_surroundings_flags(*app, flags->surroundings)) {
+    if (!option->check_lname("sun")) option->needs(map);  // signals fade in it without a map, too
+  }
   app->add_option("--scans", flags->scans, "Use at most this many scans, from the first")
       ->check(CLI::Range(1, 100000))
-      ->capture_default_str();
+      ->capture_default_str()
+      ->excludes(map);
   add_time_unit_flag(*app, flags->time_unit);
   app->add_option("--like",
                   flags->like,
@@ -308,8 +294,10 @@ void add_lidar_fit_command(CLI::App& parent) {
   app->add_option("-o,--output",
                   flags->output,
                   "Sensor file (.yaml) with the figures; a turning sensor gets a table of its "
-                  "rings beside it");
-  app->add_option("--png", flags->png, "Draw the noise over range and incidence");
+                  "rings beside it, and with --map one of what is in the way");
+  app->add_option("--png",
+                  flags->png,
+                  "Draw the noise over range and incidence, with --map what is in the way");
   app->add_flag("--json", flags->json, "JSON on stdout");
   add_force_flag(*app, flags->force);
   app->add_option("--threads", flags->threads, "0: all cores")->check(CLI::Range(0, 1024));

@@ -1,7 +1,6 @@
 #include "pointflight/fidelity/blockage_fit.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "pointflight/core/input_error.hpp"
@@ -25,11 +24,11 @@ constexpr double kStep = 0.05;            // of shares
 
 /// What is counted of each cell of directions, over all scans.
 struct Counts {
-  std::vector<double> fired = std::vector<double>(DirectionCells::kCount);
-  std::vector<double> modelled = fired;  ///< Beams that come back by the model.
-  std::vector<double> sure = fired;      ///< Of these: those that surely should.
-  std::vector<double> real = fired;      ///< Real returns from where these hit.
-  double returns = 0.0;                  ///< All real ones.
+  /// Beams that come back by the model.
+  std::vector<double> modelled = std::vector<double>(DirectionCells::kCount);
+  std::vector<double> sure = modelled;  ///< Of these: those that surely should.
+  std::vector<double> real = modelled;  ///< Real returns from where these hit.
+  double returns = 0.0;                 ///< All real ones.
 };
 
 double farthest_of(const LidarSettings& lidar) {
@@ -58,38 +57,29 @@ class ScanCounter {
     request.index = index;
     const Pose& pose = scan.T_world_sensor;
     const std::vector<Beam> beams = lidar_.beams(lidar_.pattern_scan(index, 0), executor_);
-    std::vector<Vector3f> origins;
-    std::vector<Vector3f> directions;
-    for (const Beam& beam : beams) {
-      origins.push_back(beam.origin_sensor);
-      directions.push_back(beam.direction_sensor);
-      counts_.fired[DirectionCells::of(beam.direction_sensor)] += 1.0;
-    }
-    const std::vector<Hit> fired = hits(pose, origins, directions);
+    const auto far = static_cast<float>(farthest_);
+    const std::vector<Hit> fired = render_lines(pose, beams, far, renderer_, executor_);
     for (const ScanPoint& point :
          lidar_.take(request, PoseTrack(pose), renderer_, executor_).points) {
       if (point.echo != 0 || static_cast<double>(point.range) < nearest_) continue;
-      const std::size_t cell = DirectionCells::of(directions[point.beam]);
+      const std::size_t cell = DirectionCells::of(beams[point.beam].direction_sensor);
       counts_.modelled[cell] += 1.0;
       if (is_sure(fired[point.beam])) counts_.sure[cell] += 1.0;
     }
     const RealBeams real = origins_.of(scan);
     counts_.returns += static_cast<double>(real.ranges.size());
-    const std::vector<Hit> met = hits(pose, real.origins_sensor, real.directions_sensor);
-    for (std::size_t i = 0; i < met.size(); ++i) {
-      if (is_sure(met[i])) counts_.real[DirectionCells::of(real.directions_sensor[i])] += 1.0;
+    const std::vector<Hit> seen =
+        render_lines(pose, real.origins_sensor, real.directions_sensor, far, renderer_, executor_);
+    for (std::size_t i = 0; i < seen.size(); ++i) {
+      if (is_sure(seen[i])) counts_.real[DirectionCells::of(real.directions_sensor[i])] += 1.0;
     }
   }
 
   [[nodiscard]] const Counts& counts() const { return counts_; }
+  /// What the sensor fires.
+  [[nodiscard]] const BeamOrigins& beams() const { return origins_; }
 
  private:
-  [[nodiscard]] std::vector<Hit> hits(const Pose& pose,
-                                      std::span<const Vector3f> origins,
-                                      std::span<const Vector3f> directions) const {
-    const auto far = static_cast<float>(farthest_);
-    return render_lines(pose, origins, directions, far, renderer_, executor_);
-  }
   [[nodiscard]] bool is_sure(const Hit& hit) const {
     return hit.is_return() && static_cast<double>(hit.range) > nearest_ + kTooNear &&
            static_cast<double>(hit.cos_incidence) > kSureCosine;
@@ -120,15 +110,11 @@ double usual_of_row(const Counts& counts, std::size_t row) {
 }
 
 /// Blocked share of each cell of a row.
-void find_blocked_in_row(const Counts& counts,
-                         std::size_t row,
-                         std::span<double> blocked,
-                         double& told) {
+void find_blocked_in_row(const Counts& counts, std::size_t row, std::span<double> blocked) {
   const double usual = usual_of_row(counts, row);
   for (std::size_t k = 0; k < DirectionCells::kColumns; ++k) {
     const std::size_t cell = row * DirectionCells::kColumns + k;
     if (counts.sure[cell] < kTellingBeams) continue;
-    told += counts.fired[cell];
     const double share =
         std::clamp(1.0 - counts.real[cell] / (usual * counts.sure[cell]), 0.0, 1.0);
     if (share < kLeastShare) continue;
@@ -211,21 +197,22 @@ BlockageFit fit_blockage(const std::vector<RealScan>& scans,
   const Counts& counts = counter.counts();
   BlockageFit fit;
   fit.scans = scans.size();
-  double all = 0.0;
+  const double all = counter.beams().beams();
   Shares blocked(DirectionCells::kCount);
   const auto of_row = [&](std::size_t row) {
     return std::span(blocked).subspan(row * DirectionCells::kColumns, DirectionCells::kColumns);
   };
   for (std::size_t row = 0; row < DirectionCells::kRows; ++row) {
-    find_blocked_in_row(counts, row, of_row(row), fit.told);
+    find_blocked_in_row(counts, row, of_row(row));
   }
   take_out_faint(blocked);
   for (std::size_t row = 0; row < DirectionCells::kRows; ++row) {
     add_sectors(of_row(row), row, fit.sectors);
   }
   for (std::size_t cell = 0; cell < blocked.size(); ++cell) {
-    all += counts.fired[cell];
-    fit.blocked += blocked[cell] * counts.fired[cell];
+    const double fired = counter.beams().fired(cell);
+    if (counts.sure[cell] >= kTellingBeams) fit.told += fired;
+    fit.blocked += blocked[cell] * fired;
     fit.modelled += counts.modelled[cell];
     fit.explained += (1.0 - blocked[cell]) * counts.modelled[cell];
   }

@@ -170,17 +170,12 @@ class Counter {
     request.index = scan;
     request.start = SimTime(kApart * scan);
     const std::vector<Beam> beams = modelled_.beams(modelled_.pattern_scan(scan, 0), executor_);
-    std::vector<Vector3f> origins;
-    std::vector<Vector3f> directions;
-    for (const Beam& beam : beams) {
-      origins.push_back(beam.origin_sensor);
-      directions.push_back(beam.direction_sensor);
-    }
-    const std::vector<Hit> fired = lines(pose, origins, directions);
+    const auto far = static_cast<float>(SensorComparison::kRanges.back());
+    const std::vector<Hit> fired = render_lines(pose, beams, far, renderer_, executor_);
     std::vector<ReturnShare*> of_beam(beams.size());
     for (std::size_t i = 0; i < beams.size(); ++i) {
       if (fired[i].is_return() && is_seen(fired[i])) made_.back.plain += 1.0;
-      if (blocked_[DirectionCells::of(directions[i])]) continue;
+      if (blocked_[DirectionCells::of(beams[i].direction_sensor)]) continue;
       of_beam[i] = share_of(made_, fired[i]);
       if (of_beam[i] == nullptr) continue;
       of_beam[i]->beams += 1.0;

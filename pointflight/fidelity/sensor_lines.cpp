@@ -31,4 +31,18 @@ std::vector<Hit> render_lines(const Pose& T_world_sensor,
   return hits;
 }
 
+std::vector<Hit> render_lines(const Pose& T_world_sensor,
+                              std::span<const Beam> beams,
+                              float range_max,
+                              const Renderer& renderer,
+                              const Executor& executor) {
+  std::vector<Vector3f> origins;
+  std::vector<Vector3f> directions;
+  for (const Beam& beam : beams) {
+    origins.push_back(beam.origin_sensor);
+    directions.push_back(beam.direction_sensor);
+  }
+  return render_lines(T_world_sensor, origins, directions, range_max, renderer, executor);
+}
+
 }  // namespace pointflight

@@ -5,6 +5,7 @@
 
 #include "pointflight/core/parallel.hpp"
 #include "pointflight/geometry/types.hpp"
+#include "pointflight/lidar/beam_pattern.hpp"
 #include "pointflight/render/renderer.hpp"
 
 namespace pointflight {
@@ -14,6 +15,13 @@ namespace pointflight {
 std::vector<Hit> render_lines(const Pose& T_world_sensor,
                               std::span<const Vector3f> origins_sensor,
                               std::span<const Vector3f> directions_sensor,
+                              float range_max,
+                              const Renderer& renderer,
+                              const Executor& executor);
+
+/// The same along beams of a pattern.
+std::vector<Hit> render_lines(const Pose& T_world_sensor,
+                              std::span<const Beam> beams,
                               float range_max,
                               const Renderer& renderer,
                               const Executor& executor);

@@ -61,7 +61,9 @@ void draw_sensor_fit(const SensorFit& fit, const std::string& title, const std::
       canvas.dot(x, y, size, color);
       model.push_back(plot.at(bin.range, 1e3 * bin.fitted));
     }
+    canvas.begin_clip(plot.left, plot.top, plot.width, plot.height);
     canvas.line(model, 1.5, color, 0.7);
+    canvas.end_clip();
     entries.push_back({fmt::format("{:.0f}° to {:.0f}°", incidence / kDegree, to / kDegree),
                        14.0,
                        [color](Canvas& c, double x, double y) { c.dot(x + 7.0, y, 4.5, color); }});

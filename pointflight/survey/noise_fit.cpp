@@ -132,14 +132,19 @@ NoiseFit fit_noise(std::span<const NoiseSample> samples, double not_flat) {
 
 double signal_weakness(const DetectionModel& model, double range, double cosine) {
   if (model.is_ideal() || !(range > 0.0)) return 0.0;
-  constexpr std::size_t kQuantiles = 32;
+  static const std::array<double, 32> reflectivities = [] {
+    std::array<double, 32> quantiles{};
+    for (std::size_t i = 0; i < quantiles.size(); ++i) {
+      const double share = (static_cast<double>(i) + 0.5) / static_cast<double>(quantiles.size());
+      quantiles[i] = std::min(
+          1.0, kUsualReflectivity * math::exp(kUsualSpread * math::normal_quantile(share)));
+    }
+    return quantiles;
+  }();
   double weakness = 0.0;
   double seen = 0.0;
-  for (std::size_t i = 0; i < kQuantiles; ++i) {
-    const double share = (static_cast<double>(i) + 0.5) / static_cast<double>(kQuantiles);
-    const double reflectivity =
-        kUsualReflectivity * math::exp(kUsualSpread * math::normal_quantile(share));
-    const double margin = model.margin(std::min(1.0, reflectivity) * cosine, range);
+  for (const double reflectivity : reflectivities) {
+    const double margin = model.margin(reflectivity * cosine, range);
     if (!(margin > 0.0)) continue;
     const double probability = model.probability(margin);
     seen += probability;

@@ -10,8 +10,7 @@ namespace pointflight {
 namespace {
 
 // Of the attitude loop's natural frequency and damping. The rotor across from the lost one can only
-// push, so that half of a fast loop's torque is not to be had: with 0.5 and 1 quad_330 tumbles at
-// 50 rad/s.
+// push, so that half of a fast loop's torque is not to be had: with 0.5 and 1 quad_330 tumbles.
 constexpr double kSpinningAxisRate = 0.25;
 constexpr double kSpinningDamping = 0.2;
 // Of a spinning body's nutation, whose damping is to be right for wobbles that keep still in the
@@ -67,8 +66,9 @@ std::vector<double> LoopController::update(const RigidBodyState& state,
       return self.speeds(state, demand.thrust, torque(demand), dt, memory);
     }
     [[nodiscard]] Vector3d torque(const AttitudeDemand& demand) const {
-      if (memory.spins)
+      if (memory.spins) {
         return self.spinning_torque(state, memory.rotor_momentum, demand.R_world_body.col(2));
+      }
       return self.demanded_torque(state, demand, dt, memory);
     }
     std::vector<double> operator()(const RotorSpeedCommand& c) const { return c.speeds; }
