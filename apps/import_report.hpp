@@ -13,7 +13,7 @@ namespace pointflight::apps {
 /// How far the points lie apart, and whether the resolution is finer.
 std::string about_spacing(double spacing, double resolution, double supported);
 
-/// The resolutions that were tried, on stderr; `judged_by`: "left out rays".
+/// The resolutions that were tried, on stderr; `judged_by`: "what left out scans saw".
 void print_tried(const std::vector<TriedResolution>& tried, std::string_view judged_by);
 
 /// How noisy flat surfaces were, and what became of it.

@@ -138,7 +138,7 @@ void import_survey(const ImportFlags& flags) {
   write_ghosts(std::move(ghosts), made.fit);
   outputs.commit();
   print_report(made.imported, options);
-  print_tried(made.tried, "left out rays");
+  print_tried(made.tried, "what left out scans saw");
   print_closed(flags.fit, made.closed);
   print_fit(made.fit, made.after);
   print_end(flags, made.imported, start);

@@ -16,6 +16,9 @@
 #include "pointflight/core/math.hpp"
 #include "pointflight/map/known_space.hpp"
 #include "pointflight/map/map_file.hpp"
+#include "pointflight/survey/internal/ray_fate.hpp"
+#include "pointflight/survey/internal/reshaped_surfel.hpp"
+#include "pointflight/survey/internal/surfel_blame.hpp"
 #include "pointflight/survey/surfel_changes.hpp"
 #include "pointflight/survey/surfel_evidence.hpp"
 #include "pointflight/survey/survey_hits.hpp"
@@ -23,19 +26,7 @@
 namespace pointflight {
 namespace {
 
-constexpr SurfelWord kPlaceBits = (SurfelWord{1} << 30) - 1;
-constexpr float kWidest = 1.8f;           // r: what eight bytes can say
-constexpr float kThinnestVolume = 0.06f;  // r: above the planar class
 constexpr double kLeastShare = 1e-3;
-
-/// How a ray of the survey is rendered.
-enum class Fate : std::uint8_t { kEarly, kLeak, kRight, kFree };
-
-Fate fate_of(const SurveyRay& ray, float rendered, float right) {
-  if (!ray.is_return) return rendered < 0.0f ? Fate::kFree : Fate::kEarly;
-  if (rendered < 0.0f || rendered > ray.range + right) return Fate::kLeak;
-  return rendered < ray.range - right ? Fate::kEarly : Fate::kRight;
-}
 
 /// Counts of fates, from several threads.
 class FateCounts {
@@ -64,26 +55,6 @@ class FateCounts {
 
   std::array<std::atomic<std::uint64_t>, 8> counts_{};
 };
-
-/// A surfel with its standard deviations scaled, its position as it was.
-SurfelWord resized(SurfelWord word, const std::array<double, 3>& factors) {
-  if (factors == std::array{1.0, 1.0, 1.0}) return word;  // encoding would round the axes
-  Surfel surfel = decode(word);
-  for (int k = 0; k < 3; ++k) {
-    surfel.s[k] *= static_cast<float>(factors[static_cast<std::size_t>(k)]);
-  }
-  if (surfel.s[1] > surfel.s[2]) {
-    std::swap(surfel.s[1], surfel.s[2]);
-    const Vector3f axis = surfel.axes.col(1);
-    surfel.axes.col(1) = surfel.axes.col(2);
-    surfel.axes.col(2) = axis;
-  }
-  for (const int k : {1, 2}) surfel.s[k] = std::clamp(surfel.s[k], kMinSpread, kWidest);
-  surfel.s[0] =
-      is_planar(word) ? kPlanarThickness : std::clamp(surfel.s[0], kThinnestVolume, surfel.s[1]);
-  surfel.center_voxels = Vector3f::Constant(0.5f);  // any: the old position is put back
-  return (encode(surfel) & ~kPlaceBits) | (word & kPlaceBits);
-}
 
 // ---- pass 1
 
@@ -129,81 +100,12 @@ EditedMap shrink_by_passes(const SurfelMap& map,
       return std::nullopt;
     }
     const double factor = math::pow(std::max(share, kLeastShare), fit.exponent);
-    return resized(word, {factor, factor, factor});
+    return reshaped(word, {.factors = {factor, factor, factor}});
   };
   return changed(map, change, options, executor);
 }
 
 // ---- pass 2
-
-/// d w / d(ln s_k) of a hit's weight: w = c (1 - q / M^2)^2 with q = sum a_k^2, a_k the coordinates
-/// of the nearest point in units of s_k, and c = 36 / (pi M^2), so 4 c (1 - q / M^2) a_k^2 / M^2.
-class WeightSlopes {
- public:
-  explicit WeightSlopes(const SurfelMap& map)
-      : map_(map),
-        support_squared_(static_cast<double>(map.model().support) *
-                         static_cast<double>(map.model().support)),
-        headers_(map.words().size(), 0) {
-    for_each_surfel(map.words(), [&](const LeafHeader&, std::size_t word) {
-      headers_[word] = static_cast<std::uint8_t>(headers_[word - 1] + 1);
-    });
-  }
-
-  [[nodiscard]] std::array<double, 3> at(const SurveyRay& ray, const SurfelHit& met) const {
-    const Surfel surfel = decode(map_.words()[met.word]);
-    const LeafHeader leaf = decode_leaf(map_.words()[met.word - headers_[met.word]]);
-    const Vector3d nearest = ray.origin_world +
-                             static_cast<double>(met.t) * ray.direction_world.cast<double>() -
-                             map_.center_world(leaf, map_.words()[met.word]);
-    std::array<double, 3> squares{};
-    double q = 0.0;
-    for (int k = 0; k < 3; ++k) {
-      const double a = surfel.axes.col(k).cast<double>().dot(nearest) /
-                       (map_.resolution() * static_cast<double>(surfel.s[k]));
-      squares[static_cast<std::size_t>(k)] = a * a;
-      q += a * a;
-    }
-    const double inside = std::max(0.0, 1.0 - q / support_squared_);
-    const double scale = 4.0 * 36.0 / (kPi * support_squared_) * inside / support_squared_;
-    return {scale * squares[0], scale * squares[1], scale * squares[2]};
-  }
-
- private:
-  const SurfelMap& map_;
-  double support_squared_;
-  std::vector<std::uint8_t> headers_;  ///< Of each word, how far back its leaf's header lies.
-};
-
-/// Kinds of evidence: for each axis and fate, and early rays as such.
-constexpr std::size_t kind_of(std::size_t axis, Fate fate) {
-  return 3 * axis + static_cast<std::size_t>(fate);
-}
-constexpr std::size_t kEarlyRays = 9;
-constexpr std::size_t kBlameKinds = 10;
-
-/// New sizes of one surfel, or nothing if it is to go.
-std::optional<std::array<double, 3>> factors_of(const SurfelEvidence& evidence,
-                                                std::size_t word,
-                                                const FitOptions& fit) {
-  std::array<double, 3> factors{};
-  double early_all = 0.0;
-  double all = 0.0;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    const double early = evidence.sum(word, kind_of(axis, Fate::kEarly));
-    const double leaks = evidence.sum(word, kind_of(axis, Fate::kLeak));
-    const double right = evidence.sum(word, kind_of(axis, Fate::kRight));
-    const double change = -fit.step * (early - fit.leak_weight * leaks) /
-                          (early + fit.leak_weight * leaks + right + fit.doubt);
-    factors[axis] = std::min(fit.growth_max, math::exp(change));
-    early_all += early;
-    all += early + leaks + right;
-  }
-  if (evidence.sum(word, kEarlyRays) >= 3.0 && early_all >= fit.blame_share * all) {
-    return std::nullopt;
-  }
-  return factors;
-}
 
 /// Reads a survey and keeps where its rays began.
 class OriginKeeper : public SurveyReader {
@@ -233,9 +135,8 @@ EditedMap correct_by_blame(const SurfelMap& map,
                            const Executor& executor,
                            FitReport& report,
                            const Progress& progress) {
-  SurfelEvidence evidence(map.words().size(), kBlameKinds);
+  SurfelBlame blame(map, fit);
   FateCounts fates;
-  const WeightSlopes slopes(map);
   const auto right = static_cast<float>(fit.right);
   const float window = kernel_map_of(map).window;
   const auto visit = [&](const SurveyRay& ray, const RayHits& way) {
@@ -246,25 +147,21 @@ EditedMap correct_by_blame(const SurfelMap& map,
     const Fate fate = fate_of(ray, way.range, right);
     fates.add(ray, fate);
     if (fate == Fate::kFree) return;
-    for (const SurfelHit& met : way.hits) {
+    for (const SurfelHit& hit : way.hits) {
       const bool is_concerned = fate == Fate::kLeak
-                                    ? std::abs(met.t - ray.range) <= right
-                                    : met.t >= way.first && met.t <= way.first + window;
-      if (!is_concerned || met.weight <= 0) continue;
-      const auto slope = slopes.at(ray, met);
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        evidence.add(met.word, kind_of(axis, fate), slope[axis]);
-      }
-      if (fate == Fate::kEarly) evidence.add(met.word, kEarlyRays, 1.0);
+                                    ? std::abs(hit.t - ray.range) <= right
+                                    : hit.t >= way.first && hit.t <= way.first + window;
+      if (!is_concerned || hit.weight <= 0) continue;
+      blame.add(ray, fate, hit);
     }
   };
   report.overflows += follow_survey(
-      map, survey, fit.right, executor, "fitting sizes to rendered rays", progress, visit);
+      map, survey, fit.right, executor, "fitting shapes to rendered rays", progress, visit);
   before = fates.rays();
   const auto change = [&](const LeafHeader&, std::size_t at) -> std::optional<SurfelWord> {
     if (map.is_assumed(static_cast<std::uint32_t>(at))) return map.words()[at];
-    const auto factors = factors_of(evidence, at, fit);
-    if (factors) return resized(map.words()[at], *factors);
+    const auto change = blame.verdict(at);
+    if (change) return reshaped(map.words()[at], *change);
     ++report.blamed;
     return std::nullopt;
   };
@@ -286,14 +183,16 @@ EditedMap fit_map(const SurfelMap& map,
   EditedMap fitted = shrink_by_passes(map, kept, fit, options, executor, report, progress);
   std::optional<KnownSpaceBuilder> known;
   if (fit.known_space) known.emplace(box, map.resolution(), fitted.surfels);
+  FitOptions of_pass = fit;
   for (int pass = 0; pass < fit.blame_passes; ++pass) {
     const auto before =
         SurfelMap::from_bytes(map_bytes(fitted.tree, fitted.description), "the map half fitted");
     fitted = {};  // room for the next
     OwnRays rays;
     KnownSpaceBuilder* marks = known && pass == 0 ? &*known : nullptr;
-    fitted =
-        correct_by_blame(*before, survey, fit, marks, rays, options, executor, report, progress);
+    fitted = correct_by_blame(
+        *before, survey, of_pass, marks, rays, options, executor, report, progress);
+    of_pass.expected_leaks = 0.0;  // the next ones see what came of expecting them
     if (pass == 0) report.between = rays;
   }
   fitted.surfels_before = map.surfel_count();

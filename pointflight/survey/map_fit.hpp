@@ -16,11 +16,17 @@ namespace pointflight {
 /// Parameters of a fit.
 struct FitOptions {
   double right = 0.1;        ///< A return is right so near, m.
-  double exponent = 0.8;     ///< Pass 1: sizes times (hits / (hits + passes))^exponent.
+  double exponent = 1.0;     ///< Pass 1: sizes times (hits / (hits + passes))^exponent.
   double step = 0.7;         ///< Pass 2: of ln(size) for blame alone.
   double doubt = 0.3;        ///< Pass 2: evidence below this weight changes little.
   double leak_weight = 3.0;  ///< A ray that leaks counts as so many early ones.
-  double growth_max = 1.6;   ///< Pass 2: of a size.
+  double growth_max = 2.0;   ///< Pass 2: of a size.
+  double shift_step = 2.0;   ///< Pass 2: of a centre for blame alone, in standard deviations.
+  double shift_max = 0.7;    ///< Pass 2: of a centre, in standard deviations.
+  /// Pass 2, the first time: leaks that are expected along each axis of a planar surfel, beside
+  /// those of the survey's rays. Each of these ended on a surfel of its own; where returns are few,
+  /// others would get through between them.
+  double expected_leaks = 5.0;
   /// Surfels with a smaller share of hits than this, passed with a weight of `ghost_passes` or
   /// more, are of what moved: they go.
   double ghost_share = 0.03;
@@ -59,15 +65,18 @@ struct FitReport {
   std::uint64_t overflows = 0;
 };
 
-/// Passes over the rays, in memory that depends on the map alone: some 90 bytes per surfel.
+/// Passes over the rays, in memory that depends on the map alone: some 140 bytes per surfel.
 ///
 /// Pass 1 sums for each surfel the weights (of the hit rule) of rays that passed it, ending `right`
 /// behind it or farther, and of those that ended at it, and makes it smaller by their share. Pass 2
 /// renders the rays and sums for each surfel that had a part in it dw / d(ln s_k), of rays rendered
 /// early, right, and late or not at all: ln s_k changes by -step (E - L) / (E + L + C + doubt) with
-/// the leaks L weighed. Planar surfels stay planar. Pass 2 also marks the space that rays crossed,
-/// in the box of the surfels and the sensor's positions, beside what the map knew. All sums are of
-/// whole numbers: the same bytes for any number of threads and any order of the rays.
+/// the leaks L weighed and, for planar surfels, `expected_leaks` (C / (C + E))^2 added. Centres
+/// move in the same way by dw / d(centre), away from where rays are early and to where they leak,
+/// in their voxel. Planar surfels stay planar, and in their plane. Pass 2 also marks the space that
+/// rays crossed, in the box of the surfels and the sensor's positions, beside what the map knew.
+/// All sums are of whole numbers: the same bytes for any number of threads and any order of the
+/// rays.
 EditedMap fit_map(const SurfelMap& map,
                   const SurveyOpener& survey,
                   const FitOptions& fit,

@@ -12,11 +12,13 @@
 #include "pointflight/map/map_file.hpp"
 #include "pointflight/survey/scan_fingerprint.hpp"
 #include "pointflight/survey/supported_cells.hpp"
+#include "pointflight/survey/surface_share.hpp"
 
 namespace pointflight {
 namespace {
 
-constexpr std::size_t kLeftOut = 10;  // one scan of so many judges
+constexpr std::size_t kLeftOut = 10;    // one stretch of the survey of so many judges
+constexpr std::size_t kStretches = 30;  // scans shot in a row see the same from the same position
 // share of the rays: what is smaller than they tell is not lost without need
 constexpr double kLevel = 0.003;
 
@@ -85,7 +87,8 @@ std::vector<TriedResolution> try_resolutions(const ScanOpener& survey,
                                              const Progress& progress) {
   require_argument(scan_count >= 2, "try_resolutions: two scans at least are wanted");
   const auto is_left_out = [&](std::size_t scan) {
-    return scan % kLeftOut == std::min(kLeftOut, scan_count) / 2;
+    const std::size_t stretch = scan_count < kStretches ? scan : kStretches * scan / scan_count;
+    return stretch % kLeftOut == std::min(kLeftOut, scan_count) / 2;
   };
   const SurveyOpener learnt = [&] {
     return survey([&](std::size_t scan) { return !is_left_out(scan); });
@@ -114,10 +117,9 @@ std::vector<TriedResolution> try_resolutions(const ScanOpener& survey,
                                            report,
                                            closed,
                                            progress);
-    const OwnRays rays = measure_rays(
+    const SurfaceShare share = measure_surface(
         *opened(fitted.tree, fitted.description), judges, quick.right, counts, executor, progress);
-    return TriedResolution{
-        imported.report.resolution, rays.right_share(), rays.returns + rays.empty};
+    return TriedResolution{imported.report.resolution, share.right, share.rays};
   };
   return search_resolutions(try_one, 0.0);
 }

@@ -55,8 +55,9 @@ struct SurveyPoints {
 };
 
 /// Tries resolutions (`search_resolutions`): maps of the returns of nine tenths of the scans,
-/// fitted to these, judged by the rays of the others: those that end where the nine tenths saw
-/// something and those without a return. Two scans at least. Throws InputError.
+/// fitted to these, judged by what the others see (`measure_surface`): rays that end where the nine
+/// tenths saw something and those without a return. The others are three stretches of a thirtieth
+/// of the scans each, or every tenth scan of fewer than 30. Two scans at least. Throws InputError.
 std::vector<TriedResolution> try_resolutions(const ScanOpener& survey,
                                              std::size_t scan_count,
                                              const SurveyMapOptions& options,

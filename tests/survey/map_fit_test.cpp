@@ -5,12 +5,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 
-#include "pointflight/core/constants.hpp"
 #include "pointflight/core/random.hpp"
-#include "pointflight/render/internal/all_hits_kernel.hpp"
 #include "pointflight/render/renderer.hpp"
+#include "pointflight/survey/internal/reshaped_surfel.hpp"
+#include "pointflight/survey/surface_share.hpp"
+#include "pointflight/survey/survey_map.hpp"
 #include "tests/support.hpp"
 
 namespace pointflight {
@@ -205,96 +205,147 @@ TEST(MapFit, NothingLeftIsAnErrorOfOneLine) {
   testing::expect_contains(error, "nothing is left");
 }
 
-/// A ray's way by brute force over all surfels, in double.
-std::map<std::uint32_t, std::pair<double, double>> met_by_force(const SurfelMap& map,
-                                                                const Ray& ray) {
-  std::map<std::uint32_t, std::pair<double, double>> met;  // word: t, weight
-  const double r = map.resolution();
-  const double m2 =
-      static_cast<double>(map.model().support) * static_cast<double>(map.model().support);
-  for_each_surfel(map.words(), [&](const LeafHeader& leaf, std::size_t word) {
-    const Surfel surfel = decode(map.words()[word]);
-    const Vector3d center = map.origin_world() + r * (Vector3d(leaf.x, leaf.y, leaf.z) +
-                                                      surfel.center_voxels.cast<double>());
-    Vector3d u;
-    Vector3d v;
-    for (int k = 0; k < 3; ++k) {
-      const double s = r * static_cast<double>(surfel.s[k]);
-      u[k] = surfel.axes.col(k).cast<double>().dot(center - ray.origin_world) / s;
-      v[k] = surfel.axes.col(k).cast<double>().dot(ray.direction_world.cast<double>()) / s;
-    }
-    const double t = u.dot(v) / v.dot(v);
-    const double q = (u - t * v).squaredNorm();
-    if (q >= m2 || t < 0.0 || t > static_cast<double>(ray.range_max)) return;
-    const double weight = 36.0 / (kPi * m2) * (1.0 - q / m2) * (1.0 - q / m2);
-    met[static_cast<std::uint32_t>(word)] = {t, weight};
-  });
-  return met;
-}
-
-using MetByWord = std::map<std::uint32_t, std::pair<double, double>>;
-
-/// At the rim of the support rounding decides, and there the weight is nothing.
-void expect_same(const MetByWord& got, const MetByWord& truth) {
-  constexpr double kRim = 1e-3;
-  for (const auto& [word, at] : truth) {
-    if (at.second < kRim) continue;
-    const auto found = got.find(word);
-    ASSERT_NE(found, got.end()) << word;
-    EXPECT_NEAR(found->second.first, at.first, 2e-3);
-    EXPECT_NEAR(found->second.second, at.second, 2e-2);
-  }
-  for (const auto& [word, at] : got) EXPECT_TRUE(at.second < kRim || truth.contains(word));
-}
-
-TEST(MeetAll, FindsWhatBruteForceFindsBehindSurfacesToo) {
-  const auto map = map_of(wall_and_ghost(), 0.15, 12.0, 0.01);
-  const RandomStream random(8, StreamId::kTest, 0);
-  std::vector<Ray> rays;
-  std::vector<std::uint32_t> order;
-  for (std::uint32_t i = 0; i < 200; ++i) {
+/// A wall at x = 4 up to y = 0, and rays from the origin at and beside its edge: those beside it
+/// end at a wall 2 m behind.
+std::vector<SurveyRay> rays_at_an_edge(std::size_t count, std::uint64_t seed) {
+  const RandomStream random(seed, StreamId::kTest, 0);
+  std::vector<SurveyRay> rays;
+  for (std::size_t i = 0; i < count; ++i) {
     const auto [u, v] = random.uniform2(i);
-    const Vector3d to(4.0, 3.0 * u - 1.5, 3.0 * v - 1.5);
-    rays.push_back({Vector3d(0, 0.1, 0), to.normalized().cast<float>(), 6.0f});
-    order.push_back(i);
+    const Vector3d to(4.0, 0.3 * u - 0.15, 1.8 * v - 0.9);
+    rays.push_back(ray_between(Vector3d::Zero(), to.y() < 0.0 ? to : 1.5 * to));
   }
-  std::size_t far_behind = 0;
-  std::size_t seen = 0;
-  const auto visit = [&](const RayHits& way) {
-    ++seen;
-    MetByWord got;
-    for (const SurfelHit& met : way.hits) {
-      got[met.word] = {static_cast<double>(met.t),
-                       static_cast<double>(met.weight) / static_cast<double>(kWeightOne)};
-      far_behind += way.range >= 0.0f && met.t > way.range + 1.0f ? 1 : 0;
-    }
-    expect_same(got, met_by_force(*map, rays[way.ray]));
-  };
-  EXPECT_EQ(find_all_hits(kernel_map_of(*map), rays, order, visit), 0u);
-  EXPECT_EQ(seen, rays.size());
-  EXPECT_GT(far_behind, 20u) << "the wall behind the ball";
+  return rays;
 }
 
-TEST(MeetAll, AnEmptyMapAndNoRays) {
-  const auto map = map_of(std::vector<Vector3d>{{1, 2, 3}}, 0.1);
-  std::vector<Ray> rays = {{Vector3d::Zero(), Vector3f::UnitX(), 5.0f}};
-  const std::vector<std::uint32_t> order = {0};
+double right_share(const SurfelMap& map, const std::vector<SurveyRay>& rays) {
+  const auto survey = [&] { return std::make_unique<Rays>(rays); };
+  return measure_rays(map, survey, 0.1, {}, Executor(2)).right_share();
+}
+
+std::shared_ptr<const SurfelMap> fitted_by(const FitOptions& fit,
+                                           const SurfelMap& map,
+                                           const std::vector<SurveyRay>& rays) {
+  FitReport report;
+  return opened(fit_map(
+      map, [&] { return std::make_unique<Rays>(rays); }, fit, {}, Executor(2), report));
+}
+
+TEST(MapFit, CentresMoveAwayFromWhereRaysPass) {
+  ShapeScene scene;
+  scene.add_rectangle({4, -2, -1}, {0, 2.03, 0}, {0, 0, 2});  // poses were off by 3 cm
+  scene.add_rectangle({6, -3, -2}, {0, 6, 0}, {0, 0, 4});
+  const auto map = map_of(scene, 0.1);
+  const auto survey = rays_at_an_edge(20000, 4);
+  const auto others = rays_at_an_edge(20000, 5);
+  FitOptions still;
+  still.shift_step = 0.0;
+  const double before = right_share(*map, others);
+  const double resized = right_share(*fitted_by(still, *map, survey), others);
+  const double moved = right_share(*fitted_by({}, *map, survey), others);
+  EXPECT_GT(resized, before);
+  EXPECT_GT(moved, resized + 0.01) << before << ", " << resized << ", " << moved;
+}
+
+/// Rays at a trunk, 0.3 m thick and 3 m away: its half that the origin sees.
+std::vector<SurveyRay> rays_at_a_trunk(std::size_t count, std::uint64_t seed) {
+  const RandomStream random(seed, StreamId::kTest, 0);
+  std::vector<SurveyRay> rays;
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto [u, v] = random.uniform2(i);
+    const double angle = 2.4 * (u - 0.5);
+    const Vector3d to(3.0 - 0.3 * std::cos(angle), 0.3 * std::sin(angle), 1.8 * v - 0.9);
+    rays.push_back(ray_between(Vector3d::Zero(), to));
+  }
+  return rays;
+}
+
+TEST(MapFit, WhereReturnsAreFewOthersDoNotGetThrough) {
+  const auto survey = rays_at_a_trunk(300, 9);
+  std::vector<Vector3d> points;
+  for (const SurveyRay& ray : survey) points.push_back(ray.point_world());
+  const auto map = map_of(points, 0.06);
+  const auto others = rays_at_a_trunk(20000, 10);
+  FitOptions as_returned;
+  as_returned.expected_leaks = 0.0;
+  const double without = 1.0 - right_share(*fitted_by(as_returned, *map, survey), others);
+  const double with = 1.0 - right_share(*fitted_by({}, *map, survey), others);
+  EXPECT_GT(without, 0.02);
+  EXPECT_LT(with, 0.7 * without) << without << ", " << with;
+}
+
+TEST(MapFit, AReshapedSurfelStaysInItsVoxelAndInItsPlane) {
+  const auto map = map_of(wall_and_ghost(), 0.1);
   std::size_t seen = 0;
-  find_all_hits(kernel_map_of(*map), rays, {}, [&](const RayHits&) { ++seen; });
-  EXPECT_EQ(seen, 0u);
-  find_all_hits(kernel_map_of(*map), rays, order, [&](const RayHits& way) {
-    ++seen;
-    EXPECT_LT(way.range, 0.0f);
-    EXPECT_TRUE(way.hits.empty());
+  for_each_surfel(map->words(), [&](const LeafHeader&, std::size_t at) {
+    const SurfelWord word = map->words()[at];
+    EXPECT_EQ(reshaped(word, {}), word);
+    const Surfel before = decode(word);
+    const SurfelWord changed =
+        reshaped(word, {.factors = {1.0, 0.8, 1.3}, .shifts = {0.0, 0.6, -0.7}});
+    const Surfel after = decode(changed);
+    for (int k = 0; k < 3; ++k) {
+      EXPECT_EQ(std::floor(before.center_voxels[k]), std::floor(after.center_voxels[k]));
+    }
+    EXPECT_EQ(is_planar(word), is_planar(changed));
+    EXPECT_LE(after.s[2], 1.9f);
+    const Vector3f way = after.center_voxels - before.center_voxels;
+    const float full = (before.s.tail<2>().array() * Eigen::Array2f(0.6f, -0.7f)).matrix().norm();
+    EXPECT_LE(way.norm(), full + 0.03f);
+    if (is_planar(word) && (way.norm() > 0.9f * full)) {
+      EXPECT_LT(std::abs(way.dot(before.axes.col(0))), 0.03f);
+      ++seen;
+    }
   });
-  EXPECT_EQ(seen, 1u);
-  KernelMap empty = kernel_map_of(*map);
-  empty.node_count = 0;
-  find_all_hits(empty, rays, order, [&](const RayHits& way) {
-    ++seen;
-    EXPECT_LT(way.range, 0.0f);
-  });
-  EXPECT_EQ(seen, 2u);
+  EXPECT_GT(seen, 20u);
+}
+
+TEST(MapFit, EveryPieceOfSurfaceHasOneVote) {
+  ShapeScene scene;
+  scene.add_rectangle({4, -2, -2}, {0, 4, 0}, {0, 0, 4});
+  const auto map = map_of(scene, 0.1);
+  std::vector<SurveyRay> rays;
+  for (int i = 0; i < 99; ++i) rays.push_back(ray_between(Vector3d::Zero(), {4, 0.05, 0.05}));
+  rays.push_back(ray_between(Vector3d::Zero(), {8, 2.05, 0.05}));  // the wall is nearer
+  const auto measured = [&](int threads) {
+    return measure_surface(
+        *map,
+        [&] { return std::make_unique<Rays>(rays); },
+        0.1,
+        [](const SurveyRay&) { return true; },
+        Executor(threads));
+  };
+  EXPECT_NEAR(measured(1).right, 0.5, 1e-6);
+  // free as far as it was measured to be, and through the wall
+  for (int i = 0; i < 75; ++i) rays.push_back(ray_between(Vector3d::Zero(), {3, 0, 0}, false));
+  for (int i = 0; i < 25; ++i) rays.push_back(ray_between(Vector3d::Zero(), {6, 0, 0}, false));
+  EXPECT_NEAR(measured(1).right, 0.5 * 0.5 + 0.5 * 0.75, 1e-6);
+  EXPECT_EQ(measured(1).right, measured(5).right);
+  EXPECT_EQ(measured(2).rays, 200u);
+}
+
+TEST(MapSurvey, JudgesAreStretchesOfScans) {
+  const auto wall = rays_at_the_wall(4000);
+  const auto judges_of = [&](std::size_t scans) {
+    std::vector<std::size_t> fewest(scans + 1);
+    const ScanOpener open = [&](const auto& accepts) {
+      std::vector<std::size_t> taken;
+      for (std::size_t i = 0; i < scans; ++i) {
+        if (accepts(i)) taken.push_back(i);
+      }
+      if (taken.size() < fewest.size()) fewest = taken;
+      return std::make_unique<Rays>(wall);
+    };
+    try_resolutions(open, scans, {}, Executor(2));
+    return fewest;
+  };
+  const auto every_tenth = judges_of(25);
+  EXPECT_EQ(every_tenth, (std::vector<std::size_t>{5, 15}));
+  const auto stretches = judges_of(300);
+  ASSERT_EQ(stretches.size(), 30u);
+  EXPECT_EQ(stretches.front(), 50u);
+  EXPECT_EQ(stretches[9], 59u);
+  EXPECT_EQ(stretches[10], 150u);
 }
 
 }  // namespace
