@@ -1,7 +1,5 @@
 #include "pointflight/survey/map_fit.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -9,10 +7,8 @@
 #include <functional>
 #include <memory>
 #include <optional>
-#include <span>
 #include <utility>
 
-#include "pointflight/core/constants.hpp"
 #include "pointflight/core/math.hpp"
 #include "pointflight/map/known_space.hpp"
 #include "pointflight/map/map_file.hpp"
@@ -160,8 +156,8 @@ EditedMap correct_by_blame(const SurfelMap& map,
   before = fates.rays();
   const auto change = [&](const LeafHeader&, std::size_t at) -> std::optional<SurfelWord> {
     if (map.is_assumed(static_cast<std::uint32_t>(at))) return map.words()[at];
-    const auto change = blame.verdict(at);
-    if (change) return reshaped(map.words()[at], *change);
+    const auto verdict = blame.verdict(at);
+    if (verdict) return reshaped(map.words()[at], *verdict);
     ++report.blamed;
     return std::nullopt;
   };

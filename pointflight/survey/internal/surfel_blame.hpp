@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "pointflight/map/surfel_map.hpp"
+#include "pointflight/render/internal/all_hits_kernel.hpp"
 #include "pointflight/survey/internal/ray_fate.hpp"
 #include "pointflight/survey/internal/reshaped_surfel.hpp"
 #include "pointflight/survey/map_fit.hpp"
