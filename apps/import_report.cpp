@@ -24,7 +24,7 @@ std::string about_spacing(double spacing, double resolution, double supported) {
 void print_tried(const std::vector<TriedResolution>& tried, std::string_view judged_by) {
   for (const TriedResolution& one : tried) {
     log(fmt::format(
-        "  {:.4g} m     {:.2f} % of {} right", one.resolution, 100.0 * one.right, judged_by));
+        "  {:.4g} m     {:.2f} % right of {}", one.resolution, 100.0 * one.right, judged_by));
   }
 }
 

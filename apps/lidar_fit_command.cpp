@@ -6,10 +6,11 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "apps/carried_lidar.hpp"
 #include "apps/cli.hpp"
 #include "apps/commands.hpp"
+#include "apps/fitted_sigma.hpp"
 #include "apps/flags.hpp"
-#include "apps/lidar_blockage.hpp"
 #include "apps/settings_json.hpp"
 #include "apps/surroundings_flags.hpp"
 #include "apps/survey_flags.hpp"
@@ -27,27 +28,12 @@ namespace fs = std::filesystem;
 
 constexpr double kRestless = 1.5;  // `SensorFit::unrest` from here on is said
 
-struct SensorFitFlags : BlockageFlags {
+struct SensorFitFlags : CarriedFlags {
   std::string input;
   std::string topic;
   std::int64_t scans = 100;
   std::optional<TimeUnit> time_unit;  ///< Nothing: recognised.
 };
-
-/// A figure with its standard error, or what it would have to be to show.
-void print_sigma(const char* name, const FittedSigma& fitted, double scale, const char* unit) {
-  if (fitted.shows()) {
-    fmt::print(
-        "{:<16} {:.3g} ± {:.1g} {}\n", name, scale * fitted.sigma, scale * fitted.error, unit);
-  } else if (std::isfinite(fitted.error)) {
-    fmt::print("{:<16} does not show: less than {:.2g} {}\n",
-               name,
-               scale * (fitted.sigma + 2.0 * fitted.error),
-               unit);
-  } else {
-    fmt::print("{:<16} does not show\n", name);
-  }
-}
 
 void print_fit_of(const SensorFit& fit) {
   fmt::print("{} scans, {} returns; noise on {} flat patches of {:g} degrees with {} of them\n",
@@ -189,11 +175,11 @@ void write_sensor(const SensorFitFlags& flags, const SensorFit& fit) {
 
 void fit_lidar(const SensorFitFlags& flags) {
   if (!flags.map.empty()) {
-    BlockageFlags carried = flags;
+    CarriedFlags carried = flags;
     carried.posed.files.scans = flags.input;
     carried.posed.files.time_unit = flags.time_unit;
     carried.posed.scan_topic = flags.topic;
-    fit_blockage_of(carried);
+    fit_carried_lidar(carried);
     return;
   }
   check_outputs({flags.output, flags.png}, {flags.input}, flags.force);

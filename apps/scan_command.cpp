@@ -96,6 +96,7 @@ void take_scan(const ScanFlags& flags) {
   const Executor executor(flags.threads);
   ScanRequest request;
   request.index = flags.index;
+  request.start = SimTime(static_cast<std::int64_t>(flags.index) * lidar.period());
   request.noise = !flags.no_noise;
   request.seed = flags.seed;
   request.truth = flags.truth;
@@ -138,7 +139,7 @@ void add_scan_command(CLI::App& parent, int& /*exit_code*/) {
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   app->add_option("--index", flags->index, "Which scan of a pattern that does not repeat")
-      ->check(CLI::Range(0, 1 << 30));
+      ->check(CLI::Range(0, 1 << 26));
   app->add_flag("--no-noise", flags->no_noise, "Exact ranges");
   add_surroundings_flags(*app, flags->surroundings);
   app->add_option(

@@ -43,6 +43,15 @@ std::array<double, 2> RandomStream::normal2(std::uint64_t index) const {
   return {radius * angle.cos, radius * angle.sin};
 }
 
+double RandomStream::moving_normal(double t, std::uint64_t which, std::uint64_t count) const {
+  const std::int64_t before = floor_to_integer(t);
+  const double part = t - static_cast<double>(before);
+  const auto draw = static_cast<std::uint64_t>(before);
+  const double mixed =
+      (1.0 - part) * normal(draw * count + which) + part * normal((draw + 1) * count + which);
+  return mixed / std::sqrt((1.0 - part) * (1.0 - part) + part * part);
+}
+
 void RandomStream::uniform2(std::uint64_t first, std::span<double> u, std::span<double> v) const {
   assert(u.size() == v.size());
   draw_uniforms(

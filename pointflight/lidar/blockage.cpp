@@ -83,13 +83,8 @@ double Blockage::share(const Vector3f& direction_sensor) const {
 
 double blockage_level(std::uint64_t seed, std::uint32_t sensor, SimTime time) {
   const RandomStream random(seed, StreamId::kLidarBlockage, sensor);
-  const double t = to_seconds(time.time_since_epoch()) / kSway;
-  const std::int64_t before = floor_to_integer(t);
-  const double part = t - static_cast<double>(before);
-  const auto draw = static_cast<std::uint64_t>(before);
-  // between draws a mixture of as great a deviation
-  const double mixed = (1.0 - part) * random.normal(draw) + part * random.normal(draw + 1);
-  return math::normal_probability(mixed / std::sqrt((1.0 - part) * (1.0 - part) + part * part));
+  return math::normal_probability(
+      random.moving_normal(to_seconds(time.time_since_epoch()) / kSway));
 }
 
 std::vector<BlockedSector> read_blocked_sectors(const std::string& path) {

@@ -96,6 +96,7 @@ class Lidar {
 
   struct Received;
   void take_out_blocked(const Aimed& aimed, Received& received, const Executor& executor) const;
+  void leave_motion(const Aimed& aimed, const PoseTrack& T_world_sensor, Scan& scan) const;
 
   /// What came back of a scan's beams.
   struct Received {

@@ -8,6 +8,7 @@
 #include "pointflight/core/random.hpp"
 #include "pointflight/lidar/internal/aimed.hpp"
 #include "pointflight/lidar/internal/range_offsets.hpp"
+#include "pointflight/lidar/residual_motion.hpp"
 
 namespace pointflight {
 namespace {
@@ -354,6 +355,21 @@ void Lidar::take_out_blocked(const Aimed& aimed,
   });
 }
 
+/// Scans without motion are what deskewed ones would be, if deskewing were exact.
+void Lidar::leave_motion(const Aimed& aimed, const PoseTrack& T_world_sensor, Scan& scan) const {
+  const DeskewingSettings& left = settings_.deskewing;
+  const ScanRequest& request = aimed.request;
+  const bool is_still = aimed.snapshot || T_world_sensor.records().size() == 1;
+  if (!request.noise || !is_still) return;
+  if (left.rotation_sigma_deg <= 0.0 && left.translation_sigma <= 0.0) return;
+  const ResidualMotion motion = residual_motion(left, request.seed, sensor_, request.start);
+  const double duration = to_seconds(period());
+  for (ScanPoint& point : scan.points) {
+    const double time = to_seconds(point.time_offset) / duration;
+    point.position_sensor = motion.moved(point.position_sensor, time);
+  }
+}
+
 /// The returns as points.
 Scan Lidar::written(const Aimed& aimed,
                     const PoseTrack& T_world_sensor,
@@ -391,6 +407,7 @@ Scan Lidar::written(const Aimed& aimed,
     }
   }
   if (request.truth) add_truth(received.returns, T_world_sensor, request.map, scan);
+  leave_motion(aimed, T_world_sensor, scan);
   if (request.known != nullptr) {
     mark_unknown(*request.known, aimed.rays, marked, scan, executor);
   }

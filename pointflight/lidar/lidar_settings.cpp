@@ -172,6 +172,16 @@ void describe_noise(SettingsVisitor& v, RangeNoiseSettings& s) {
           s.range_step);
 }
 
+void describe_deskewing(SettingsVisitor& v, DeskewingSettings& s) {
+  v.value({"rotation_sigma_deg",
+           "deg",
+           "points turn by so much, about each axis, from a scan's first beam to its last",
+           0,
+           2},
+          s.rotation_sigma_deg);
+  v.value({"translation_sigma", "m", "they shift by so much, along each axis", 0, 1},
+          s.translation_sigma);
+}
 void describe_optics(SettingsVisitor& v, OpticsSettings& s) {
   v.value({"wavelength_nm", "nm", "not used yet", 0, 20000}, s.wavelength_nm);
   v.value({"divergence_horizontal_deg", "deg", "full angle, FWHM; both 0: beams are lines", 0, 10},
@@ -231,6 +241,8 @@ void describe(SettingsVisitor& v, LidarSettings& s) {
             [&](SettingsVisitor& w) { describe_optics(w, s.optics); });
   v.section({"detection", "", "which beams come back, by the sheet's ranges"},
             [&](SettingsVisitor& w) { describe(w, s.detection); });
+  v.section({"deskewing", "", "what it leaves in scans that are taken from one pose"},
+            [&](SettingsVisitor& w) { describe_deskewing(w, s.deskewing); });
   v.value({"blocked",
            "",
            "CSV of directions in which what carries the sensor is in the way: a path from this "

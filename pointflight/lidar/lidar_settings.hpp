@@ -143,6 +143,14 @@ struct OpticsSettings {
   std::int64_t sub_rays = 0;
 };
 
+/// What deskewing leaves in a scan: from its first to its last beam points turn and shift, in
+/// proportion to time, by what the motion estimate was wrong (`ResidualMotion`). Of scans that are
+/// taken from one pose, which stand for deskewed ones; rolling scans have their motion in them.
+struct DeskewingSettings {
+  double rotation_sigma_deg = 0.0;  ///< About each axis, over a scan.
+  double translation_sigma = 0.0;   ///< m along each axis, over a scan.
+};
+
 /// What a figure rests on.
 enum class Ground {
   kMeasured,  ///< On scans of the sensor or a table of its maker's that was measured or computed.
@@ -178,6 +186,7 @@ struct LidarSettings {
   RangeNoiseSettings noise;                   ///< Of every return.
   OpticsSettings optics;                      ///< Of every beam.
   DetectionSettings detection;                ///< Which beams come back.
+  DeskewingSettings deskewing;                ///< Of scans without motion.
   std::string blocked;                        ///< CSV: `read_blocked_sectors`. Empty: nothing is.
   ScanPattern pattern = ScanPattern::kUnset;  ///< Which of the sections below counts.
   RotorSettings rotor;                        ///< Where `pattern` says so.

@@ -153,6 +153,7 @@ TEST_F(Program, WhatIsInASensorsWayIsFoundFromScansWithPoses) {
                                        folder / "blocked.png"));
   ASSERT_EQ(found.code, 0) << found.err;
   expect_contains(found.out, "in the way");
+  expect_contains(found.out, "left by deskewing, from a scan's first beam to its last:");
   expect_contains(read_file(folder / "carried.yaml"), "carried_blocked.csv");
   EXPECT_EQ(read_file(folder / "blocked.png").substr(1, 3), "PNG");
   EXPECT_EQ(run("lidar show " + (folder / "carried.yaml")).code, 0);

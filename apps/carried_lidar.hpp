@@ -7,8 +7,9 @@
 
 namespace pointflight::apps {
 
-/// `lidar fit --map`: what carries a sensor and is in its way.
-struct BlockageFlags {
+/// `lidar fit --map`: what carrying does to a sensor. Its carrier is in its way, and its scans keep
+/// some of the motion that deskewing should have taken out.
+struct CarriedFlags {
   ScansFlags posed;           ///< Scans with poses.
   std::string map;            ///< Of what they saw.
   std::string like;           ///< The sensor.
@@ -21,6 +22,6 @@ struct BlockageFlags {
 };
 
 /// Finds and writes it. Throws InputError.
-void fit_blockage_of(const BlockageFlags& flags);
+void fit_carried_lidar(const CarriedFlags& flags);
 
 }  // namespace pointflight::apps
