@@ -12,6 +12,7 @@
 #include "apps/surroundings_flags.hpp"
 #include "apps/terminal.hpp"
 #include "pointflight/core/input_error.hpp"
+#include "pointflight/core/output_file.hpp"
 #include "pointflight/lidar/lidar.hpp"
 #include "pointflight/picture/pictures.hpp"
 
