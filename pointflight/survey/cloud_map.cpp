@@ -9,6 +9,7 @@
 #include "pointflight/map/import/import_check.hpp"
 #include "pointflight/map/import/spacing.hpp"
 #include "pointflight/map/map_file.hpp"
+#include "pointflight/render/ray_casting.hpp"
 #include "pointflight/render/renderer.hpp"
 #include "pointflight/survey/left_out_points.hpp"
 
@@ -180,18 +181,7 @@ double share_right(const ImportedMap& imported,
       SurfelMap::from_bytes(map_bytes(imported.tree, imported.description), "a map of points");
   const auto renderer = make_renderer("beam", Scene{map});
   std::vector<Hit> hits(rays.size());
-  // position by position: neighbours in direction go down the tree together, which took three
-  // quarters of an import's time if they started far apart
-  for (std::size_t begin = 0; begin < rays.size();) {
-    std::size_t end = begin + 1;
-    while (end < rays.size() && rays[end].origin_world == rays[begin].origin_world) ++end;
-    RayBatch batch;
-    batch.rays = rays.subspan(begin, end - begin);
-    batch.T_world_sensor.translation = rays[begin].origin_world;
-    batch.range_max = rays[begin].range_max;
-    renderer->render(batch, std::span(hits).subspan(begin, end - begin), executor);
-    begin = end;
-  }
+  cast_rays(*renderer, rays, hits, executor);
   std::size_t right = 0;
   for (std::size_t i = 0; i < hits.size(); ++i) {
     const double off = static_cast<double>(hits[i].range - judges[i].range);
