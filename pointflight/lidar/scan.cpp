@@ -2,13 +2,15 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <cstddef>
 #include <cstring>
 #include <string_view>
 
+#include "pointflight/core/argument.hpp"
+#include "pointflight/core/constants.hpp"
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/core/mapped_file.hpp"
-#include "pointflight/io/pcd_writer.hpp"
 
 namespace pointflight {
 namespace {
@@ -29,30 +31,6 @@ static_assert(offsetof(TruthRow, assumed) + 1 == kTruthSize);
 constexpr std::size_t row_size(const ScanMarks& marks) {
   return kFloats * sizeof(float) + 2 * sizeof(std::uint16_t) + (marks.unknown ? 1 : 0) +
          (marks.echoes ? 1 : 0) + (marks.truth ? kTruthSize : 0);
-}
-
-/// What a file of such a scan has.
-std::vector<PcdField> fields_of(const ScanMarks& marks) {
-  std::vector<PcdField> fields = {{"x", 'F', 4},
-                                  {"y", 'F', 4},
-                                  {"z", 'F', 4},
-                                  {"intensity", 'F', 4},
-                                  {"range", 'F', 4},
-                                  {"time", 'F', 4},
-                                  {"ring", 'U', 2},
-                                  {"label", 'U', 2}};
-  if (marks.unknown) fields.push_back({"unknown", 'U', 1});
-  if (marks.echoes) fields.push_back({"echo", 'U', 1});
-  if (!marks.truth) return fields;
-  for (const char* name :
-       {"true_range", "incidence", "depth", "deskewed_x", "deskewed_y", "deskewed_z"}) {
-    fields.push_back({name, 'F', 4});
-  }
-  fields.push_back({"surfel", 'U', 4});
-  fields.push_back({"sub_ray", 'U', 2});
-  fields.push_back({"sub_rays", 'U', 2});
-  fields.push_back({"assumed", 'U', 1});
-  return fields;
 }
 
 TruthRow row_of(const PointTruth& truth) {
@@ -77,11 +55,46 @@ PointTruth truth_of(const TruthRow& row) {
           row.assumed != 0};
 }
 
+/// How far deskewing leaves a point off its beam at most, m: six deviations of half of what a whole
+/// scan turns and shifts by.
+float farthest_off(const DeskewingSettings& left, float range) {
+  const auto turn = static_cast<float>(left.rotation_sigma_deg * kDegree);
+  return 3.0f * (turn * range + static_cast<float>(left.translation_sigma)) * std::sqrt(3.0f);
+}
+
 }  // namespace
 
-void write_scan_pcd(const std::string& path, const Scan& scan) {
+std::vector<PcdField> scan_fields(const ScanMarks& marks) {
+  std::vector<PcdField> fields = {{"x", 'F', 4},
+                                  {"y", 'F', 4},
+                                  {"z", 'F', 4},
+                                  {"intensity", 'F', 4},
+                                  {"range", 'F', 4},
+                                  {"time", 'F', 4},
+                                  {"ring", 'U', 2},
+                                  {"label", 'U', 2}};
+  if (marks.unknown) fields.push_back({"unknown", 'U', 1});
+  if (marks.echoes) fields.push_back({"echo", 'U', 1});
+  if (!marks.truth) return fields;
+  for (const char* name :
+       {"true_range", "incidence", "depth", "deskewed_x", "deskewed_y", "deskewed_z"}) {
+    fields.push_back({name, 'F', 4});
+  }
+  fields.push_back({"surfel", 'U', 4});
+  fields.push_back({"sub_ray", 'U', 2});
+  fields.push_back({"sub_rays", 'U', 2});
+  fields.push_back({"assumed", 'U', 1});
+  return fields;
+}
+
+std::size_t scan_row_size(const ScanMarks& marks) {
+  return row_size(marks);
+}
+
+void write_scan_rows(const Scan& scan, std::span<std::byte> rows) {
   const std::size_t row = row_size(scan.marks);
-  std::vector<std::byte> rows(scan.points.size() * row);
+  require_argument(rows.size() == scan.points.size() * row,
+                   "write_scan_rows: a row for each point is wanted");
   std::byte* at = rows.data();
   for (std::size_t i = 0; i < scan.points.size(); ++i) {
     const ScanPoint& point = scan.points[i];
@@ -103,14 +116,22 @@ void write_scan_pcd(const std::string& path, const Scan& scan) {
     }
     at += row;
   }
-  write_pcd(OutputFile(path), fields_of(scan.marks), scan.points.size(), rows);
 }
 
-void read_scan_points(const std::string& path, std::span<const Beam> beams, Scan& scan) {
+void write_scan_pcd(const std::string& path, const Scan& scan) {
+  std::vector<std::byte> rows(scan.points.size() * row_size(scan.marks));
+  write_scan_rows(scan, rows);
+  write_pcd(OutputFile(path), scan_fields(scan.marks), scan.points.size(), rows);
+}
+
+void read_scan_points(const std::string& path,
+                      std::span<const Beam> beams,
+                      const DeskewingSettings& left,
+                      Scan& scan) {
   const ScanMarks& marks = scan.marks;
   const std::size_t row = row_size(marks);
   std::string fields = "FIELDS";
-  for (const PcdField& field : fields_of(marks)) fields += " " + field.name;
+  for (const PcdField& field : scan_fields(marks)) fields += " " + field.name;
   fields += "\n";
   constexpr std::string_view kBody = "DATA binary\n";
   const MappedFile file(path);
@@ -150,7 +171,7 @@ void read_scan_points(const std::string& path, std::span<const Beam> beams, Scan
     const auto fits = [&](const Beam& b) {
       return static_cast<float>(to_seconds(b.time_offset)) == values[5] && b.ring == point.ring &&
              (b.origin_sensor + point.range * b.direction_sensor - point.position_sensor).norm() <=
-                 1e-5f * (1.0f + point.range);
+                 1e-5f * (1.0f + point.range) + farthest_off(left, point.range);
     };
     while (beam < beams.size() && !fits(beams[beam])) ++beam;
     if (beam == beams.size()) {

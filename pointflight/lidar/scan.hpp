@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <string>
@@ -7,7 +8,9 @@
 
 #include "pointflight/core/time.hpp"
 #include "pointflight/geometry/types.hpp"
+#include "pointflight/io/pcd_writer.hpp"
 #include "pointflight/lidar/beam_pattern.hpp"
+#include "pointflight/lidar/lidar_settings.hpp"
 #include "pointflight/map/body.hpp"
 #include "pointflight/render/renderer.hpp"
 
@@ -77,15 +80,29 @@ struct Scan {
   }
 };
 
-/// Writes x y z intensity range time (float32; time in seconds after the scan's start), ring
-/// (uint16), label (uint16) and, where the scan marks them, unknown (uint8: 0, 1), echo (uint8:
-/// 0 to 2) and `PointTruth` (true_range incidence depth deskewed_x deskewed_y deskewed_z, float32;
-/// surfel, uint32; sub_ray and sub_rays, uint16; assumed, uint8) as binary PCD. Throws InputError.
+/// What files have of each point, in this order and without padding: x y z intensity range time
+/// (float32; time in seconds after the scan's start), ring (uint16), label (uint16) and, where the
+/// scan marks them, unknown (uint8: 0, 1), echo (uint8: 0 to 2) and `PointTruth` (true_range
+/// incidence depth deskewed_x deskewed_y deskewed_z, float32; surfel, uint32; sub_ray and sub_rays,
+/// uint16; assumed, uint8).
+std::vector<PcdField> scan_fields(const ScanMarks& marks);
+
+/// Bytes of a point with these fields.
+std::size_t scan_row_size(const ScanMarks& marks);
+
+/// The points as such rows; throws std::invalid_argument if `rows` has not their size.
+void write_scan_rows(const Scan& scan, std::span<std::byte> rows);
+
+/// The same as binary PCD. Throws InputError.
 void write_scan_pcd(const std::string& path, const Scan& scan);
 
 /// Fills in the points of such a file, and their truth, of a scan taken with `beams` whose `marks`
 /// are set: the file has what they say. Times and numbers of the points are those of the beams, to
-/// the nanosecond. Throws InputError, also if the points are not those of the beams.
-void read_scan_points(const std::string& path, std::span<const Beam> beams, Scan& scan);
+/// the nanosecond. Points may lie off their beams by what deskewing leaves (`left`). Throws
+/// InputError, also if the points are not those of the beams.
+void read_scan_points(const std::string& path,
+                      std::span<const Beam> beams,
+                      const DeskewingSettings& left,
+                      Scan& scan);
 
 }  // namespace pointflight

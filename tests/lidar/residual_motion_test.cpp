@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "pointflight/core/constants.hpp"
+#include "pointflight/core/input_error.hpp"
 #include "pointflight/geometry/rotation.hpp"
 #include "pointflight/lidar/lidar.hpp"
 #include "pointflight/render/renderer.hpp"
@@ -131,6 +132,25 @@ TEST_F(DeskewedScanTest, PointsLieWhereTheMotionPutsThem) {
     const double time = to_seconds(exact[i].time_offset) / 0.1;
     EXPECT_EQ(moved[i].position_sensor, motion.moved(exact[i].position_sensor, time));
   }
+}
+
+TEST_F(DeskewedScanTest, FilesOfSuchScansAreReadBack) {
+  const testing::TemporaryFolder folder;
+  ScanRequest request;
+  request.seed = 4;
+  const Lidar lidar(left_, 0, nullptr, Surroundings{});
+  const Scan scan = lidar.take(request, PoseTrack(Pose{}), *renderer_, executor_);
+  write_scan_pcd(folder / "s.pcd", scan);
+  const std::vector<Beam> beams = lidar.beams(lidar.pattern_scan(0, 4), executor_);
+  Scan read = scan;
+  read.points.clear();
+  read_scan_points(folder / "s.pcd", beams, left_.deskewing, read);
+  ASSERT_EQ(read.points.size(), scan.points.size());
+  for (std::size_t i = 0; i < scan.points.size(); ++i) {
+    EXPECT_EQ(read.points[i].beam, scan.points[i].beam);
+    EXPECT_EQ(read.points[i].position_sensor, scan.points[i].position_sensor);
+  }
+  EXPECT_THROW(read_scan_points(folder / "s.pcd", beams, {}, read), InputError);
 }
 
 }  // namespace
