@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# clang-tidy over the libraries, the program and the benchmarks (not over tests). A source that was found clean is not looked at again as long as nothing
+# clang-tidy over the libraries, the program, the Python module and the benchmarks (not over tests). A source that was found clean is not looked at again as long as nothing
 # that it includes, the rules and clang-tidy itself have changed: a stamp of all that lies in the user's cache, so that
 # other clones find it, too.
 # usage: tidy.sh CLANG_TIDY BUILD_FOLDER JOBS [--all]
@@ -32,7 +32,7 @@ python3 - "$build" <<'END' | xargs -0 -P "$jobs" -n 2 bash -c 'one "$1" "$2"' on
 import json, re, sys
 seen = 0
 for entry in json.load(open(sys.argv[1] + "/compile_commands.json")):
-    if re.search(r"/batches/(?!tests_)|/(pointflight|bench)/[a-z0-9_/]+\.cpp$", entry["file"]):
+    if re.search(r"/batches/(?!tests_)|/(pointflight|bench|python)/[a-z0-9_/]+\.cpp$", entry["file"]):
         print(entry["file"], entry["command"], sep="\0", end="\0")
         seen += 1
 sys.exit(0 if seen else "nothing to lint")

@@ -1,0 +1,80 @@
+#include "python/bindings/arrays.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/LU>
+
+namespace pointflight::python {
+namespace {
+
+constexpr double kRigid = 1e-6;  // of a rotation's products and determinant
+
+std::vector<py::ssize_t> shape_of(const py::array& array) {
+  return {array.shape(), array.shape() + array.ndim()};
+}
+
+Pose rigid_pose(const double* rows, const char* name) {
+  Matrix3d rotation;
+  Pose pose;
+  for (int i = 0; i < 3; ++i) {
+    for (int k = 0; k < 3; ++k) rotation(i, k) = rows[4 * i + k];
+    pose.translation[i] = rows[4 * i + 3];
+  }
+  const Matrix3d product = rotation * rotation.transpose();
+  const bool is_rigid = (product - Matrix3d::Identity()).cwiseAbs().maxCoeff() <= kRigid &&
+                        rotation.determinant() > 0.0 && pose.translation.allFinite() &&
+                        rows[12] == 0.0 && rows[13] == 0.0 && rows[14] == 0.0 && rows[15] == 1.0;
+  if (!is_rigid) {
+    throw py::value_error(fmt::format(
+        "{}: not a rigid transform (rotation and translation above a row 0 0 0 1)", name));
+  }
+  pose.rotation = Quaterniond(rotation).normalized();
+  return pose;
+}
+
+}  // namespace
+
+std::string shape_text(const std::vector<py::ssize_t>& shape) {
+  std::string text = "(";
+  for (std::size_t i = 0; i < shape.size(); ++i) {
+    text += i > 0 ? ", " : "";
+    text += shape[i] < 0 ? "n" : std::to_string(shape[i]);
+  }
+  return text + (shape.size() == 1 ? ",)" : ")");
+}
+
+void require_shape(const py::array& array,
+                   const char* name,
+                   const std::vector<py::ssize_t>& shape) {
+  const std::vector<py::ssize_t> found = shape_of(array);
+  bool fits = found.size() == shape.size();
+  for (std::size_t i = 0; fits && i < shape.size(); ++i) {
+    fits = shape[i] < 0 || shape[i] == found[i];
+  }
+  if (fits) return;
+  throw py::value_error(
+      fmt::format("{}: shape {} is wanted, not {}", name, shape_text(shape), shape_text(found)));
+}
+
+Array<double> rows_of_three(const Array<double>& array, const char* name) {
+  if (array.ndim() == 1 && array.shape(0) == 3) return Array<double>(array).reshape({1, 3});
+  require_shape(array, name, {-1, 3});
+  return array;
+}
+
+std::vector<Pose> poses_from(const Array<double>& matrices, const char* name) {
+  if (matrices.ndim() == 2) return {pose_from(matrices, name)};
+  require_shape(matrices, name, {-1, 4, 4});
+  std::vector<Pose> poses;
+  for (py::ssize_t i = 0; i < matrices.shape(0); ++i) {
+    poses.push_back(rigid_pose(matrices.data() + 16 * i, name));
+  }
+  return poses;
+}
+
+Pose pose_from(const Array<double>& matrix, const char* name) {
+  require_shape(matrix, name, {4, 4});
+  return rigid_pose(matrix.data(), name);
+}
+
+}  // namespace pointflight::python

@@ -1,0 +1,161 @@
+// Single rays: from anywhere, and of range images.
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "pointflight/core/math.hpp"
+#include "pointflight/render/ray_casting.hpp"
+#include "python/bindings/arrays.hpp"
+#include "python/bindings/map_object.hpp"
+#include "python/bindings/work.hpp"
+
+namespace pointflight::python {
+namespace {
+
+constexpr double kNoHit = std::numeric_limits<double>::infinity();
+
+float range_limit(double range_max) {
+  if (!(range_max > 0.0)) throw py::value_error("range_max: above 0 m is wanted");
+  return static_cast<float>(std::min(range_max, 1e9));
+}
+
+/// A unit vector of a direction of any length. Throws ValueError.
+Vector3f direction_from(const double* at, const char* name) {
+  const Vector3d direction(at[0], at[1], at[2]);
+  const double length = direction.norm();
+  if (!(length > 0.0) || !std::isfinite(length)) {
+    throw py::value_error(std::string(name) + ": a direction is zero or not finite");
+  }
+  return (direction / length).cast<float>();
+}
+
+/// Rays from origins along directions, which are as many, or one for all.
+std::vector<Ray> rays_from(const Array<double>& origins,
+                           const Array<double>& directions,
+                           float range_max) {
+  const auto starts = static_cast<std::size_t>(origins.shape(0));
+  const auto ways = static_cast<std::size_t>(directions.shape(0));
+  if (starts != ways && starts != 1 && ways != 1) {
+    throw py::value_error(
+        "origins, directions: as many of one as of the other are wanted, or one: not " +
+        std::to_string(starts) + " and " + std::to_string(ways));
+  }
+  const std::size_t count = starts == 0 || ways == 0 ? 0 : std::max(starts, ways);
+  std::vector<Ray> rays(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    const double* from = origins.data() + (starts == 1 ? 0 : 3 * i);
+    rays[i].origin_world = {from[0], from[1], from[2]};
+    if (!rays[i].origin_world.allFinite()) throw py::value_error("origins: one is not finite");
+    rays[i].direction_world =
+        direction_from(directions.data() + (ways == 1 ? 0 : 3 * i), "directions");
+    rays[i].range_max = range_max;
+  }
+  return rays;
+}
+
+/// Normals towards the rays' origins, world frame.
+void write_normals(const SurfelMap& map,
+                   std::span<const Ray> rays,
+                   std::span<const Hit> hits,
+                   std::span<float> normals) {
+  for (std::size_t i = 0; i < hits.size(); ++i) {
+    Vector3f normal = Vector3f::Constant(std::numeric_limits<float>::quiet_NaN());
+    if (hits[i].is_return() && hits[i].surfel < map.words().size()) {
+      normal = decode(map.words()[hits[i].surfel]).axes.col(0);
+      if (normal.dot(rays[i].direction_world) > 0.0f) normal = -normal;
+    }
+    for (int k = 0; k < 3; ++k) normals[3 * i + static_cast<std::size_t>(k)] = normal[k];
+  }
+}
+
+py::tuple cast_in(const MapObject& object,
+                  const Array<double>& origins,
+                  const Array<double>& directions,
+                  double range_max) {
+  const std::vector<Ray> rays = rays_from(rows_of_three(origins, "origins"),
+                                          rows_of_three(directions, "directions"),
+                                          range_limit(range_max));
+  const std::size_t count = rays.size();
+  std::vector<double> ranges(count, kNoHit);
+  std::vector<double> points(3 * count, std::numeric_limits<double>::quiet_NaN());
+  std::vector<float> normals(3 * count);
+  std::vector<float> incidences(count, std::numeric_limits<float>::quiet_NaN());
+  std::vector<float> intensities(count, 0.0f);
+  std::vector<std::uint32_t> surfels(count, kNoSurfel);
+  {
+    const py::gil_scoped_release unlocked;
+    std::vector<Hit> hits(count);
+    cast_rays(*object.beams, rays, hits, *executor());
+    write_normals(*object.map, rays, hits, normals);
+    for (std::size_t i = 0; i < count; ++i) {
+      if (!hits[i].is_return()) continue;
+      ranges[i] = static_cast<double>(hits[i].range);
+      const Vector3d point =
+          rays[i].origin_world + ranges[i] * rays[i].direction_world.cast<double>();
+      for (int k = 0; k < 3; ++k) points[3 * i + static_cast<std::size_t>(k)] = point[k];
+      const double cosine = std::clamp(static_cast<double>(hits[i].cos_incidence), 0.0, 1.0);
+      incidences[i] = static_cast<float>(math::acos(cosine));
+      intensities[i] = hits[i].intensity;
+      surfels[i] = hits[i].surfel;
+    }
+  }
+  const auto n = static_cast<py::ssize_t>(count);
+  return py::make_tuple(array_of(std::move(ranges), {n}),
+                        array_of(std::move(points), {n, 3}),
+                        array_of(std::move(normals), {n, 3}),
+                        array_of(std::move(incidences), {n}),
+                        array_of(std::move(intensities), {n}),
+                        array_of(std::move(surfels), {n}));
+}
+
+py::array_t<float> ranges_in(const MapObject& object,
+                             const Array<double>& poses,
+                             const Array<double>& directions,
+                             double range_max) {
+  require_shape(directions, "directions", {-1, -1, 3});
+  const float limit = range_limit(range_max);
+  const std::vector<Pose> from = poses_from(poses, "poses");
+  const auto beams = static_cast<std::size_t>(directions.shape(0) * directions.shape(1));
+  std::vector<Vector3f> of_sensor(beams);
+  for (std::size_t i = 0; i < beams; ++i) {
+    of_sensor[i] = direction_from(directions.data() + 3 * i, "directions");
+  }
+  std::vector<float> ranges(from.size() * beams);
+  {
+    const py::gil_scoped_release unlocked;
+    std::vector<Ray> rays(ranges.size());
+    for (std::size_t p = 0; p < from.size(); ++p) {
+      const Matrix3f turn = from[p].rotation.toRotationMatrix().cast<float>();
+      for (std::size_t i = 0; i < beams; ++i) {
+        rays[p * beams + i] = {from[p].translation, (turn * of_sensor[i]).normalized(), limit};
+      }
+    }
+    std::vector<Hit> hits(rays.size());
+    cast_rays(*object.beams, rays, hits, *executor());
+    for (std::size_t i = 0; i < hits.size(); ++i) {
+      ranges[i] = hits[i].is_return() ? hits[i].range : limit;
+    }
+  }
+  return array_of(
+      std::move(ranges),
+      {static_cast<py::ssize_t>(from.size()), directions.shape(0), directions.shape(1)});
+}
+
+}  // namespace
+
+void add_rays(py::module_& module) {
+  module.def("_raycast",
+             &cast_in,
+             py::arg("map"),
+             py::arg("origins"),
+             py::arg("directions"),
+             py::arg("range_max"));
+  module.def("_ranges",
+             &ranges_in,
+             py::arg("map"),
+             py::arg("poses"),
+             py::arg("directions"),
+             py::arg("range_max"));
+}
+
+}  // namespace pointflight::python

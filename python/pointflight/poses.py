@@ -1,0 +1,58 @@
+"""Poses and patterns of directions."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+
+def numbers(values: ArrayLike) -> NDArray[np.float64]:
+    """Float64 of whatever numpy makes real numbers of; not of complex ones, text or objects (TypeError)."""
+    return np.asarray(values).astype(np.float64, casting="same_kind", copy=False)
+
+
+def pose(
+    x: float = 0.0,
+    y: float = 0.0,
+    z: float = 0.0,
+    roll: float = 0.0,
+    pitch: float = 0.0,
+    yaw: float = 0.0,
+) -> NDArray[np.float64]:
+    """T_world_sensor as a matrix (4, 4): metres and radians, turned by roll about x, then pitch about y, then yaw
+    about z, all of the world (aircraft angles)."""
+    cr, sr = math.cos(roll), math.sin(roll)
+    cp, sp = math.cos(pitch), math.sin(pitch)
+    cy, sy = math.cos(yaw), math.sin(yaw)
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr, x],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr, y],
+            [-sp, cp * sr, cp * cr, z],
+            [0.0, 0.0, 0.0, 1.0],
+        ]
+    )
+
+
+def grid(
+    rows: int,
+    columns: int,
+    elevation: ArrayLike = (-math.pi / 6, math.pi / 6),
+    azimuth: ArrayLike = (-math.pi, math.pi),
+) -> NDArray[np.float64]:
+    """Directions (rows, columns, 3) of a range image, unit vectors in the sensor frame.
+
+    Row 0 is the highest and column 0 the farthest to the left, as in a picture. `elevation` and `azimuth` are the ends
+    of the field of view in radians; directions are the centres of its cells.
+    """
+    if rows < 1 or columns < 1:
+        raise ValueError(f"rows, columns: 1 or more are wanted, not {rows} and {columns}")
+    low, high = (float(v) for v in np.asarray(elevation, dtype=np.float64))
+    right, left = (float(v) for v in np.asarray(azimuth, dtype=np.float64))
+    up = (high - (high - low) * (np.arange(rows) + 0.5) / rows)[:, None]
+    around = (left - (left - right) * (np.arange(columns) + 0.5) / columns)[None, :]
+    return np.stack(
+        np.broadcast_arrays(np.cos(up) * np.cos(around), np.cos(up) * np.sin(around), np.sin(up)), axis=-1
+    )
