@@ -19,7 +19,7 @@ struct FitOptions {
   double exponent = 1.0;     ///< Pass 1: sizes times (hits / (hits + passes))^exponent.
   double step = 0.7;         ///< Pass 2: of ln(size) for blame alone.
   double doubt = 0.3;        ///< Pass 2: evidence below this weight changes little.
-  double leak_weight = 3.0;  ///< A ray that leaks counts as so many early ones.
+  double leak_weight = 1.5;  ///< A ray that leaks counts as so many early ones.
   double growth_max = 2.0;   ///< Pass 2: of a size.
   double shift_step = 2.0;   ///< Pass 2: of a centre for blame alone, in standard deviations.
   double shift_max = 0.7;    ///< Pass 2: of a centre, in standard deviations.
