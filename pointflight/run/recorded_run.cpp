@@ -251,10 +251,7 @@ struct RecordedRun::Files {
     scan.snapshot = mounted.takes_snapshots();
     scan.marks = mounted.marks();
     scan.middle = mounted.lidar().middle_of(scan.start, beams, scan.snapshot);
-    // rolling scans have their motion in them, and nothing that deskewing left
-    const LidarSettings& settings = mounted.lidar().settings();
-    const DeskewingSettings left = scan.snapshot ? settings.deskewing : DeskewingSettings{};
-    read_scan_points(path, beams, left, scan);
+    read_scan_points(path, beams, mounted.lidar().settings().deskewing, scan);
     return ScanSample{std::make_shared<const Scan>(std::move(scan)), track};
   }
 
