@@ -139,7 +139,9 @@ void add_scan_command(CLI::App& parent, int& /*exit_code*/) {
   app->add_option("--seed", flags->seed, "Of the noise")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
-  app->add_option("--index", flags->index, "Which scan of a pattern that does not repeat")
+  app->add_option("--index",
+                  flags->index,
+                  "Which scan: of a pattern that does not repeat, and of what changes with time")
       ->check(CLI::Range(0, 1 << 26));
   app->add_flag("--no-noise", flags->no_noise, "Exact ranges");
   add_surroundings_flags(*app, flags->surroundings);

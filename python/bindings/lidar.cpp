@@ -1,11 +1,10 @@
 // Sensors: their beams, and scans of a map.
 #include "pointflight/lidar/lidar.hpp"
 
-#include <pybind11/stl.h>
-
 #include <memory>
-#include <optional>
+#include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "pointflight/core/settings.hpp"
@@ -66,10 +65,11 @@ class LidarObject {
     return py::make_tuple(rows, fields, scan.beams);
   }
 
-  /// Directions (n, 3), times (n,) after the scan's start, rings (n,).
-  [[nodiscard]] py::tuple beams(std::uint32_t index) const {
-    const auto ordered = beams_->of(index, *executor());
-    const std::vector<Beam>& all = ordered->beams;
+  /// Of the scan with this index and seed: directions (n, 3), times (n,) after its start, rings
+  /// (n,).
+  [[nodiscard]] py::tuple beams(std::uint64_t seed, std::uint32_t index) const {
+    const Lidar lidar(settings_, 0, beams_, Surroundings{});
+    const std::vector<Beam> all = lidar.beams(lidar.pattern_scan(index, seed), *executor());
     std::vector<float> directions;
     std::vector<double> times;
     std::vector<std::uint16_t> rings;
@@ -115,7 +115,7 @@ void add_lidar(py::module_& module) {
            py::arg("truth"),
            py::arg("sun_klx"),
            py::arg("reflectivity"))
-      .def("beams", &LidarObject::beams, py::arg("index"));
+      .def("beams", &LidarObject::beams, py::arg("seed"), py::arg("index"));
 }
 
 }  // namespace pointflight::python

@@ -1,10 +1,11 @@
 // Maps: opened, made of clouds, asked for distances and surfels.
 #include <pybind11/stl.h>
 
-#include <cmath>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "pointflight/core/output_file.hpp"

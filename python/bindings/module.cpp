@@ -1,7 +1,5 @@
 #include <pybind11/pybind11.h>
 
-#include <cstring>
-
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/core/version.hpp"
 #include "python/bindings/map_object.hpp"

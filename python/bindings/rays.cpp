@@ -1,9 +1,14 @@
 // Single rays: from anywhere, and of range images.
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "pointflight/core/math.hpp"
+#include "pointflight/map/surfel.hpp"
 #include "pointflight/render/ray_casting.hpp"
 #include "python/bindings/arrays.hpp"
 #include "python/bindings/map_object.hpp"

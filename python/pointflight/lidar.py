@@ -75,9 +75,9 @@ class Lidar:
     def __repr__(self) -> str:
         return f"<Lidar {self.title}>"
 
-    def beams(self, index: int = 0) -> Beams:
-        """The beams of scan number `index` of its pattern."""
-        return Beams(*self._handle.beams(index))
+    def beams(self, *, seed: int = 1, index: int = 0) -> Beams:
+        """What `scan` fires with the same seed and index: patterns that do not repeat start anywhere."""
+        return Beams(*self._handle.beams(seed, index))
 
     def scan(
         self,

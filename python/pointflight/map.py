@@ -77,6 +77,8 @@ class Map:
             clouds = [clouds]
         paths = [os.fspath(cloud) for cloud in clouds]
         written = None if output is None else os.fspath(output)
+        if written is not None and not written.endswith(".pfmap"):
+            raise ValueError(f"output: {written} does not end in .pfmap")  # and so replaces no cloud
         if written is not None and os.path.lexists(written) and not force:
             raise FileExistsError(f"{written}: is there already; force=True replaces it")
         return Map(_pointflight.Map._import_clouds(paths, written, resolution, "a map in memory", progress))

@@ -1,4 +1,4 @@
-"""The examples of docs/python.md run as they stand there."""
+"""The examples of README.md and docs/python.md run as they stand there."""
 
 import os
 import re
@@ -8,7 +8,8 @@ import unittest
 
 from support import folder, path_of, run
 
-PAGE = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "docs", "python.md")
+SOURCE = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..")
+PAGES = [os.path.join(SOURCE, "README.md"), os.path.join(SOURCE, "docs", "python.md")]
 
 
 class DocsTest(unittest.TestCase):
@@ -17,9 +18,11 @@ class DocsTest(unittest.TestCase):
         self.assertEqual(made.returncode, 0, made.stderr)
         made = run("map", "import", path_of("forest.pcd"), "-o", path_of("forest.pfmap"), "--resolution", "0.1")
         self.assertEqual(made.returncode, 0, made.stderr)
-        with open(PAGE, encoding="utf-8") as page:
-            examples = re.findall(r"```python\n(.*?)```", page.read(), re.DOTALL)
-        self.assertGreaterEqual(len(examples), 2)
+        examples = []
+        for path in PAGES:
+            with open(path, encoding="utf-8") as page:
+                examples += re.findall(r"```python\n(.*?)```", page.read(), re.DOTALL)
+        self.assertGreaterEqual(len(examples), 3)
         for example in examples:
             done = subprocess.run(
                 [sys.executable, "-c", example], cwd=folder().name, capture_output=True, text=True, check=False

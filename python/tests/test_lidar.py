@@ -58,6 +58,15 @@ class LidarTest(unittest.TestCase):
         self.assertEqual(beams.ring.max(), 15)
         self.assertTrue(0 <= beams.time.min() and beams.time.max() < 0.1)
 
+    def test_beams_are_those_of_the_scan(self) -> None:
+        lidar = pf.Lidar("mid360")
+        scan = lidar.scan(room(), pf.pose(0, 0, 1.5), seed=3, index=4, noise=False)
+        scan = scan[scan["label"] == 0]
+        beams = lidar.beams(seed=3, index=4)
+        of_shot = {(np.float32(t), r): d for t, r, d in zip(beams.time, beams.ring, beams.direction)}
+        along = np.array([of_shot[shot] for shot in zip(scan["time"], scan["ring"])])
+        np.testing.assert_allclose(scan.xyz, along * scan["range"][:, None], atol=1e-4)
+
     def test_sensor_file_is_there_to_be_changed(self) -> None:
         lidar = pf.Lidar("vlp16")
         self.assertEqual(lidar.rate, 10.0)

@@ -2,6 +2,7 @@
 
 import json
 import os
+import signal
 import sys
 import threading
 import unittest
@@ -89,6 +90,19 @@ class MapTest(unittest.TestCase):
         self.assertEqual(pf.Map.open(path).resolution, 0.2)
         pf.Map.from_points(room_points(), path, resolution=0.1, force=True)
         self.assertEqual(pf.Map.open(path).resolution, 0.1)
+        with self.assertRaisesRegex(ValueError, "pfmap"):
+            pf.Map.from_points(room_points(), path_of("cloud.pcd"), force=True)
+
+    def test_interrupt_ends_the_import(self) -> None:
+        path = path_of("interrupted.pfmap")
+        timer = threading.Timer(0.1, os.kill, (os.getpid(), signal.SIGINT))
+        timer.start()
+        with self.assertRaises(KeyboardInterrupt):
+            for _ in range(100):  # however fast the machine is
+                pf.Map.from_points(room_points(), path, force=True)
+                os.remove(path)
+        timer.join()
+        self.assertFalse(os.path.exists(path + ".partial"))
 
     def test_exception_of_a_callback_ends_the_import_and_comes_out(self) -> None:
         said = []
