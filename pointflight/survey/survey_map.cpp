@@ -19,7 +19,7 @@ namespace {
 
 constexpr std::size_t kLeftOut = 10;    // one stretch of the survey of so many judges
 constexpr std::size_t kStretches = 30;  // scans shot in a row see the same from the same position
-constexpr double kLevel = 0.0005;         // of what left out scans saw: of equals the finer
+constexpr double kLevel = 0.0005;       // of what left out scans saw: of equals the finer
 
 EditOptions edit_options_of(const ImportOptions& options) {
   EditOptions edit;

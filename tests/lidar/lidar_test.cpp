@@ -307,7 +307,8 @@ TEST(Lidar, MarksWhatCameThroughSpaceThatNoSurveySaw) {
   }
   Scan unmarked;
   testing::expect_contains(
-      testing::error_of([&] { read_scan_points(folder / "s.pcd", beams, {}, unmarked); }), "no scan");
+      testing::error_of([&] { read_scan_points(folder / "s.pcd", beams, {}, unmarked); }),
+      "no scan");
 }
 
 /// A box of 12 x 12 x 6 m around the origin.
@@ -385,7 +386,8 @@ TEST(Lidar, Statistics_TruthIsWhatIsThereAndWhereExactDeskewingPutsThePoint) {
     Scan read;
     read.marks = scan.marks;
     read.start = scan.start;
-    read_scan_points(folder / "s.pcd", lidar.beams(lidar.pattern_scan(0, 0), Executor(1)), {}, read);
+    read_scan_points(
+        folder / "s.pcd", lidar.beams(lidar.pattern_scan(0, 0), Executor(1)), {}, read);
     ASSERT_EQ(read.truth.size(), scan.truth.size());
     for (std::size_t i = 0; i < read.truth.size(); ++i) {
       EXPECT_EQ(read.truth[i].range, scan.truth[i].range);
