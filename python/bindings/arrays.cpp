@@ -62,6 +62,33 @@ Array<double> rows_of_three(const Array<double>& array, const char* name) {
   return array;
 }
 
+Vector3d vector_from(const Array<double>& array, const char* name) {
+  require_shape(array, name, {3});
+  return {array.at(0), array.at(1), array.at(2)};
+}
+
+py::array_t<double> array_of(const Vector3d& vector) {
+  py::array_t<double> array(3);
+  for (int k = 0; k < 3; ++k) array.mutable_at(k) = vector[k];
+  return array;
+}
+
+py::array_t<double> array_of(const Quaterniond& rotation) {
+  py::array_t<double> array(4);
+  for (int k = 0; k < 4; ++k) array.mutable_at(k) = rotation.coeffs()[k];
+  return array;
+}
+
+py::array_t<double> array_of(const Pose& pose) {
+  py::array_t<double> array({4, 4});
+  const Matrix3d rotation = pose.rotation.toRotationMatrix();
+  for (int i = 0; i < 4; ++i) {
+    for (int k = 0; k < 3; ++k) array.mutable_at(i, k) = i < 3 ? rotation(i, k) : 0.0;
+    array.mutable_at(i, 3) = i < 3 ? pose.translation[i] : 1.0;
+  }
+  return array;
+}
+
 std::vector<Pose> poses_from(const Array<double>& matrices, const char* name) {
   if (matrices.ndim() == 2) return {pose_from(matrices, name)};
   require_shape(matrices, name, {-1, 4, 4});

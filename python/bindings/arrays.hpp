@@ -28,6 +28,18 @@ void require_shape(const py::array& array, const char* name, const std::vector<p
 /// An array of (n, 3), or of (3,) which counts as one row. Throws ValueError.
 Array<double> rows_of_three(const Array<double>& array, const char* name);
 
+/// A vector of an array (3,). Throws ValueError.
+Vector3d vector_from(const Array<double>& array, const char* name);
+
+/// An array (3,).
+py::array_t<double> array_of(const Vector3d& vector);
+
+/// An array (4,): x, y, z, w.
+py::array_t<double> array_of(const Quaterniond& rotation);
+
+/// An array (4, 4).
+py::array_t<double> array_of(const Pose& pose);
+
 /// Poses T_world_sensor from (4, 4) or (n, 4, 4). Throws ValueError if one is no rigid transform.
 std::vector<Pose> poses_from(const Array<double>& matrices, const char* name);
 

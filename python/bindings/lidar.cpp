@@ -11,6 +11,7 @@
 #include "pointflight/lidar/scan.hpp"
 #include "python/bindings/arrays.hpp"
 #include "python/bindings/map_object.hpp"
+#include "python/bindings/run_objects.hpp"
 #include "python/bindings/work.hpp"
 
 namespace pointflight::python {
@@ -54,15 +55,7 @@ class LidarObject {
       request.map = object.map.get();
       scan = lidar.take(request, PoseTrack(T_world_sensor), *object.beams, *executor());
     }
-    py::list fields;
-    for (const PcdField& field : scan_fields(scan.marks)) {
-      fields.append(py::make_tuple(
-          field.name, std::string(1, field.type == 'F' ? 'f' : 'u') + std::to_string(field.size)));
-    }
-    const std::size_t size = scan.points.size() * scan_row_size(scan.marks);
-    py::array_t<std::uint8_t> rows(static_cast<py::ssize_t>(size));
-    write_scan_rows(scan, std::as_writable_bytes(std::span(rows.mutable_data(), size)));
-    return py::make_tuple(rows, fields, scan.beams);
+    return rows_of_scan(scan);
   }
 
   /// Of the scan with this index and seed: directions (n, 3), times (n,) after its start, rings
@@ -98,6 +91,18 @@ class LidarObject {
 };
 
 }  // namespace
+
+py::tuple rows_of_scan(const Scan& scan) {
+  py::list fields;
+  for (const PcdField& field : scan_fields(scan.marks)) {
+    fields.append(py::make_tuple(
+        field.name, std::string(1, field.type == 'F' ? 'f' : 'u') + std::to_string(field.size)));
+  }
+  const std::size_t size = scan.points.size() * scan_row_size(scan.marks);
+  py::array_t<std::uint8_t> rows(static_cast<py::ssize_t>(size));
+  write_scan_rows(scan, std::as_writable_bytes(std::span(rows.mutable_data(), size)));
+  return py::make_tuple(rows, fields, scan.beams);
+}
 
 void add_lidar(py::module_& module) {
   py::class_<LidarObject, std::shared_ptr<LidarObject>>(module, "_Lidar")

@@ -3,6 +3,7 @@
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/core/version.hpp"
 #include "python/bindings/map_object.hpp"
+#include "python/bindings/run_objects.hpp"
 #include "python/bindings/work.hpp"
 
 namespace pointflight::python {
@@ -26,6 +27,10 @@ void add_all(py::module_& module) {
   add_map(module);
   add_rays(module);
   add_lidar(module);
+  add_settings(module);
+  add_commands(module);
+  add_samples(module);
+  add_simulation(module);
 }
 
 }  // namespace

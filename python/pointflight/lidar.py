@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from typing import Any, NamedTuple, Union
+from typing import Any, List, NamedTuple, Tuple, Union
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -47,6 +47,13 @@ class Scan(np.ndarray):
         return np.lib.stride_tricks.as_strided(
             x, shape=(len(self), 3), strides=(self.strides[0], x.itemsize), writeable=self.flags.writeable
         )
+
+
+def scan_of(rows: NDArray[np.uint8], fields: List[Tuple[str, str]], beams: int) -> Scan:
+    """A scan of its bytes."""
+    scan = rows.view(np.dtype(fields)).view(Scan)
+    scan.beams = beams
+    return scan
 
 
 class Lidar:
@@ -97,9 +104,6 @@ class Lidar:
         noise: False: exact ranges. truth: adds what no sensor knows of each point. sun_klx: kilolux, 100 in full sun.
         reflectivity: of surfaces of which the map does not say it; 0: it varies from surfel to surfel.
         """
-        rows, fields, beams = self._handle.scan(
-            map._handle, numbers(pose), seed, index, noise, truth, sun_klx, reflectivity
+        return scan_of(
+            *self._handle.scan(map._handle, numbers(pose), seed, index, noise, truth, sun_klx, reflectivity)
         )
-        scan = rows.view(np.dtype(fields)).view(Scan)
-        scan.beams = beams
-        return scan
