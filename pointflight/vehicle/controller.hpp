@@ -1,5 +1,6 @@
 #pragma once
 
+#include <any>
 #include <cstddef>
 #include <memory>
 #include <optional>
@@ -39,6 +40,9 @@ struct ControllerMemory {
   bool spins = false;  ///< The rotors that are left cannot hold a heading.
   /// Of the rotors that are left about body z by the last commands, while it spins, kg m^2/s.
   double rotor_momentum = 0.0;
+  /// What a controller that a program has added remembers besides: any value that is copied as a
+  /// whole.
+  std::any own;
 };
 
 /// Turns setpoints into rotor speeds. It sees the true state.

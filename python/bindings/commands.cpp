@@ -41,14 +41,26 @@ void add_setpoints(py::module_& module) {
              require_shape(speeds, "speeds", {-1});
              return RotorSpeedCommand{{speeds.data(), speeds.data() + speeds.size()}};
            }),
-           py::arg("speeds"));
+           py::arg("speeds"))
+      .def_property_readonly(
+          "speeds",
+          [](const RotorSpeedCommand& c) {
+            return py::array_t<double>(static_cast<py::ssize_t>(c.speeds.size()), c.speeds.data());
+          },
+          "(n,): rad/s.");
   command_class<BodyRateCommand>(
       module, "BodyRates", "Rates about the body's axes (rad/s) and total thrust along body z (N).")
       .def(py::init([](const Array<double>& rates, double thrust) {
              return BodyRateCommand{vector_from(rates, "rates"), thrust};
            }),
            py::arg("rates"),
-           py::arg("thrust"));
+           py::arg("thrust"))
+      .def_property_readonly(
+          "rates",
+          [](const BodyRateCommand& c) { return array_of(c.omega_body); },
+          "(3,): rad/s, body.")
+      .def_property_readonly(
+          "thrust", [](const BodyRateCommand& c) { return c.thrust; }, "N");
   command_class<AttitudeCommand>(
       module,
       "Attitude",
@@ -63,7 +75,17 @@ void add_setpoints(py::module_& module) {
           }),
           py::arg("orientation"),
           py::arg("thrust"),
-          py::arg("rates") = py::make_tuple(0.0, 0.0, 0.0));
+          py::arg("rates") = py::make_tuple(0.0, 0.0, 0.0))
+      .def_property_readonly(
+          "orientation",
+          [](const AttitudeCommand& c) { return array_of(c.q_world_body); },
+          "(4,): x, y, z, w.")
+      .def_property_readonly(
+          "thrust", [](const AttitudeCommand& c) { return c.thrust; }, "N")
+      .def_property_readonly(
+          "rates",
+          [](const AttitudeCommand& c) { return array_of(c.omega_body); },
+          "(3,): rad/s, body.");
   command_class<AccelerationCommand>(module,
                                      "Acceleration",
                                      "Acceleration without gravity (zero hovers), m/s^2, world, "
@@ -73,7 +95,15 @@ void add_setpoints(py::module_& module) {
            }),
            py::arg("acceleration"),
            py::arg("yaw") = 0.0,
-           py::arg("yaw_rate") = 0.0);
+           py::arg("yaw_rate") = 0.0)
+      .def_property_readonly(
+          "acceleration",
+          [](const AccelerationCommand& c) { return array_of(c.a_world); },
+          "(3,): m/s^2, world.")
+      .def_property_readonly(
+          "yaw", [](const AccelerationCommand& c) { return c.yaw; }, "rad")
+      .def_property_readonly(
+          "yaw_rate", [](const AccelerationCommand& c) { return c.yaw_rate; }, "rad/s");
   command_class<VelocityCommand>(
       module,
       "Velocity",
@@ -89,7 +119,19 @@ void add_setpoints(py::module_& module) {
            py::arg("velocity"),
            py::arg("yaw") = py::none(),
            py::arg("yaw_rate") = 0.0,
-           py::arg("in_body") = false);
+           py::arg("in_body") = false)
+      .def_property_readonly(
+          "velocity", [](const VelocityCommand& c) { return array_of(c.v_world); }, "(3,): m/s.")
+      .def_property_readonly(
+          "yaw",
+          [](const VelocityCommand& c) { return c.turn ? std::nullopt : std::optional(c.yaw); },
+          "rad; None: it turns.")
+      .def_property_readonly(
+          "yaw_rate", [](const VelocityCommand& c) { return c.yaw_rate; }, "rad/s")
+      .def_property_readonly(
+          "in_body",
+          [](const VelocityCommand& c) { return c.in_body; },
+          "Along the level body axes.");
   command_class<PositionCommand>(
       module,
       "Position",
@@ -111,7 +153,21 @@ void add_setpoints(py::module_& module) {
            py::arg("velocity") = py::make_tuple(0.0, 0.0, 0.0),
            py::arg("acceleration") = py::make_tuple(0.0, 0.0, 0.0),
            py::arg("yaw") = 0.0,
-           py::arg("yaw_rate") = 0.0);
+           py::arg("yaw_rate") = 0.0)
+      .def_property_readonly(
+          "position",
+          [](const PositionCommand& c) { return array_of(c.p_world); },
+          "(3,): m, world.")
+      .def_property_readonly(
+          "velocity", [](const PositionCommand& c) { return array_of(c.v_world); }, "(3,): m/s.")
+      .def_property_readonly(
+          "acceleration",
+          [](const PositionCommand& c) { return array_of(c.a_world); },
+          "(3,): m/s^2.")
+      .def_property_readonly(
+          "yaw", [](const PositionCommand& c) { return c.yaw; }, "rad")
+      .def_property_readonly(
+          "yaw_rate", [](const PositionCommand& c) { return c.yaw_rate; }, "rad/s");
 }
 
 /// (n, 4): x, y, z, yaw of control points.

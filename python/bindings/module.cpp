@@ -31,6 +31,7 @@ void add_all(py::module_& module) {
   add_commands(module);
   add_samples(module);
   add_simulation(module);
+  add_parts(module);
 }
 
 }  // namespace

@@ -21,5 +21,6 @@ void add_settings(pybind11::module_& module);
 void add_commands(pybind11::module_& module);
 void add_samples(pybind11::module_& module);
 void add_simulation(pybind11::module_& module);
+void add_parts(pybind11::module_& module);
 
 }  // namespace pointflight::python

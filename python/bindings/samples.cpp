@@ -74,6 +74,9 @@ py::array_t<double> copy_of(const std::vector<double>& values) {
 }
 
 void add_truth(py::module_& module) {
+  py::class_<RigidBodyState> body(
+      module, "BodyState", "Where a body is and how it moves: what a controller sees.");
+  add_body(body, [](const RigidBodyState& s) -> const RigidBodyState& { return s; });
   auto state = sample_class<StateSample>(
       module,
       "StateSample",

@@ -38,16 +38,19 @@ void set_threads(int threads) {
   all.executor = std::make_shared<const Executor>(threads);
 }
 
+std::shared_ptr<py::object> held(const py::object& object) {
+  return {new py::object(object), [](py::object* one) {
+            if (Py_IsInitialized() == 0) return;  // what is left at the end stays
+            const py::gil_scoped_acquire lock;
+            delete one;
+          }};
+}
+
 Progress interruptible(const py::object& callable) {
-  // its last copy may go away without the lock
-  auto held = std::shared_ptr<py::object>(new py::object(callable), [](py::object* object) {
-    const py::gil_scoped_acquire lock;
-    delete object;
-  });
-  return [held](std::string_view what, double share) {
+  return [callable = held(callable)](std::string_view what, double share) {
     const py::gil_scoped_acquire lock;
     if (PyErr_CheckSignals() != 0) throw py::error_already_set();
-    if (!held->is_none()) (*held)(std::string(what), share);
+    if (!callable->is_none()) (*callable)(std::string(what), share);
   };
 }
 

@@ -16,6 +16,10 @@ std::shared_ptr<const Executor> executor();
 /// From now on work runs on so many threads; 0: all cores.
 void set_threads(int threads);
 
+/// An object that C++ keeps: its last copy may go away without the interpreter's lock, and even
+/// after the interpreter.
+std::shared_ptr<pybind11::object> held(const pybind11::object& object);
+
 /// Lets Ctrl-C end long work, whose thread does not hold the interpreter's lock meanwhile, and
 /// passes the progress on to a callable of (what, share) if it is not None. An exception of the
 /// callable ends the work and comes out of it.

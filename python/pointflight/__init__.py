@@ -10,7 +10,9 @@ from ._pointflight import (
     Arm,
     Attitude,
     BodyRates,
+    BodyState,
     CollisionEvent,
+    ControllerMemory,
     Disarm,
     Hover,
     ImuSample,
@@ -22,6 +24,7 @@ from ._pointflight import (
     Position,
     RotorSpeeds,
     ScanSample,
+    SensorInput,
     SimulationState,
     StateSample,
     StatusSample,
@@ -36,6 +39,7 @@ from ._pointflight import (
 )
 from .lidar import Beams, Lidar, Scan
 from .map import Map, MapInfo
+from .parts import Controller, add_controller, add_renderer, add_sensor
 from .poses import grid, pose
 from .rays import Hits, ranges, raycast
 from .runs import DataSet, Flight, Run, RunScan, Scans, columns, poses_of, read_pcd, read_table
@@ -48,9 +52,12 @@ __all__ = [
     "Attitude",
     "Beams",
     "BodyRates",
+    "BodyState",
     "CollisionEvent",
     "Command",
     "CommandRejected",
+    "Controller",
+    "ControllerMemory",
     "DataSet",
     "Disarm",
     "Flight",
@@ -75,6 +82,7 @@ __all__ = [
     "ScanSample",
     "Scans",
     "Scenario",
+    "SensorInput",
     "Simulation",
     "SimulationState",
     "StateSample",
@@ -86,6 +94,9 @@ __all__ = [
     "Velocity",
     "Waypoints",
     "__version__",
+    "add_controller",
+    "add_renderer",
+    "add_sensor",
     "columns",
     "grid",
     "pose",

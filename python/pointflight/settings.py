@@ -118,6 +118,12 @@ class Vehicle:
         """Raises InputError that lists the names."""
         self._handle = _pointflight._Vehicle.load(os.fspath(name))
 
+    @staticmethod
+    def _of(handle: _pointflight._Vehicle) -> Vehicle:
+        made = Vehicle.__new__(Vehicle)
+        made._handle = handle
+        return made
+
     @property
     def title(self) -> str:
         """Name for people."""
