@@ -24,7 +24,7 @@ class Beams(NamedTuple):
     """(n,): as the vendor's driver numbers it."""
 
 
-class Scan(np.ndarray):
+class Scan(np.ndarray):  # type: ignore[type-arg]  # numpy before 1.22 cannot be indexed
     """The returns of one scan in firing order: a structured array (n,) with the fields of the program's PCD files.
 
     x, y, z float32, m in the sensor frame; intensity, range float32; time float32, s after the scan's start; ring,

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
 import functools
 import json
 import os
-from typing import Any, Dict, Iterator, List, NamedTuple, Sequence, Tuple, Union
+from typing import Any, Dict, Iterator, List, Sequence, Tuple, Union
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -86,7 +87,8 @@ def poses_of(table: Table) -> NDArray[np.float64]:
     return poses
 
 
-class RunScan(NamedTuple):
+@dataclasses.dataclass(frozen=True)
+class RunScan:
     """A scan of a run."""
 
     points: Scan

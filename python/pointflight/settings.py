@@ -55,6 +55,8 @@ class Scenario:
     that is wrong and what would do. A scenario does not change; `replace` makes another.
     """
 
+    _handle: _pointflight._Scenario
+
     def __init__(self, values: Union[Path, Mapping[str, Any], Scenario]) -> None:
         """values: the path of a file, or its keys: `{"map": "hall.pfmap", "vehicle": {"start": [2, 3, 1.5]}}`.
         Relative paths in keys are taken from the working folder."""

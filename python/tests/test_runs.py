@@ -1,5 +1,6 @@
 """What runs have written."""
 
+import importlib.util
 import os
 import shutil
 import unittest
@@ -56,6 +57,13 @@ class RunsTest(unittest.TestCase):
             run.flight("c")
         with self.assertRaises(IndexError):
             run.flight(2)
+
+    @unittest.skipUnless(importlib.util.find_spec("pandas"), "pandas is not installed")
+    def test_pandas_takes_tables(self) -> None:
+        import pandas
+
+        frame = pandas.DataFrame(pf.Run(recorded("runs")).flight(0).trajectory)
+        self.assertEqual(frame["pz"].iloc[0], 1.5)
 
     def test_scans(self) -> None:
         scans = pf.Run(recorded("runs")).flight(0).scans
