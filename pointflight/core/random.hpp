@@ -43,6 +43,7 @@ enum class StreamId : std::uint32_t {
   kLidarOffset = 32,      ///< of ranges; entity: vehicle << 8 | lidar, index: 0 all, 1 + ring
   kLidarBlockage = 33,    ///< entity: vehicle << 8 | lidar, index: second of the run
   kLidarDeskewing = 34,   ///< entity: vehicle << 8 | lidar, index: draw * 6 + component
+  kLearning = 35,         ///< free positions; index: draw
   kTest = 1000,           ///< inputs of tests and benchmarks
 };
 

@@ -7,7 +7,6 @@
 
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/input_error.hpp"
-#include "pointflight/core/interpolation.hpp"
 #include "pointflight/core/resources.hpp"
 #include "pointflight/vehicle/command.hpp"
 
@@ -141,11 +140,6 @@ void describe_battery(SettingsVisitor& v, BatterySettings& b) {
   });
 }
 
-/// J = v / (n D).
-double advance_ratio(double climb, double speed, double radius) {
-  return kPi * climb / (std::max(speed, 1.0) * radius);
-}
-
 template <class Fail>
 void check_rotor_curves(const RotorModel& r, const Fail& fail) {
   const std::size_t n = r.advance_ratios.size();
@@ -181,6 +175,9 @@ VehicleSettings read(SettingsReader& reader, const std::string& path) {
   };
   if (settings.rotors.size() < 4) {
     fail("rotors", fmt::format("{} rotors; at least 4 are needed", settings.rotors.size()));
+  }
+  if (settings.rotors.size() > kMostRotors) {
+    fail("rotors", fmt::format("{} rotors; {} at most", settings.rotors.size(), kMostRotors));
   }
   const SolidSize& hull = settings.hull_size;
   const char* fault = fault_of_height(*settings.shape, hull.height, hull.radius);
@@ -264,42 +261,6 @@ std::string vehicle_reference() {
 
 Solid VehicleSettings::hull() const {
   return shape->make(hull_size);
-}
-
-/// Constant beyond the first and the last ratio.
-RotorModel::Shares RotorModel::shares(double climb, double speed) const {
-  const std::vector<double>& js = advance_ratios;
-  if (js.empty()) return {};
-  const double ratio = advance_ratio(climb, speed, radius);
-  if (ratio <= js.front()) return {thrust_shares.front(), torque_shares.front()};
-  const double x = std::min(ratio, js.back());
-  const std::size_t piece = piece_at(js, x);  // of both
-  return {on_piece(js, thrust_shares, piece, x), on_piece(js, torque_shares, piece, x)};
-}
-
-/// Where the share is constant w^2 = T / (k_f share). Along a straight piece of it, share = y + m J
-/// with J = c / w, c = pi v / R, and y w^2 + m c w = T / k_f. The piece whose own J it has is the
-/// one.
-double RotorModel::speed_for(double thrust, double climb) const {
-  const double square = thrust / thrust_coefficient;
-  if (advance_ratios.empty()) return std::sqrt(square);
-  const auto ratio_of = [&](double speed) { return advance_ratio(climb, speed, radius); };
-  const std::vector<double>& js = advance_ratios;
-  constexpr double kRounding = 1e-9;
-  if (const double speed = std::sqrt(square / thrust_shares.front());
-      ratio_of(speed) <= js.front()) {
-    return speed;
-  }
-  const double scale = kPi * climb / radius;
-  for (std::size_t i = 1; i < js.size(); ++i) {
-    const double slope = (thrust_shares[i] - thrust_shares[i - 1]) / (js[i] - js[i - 1]);
-    const double base = thrust_shares[i - 1] - slope * js[i - 1];
-    const double half = 0.5 * slope * scale;
-    const double speed = (std::sqrt(std::max(0.0, half * half + base * square)) - half) / base;
-    const double ratio = ratio_of(speed);
-    if (ratio >= js[i - 1] - kRounding && ratio <= js[i] + kRounding) return speed;
-  }
-  return speed_max;
 }
 
 double VehicleSettings::hover_speed() const {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -13,6 +14,9 @@
 #include "pointflight/vehicle/imu_errors.hpp"
 
 namespace pointflight {
+
+/// A vehicle's rotors: four at least, and so many at most.
+inline constexpr std::size_t kMostRotors = 32;
 
 /// One rotor: where it sits and how it turns. All thrust along body +z.
 struct RotorPlacement {
@@ -142,7 +146,7 @@ struct VehicleSettings {
   Vector3d drag_area = Vector3d::Zero();              ///< c_d A along each body axis, m^2.
   Vector3d rotational_drag = Vector3d::Zero();        ///< K_d about each body axis, N m s^2.
   RotorModel rotor;                                   ///< One for all rotors.
-  /// Four or more; commands and states count them in this order.
+  /// Four to `kMostRotors`; commands and states count them in this order.
   std::vector<RotorPlacement> rotors;
   /// The innermost command that its autopilot takes (`setpoint_names`).
   std::string lowest_command = "rotor_speeds";

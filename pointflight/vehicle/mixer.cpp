@@ -7,27 +7,15 @@
 #include <cassert>
 #include <cmath>
 
+#include "pointflight/core/argument.hpp"
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/vehicle/bounded_least_squares.hpp"
+#include "pointflight/vehicle/internal/mixer-inl.hpp"
+#include "pointflight/vehicle/internal/scalar_numbers-inl.hpp"
 
 namespace pointflight {
 namespace {
-
-/// The largest share in [0, 1] of `part` that can be added to `base` without leaving [min, max].
-double feasible_share(const Eigen::VectorXd& base,
-                      const Eigen::VectorXd& part,
-                      double min,
-                      double max) {
-  double share = 1.0;
-  for (Eigen::Index i = 0; i < base.size(); ++i) {
-    if (base[i] + part[i] > max && part[i] > 0.0)
-      share = std::min(share, (max - base[i]) / part[i]);
-    if (base[i] + part[i] < min && part[i] < 0.0)
-      share = std::min(share, (min - base[i]) / part[i]);
-  }
-  return std::max(0.0, share);
-}
 
 // What gives way to what, if not all can be had: squared, these weigh shares of the weight, and
 // of the torques that it makes at the arms and by the rotors' drag.
@@ -41,20 +29,19 @@ constexpr double kHeadingShare = 0.2;  // of a rotor's torque in hover, left ove
 }  // namespace
 
 Mixer::Mixer(const VehicleSettings& settings)
-    : rotor_(settings.rotor),
-      places_(settings.rotors),
-      thrust_coefficient_(settings.rotor.thrust_coefficient),
-      thrust_min_(thrust_coefficient_ * settings.rotor.speed_min * settings.rotor.speed_min),
-      thrust_max_(thrust_coefficient_ * settings.rotor.speed_max * settings.rotor.speed_max),
-      weight_(settings.mass * kGravity) {
+    : settings_(settings), weight_(settings.mass * kGravity) {
+  require_argument(settings.rotors.size() <= kMostRotors, "Mixer: more than kMostRotors");
+  const RotorModel& rotor = settings.rotor;
+  model_.thrust_min = rotor.thrust_coefficient * rotor.speed_min * rotor.speed_min;
+  model_.thrust_max = rotor.thrust_coefficient * rotor.speed_max * rotor.speed_max;
   const auto n = static_cast<Eigen::Index>(settings.rotors.size());
   allocation_.resize(4, n);
-  const double torque_per_thrust = settings.rotor.torque_coefficient / thrust_coefficient_;
+  const double torque_per_thrust = rotor.torque_coefficient / rotor.thrust_coefficient;
   for (Eigen::Index i = 0; i < n; ++i) {
-    const RotorPlacement& rotor = settings.rotors[static_cast<std::size_t>(i)];
+    const RotorPlacement& place = settings.rotors[static_cast<std::size_t>(i)];
     // r x T e3 = (y, -x, 0) T
-    allocation_.col(i) << 1.0, rotor.position.y(), -rotor.position.x(),
-        rotor.yaw_sign * torque_per_thrust;
+    allocation_.col(i) << 1.0, place.position.y(), -place.position.x(),
+        place.yaw_sign * torque_per_thrust;
   }
   const Eigen::Matrix4d square = allocation_ * allocation_.transpose();
   const Eigen::FullPivLU<Eigen::Matrix4d> lu(square);
@@ -63,44 +50,31 @@ Mixer::Mixer(const VehicleSettings& settings)
         fmt::format("{}: rotors: this layout cannot make thrust, roll, pitch and yaw by itself",
                     settings.path));
   }
-  inverse_ = allocation_.transpose() * lu.inverse();
+  const Eigen::MatrixXd inverse = allocation_.transpose() * lu.inverse();
+  for (Eigen::Index i = 0; i < n; ++i) {
+    for (Eigen::Index k = 0; k < 4; ++k) {
+      model_.inverse[static_cast<std::size_t>(i)][static_cast<std::size_t>(k)] = inverse(i, k);
+    }
+  }
 }
 
 /// Along a rotor's axis, m/s.
 double Mixer::climb_of(std::size_t rotor, const AirMotion& motion) const {
-  return (motion.v_body + motion.omega_body.cross(places_[rotor].position)).z();
+  return HWY_NAMESPACE::climb_of(settings_.rotors[rotor],
+                                 HWY_NAMESPACE::numbers_of(motion.v_body),
+                                 HWY_NAMESPACE::numbers_of(motion.omega_body));
 }
 
 std::vector<double> Mixer::speeds(const Wrench& wrench, const AirMotion& motion) const {
-  const auto n = static_cast<double>(allocation_.cols());
-  Eigen::VectorXd tilt = inverse_.col(1) * wrench.torque.x() + inverse_.col(2) * wrench.torque.y();
-  const Eigen::VectorXd yaw = inverse_.col(3) * wrench.torque.z();
-
-  // roll and pitch must fit between the limits at some thrust
-  const double spread = tilt.maxCoeff() - tilt.minCoeff();
-  if (spread > thrust_max_ - thrust_min_) tilt *= (thrust_max_ - thrust_min_) / spread;
-  // thrust gives way to them
-  Eigen::VectorXd lift = inverse_.col(0) * wrench.thrust;
-  const double mean = lift.sum() / n;
-  const double room_low = thrust_min_ - (lift + tilt).minCoeff();
-  const double room_high = thrust_max_ - (lift + tilt).maxCoeff();
-  const double shift = room_low > 0.0 ? room_low : std::min(0.0, room_high);
-  if (shift != 0.0) {
-    lift = Eigen::VectorXd::Constant(lift.size(), mean + shift);
-    lift = lift.cwiseMax(thrust_min_ - tilt.minCoeff()).cwiseMin(thrust_max_ - tilt.maxCoeff());
-  }
-  // yaw takes what is left
-  const Eigen::VectorXd base = lift + tilt;
-  const Eigen::VectorXd thrusts = base + feasible_share(base, yaw, thrust_min_, thrust_max_) * yaw;
-  std::vector<double> speeds(static_cast<std::size_t>(thrusts.size()));
-  for (std::size_t i = 0; i < speeds.size(); ++i) {
-    const double thrust = thrusts[static_cast<Eigen::Index>(i)];
-    speeds[i] = rotor_.speed_for(std::clamp(thrust, thrust_min_, thrust_max_), climb_of(i, motion));
-    if (!rotor_.advance_ratios.empty()) {
-      speeds[i] = std::clamp(speeds[i], rotor_.speed_min, rotor_.speed_max);
-    }
-  }
-  return speeds;
+  HWY_NAMESPACE::PerRotor<double> speeds;
+  HWY_NAMESPACE::speeds_for(
+      settings_,
+      model_,
+      HWY_NAMESPACE::WrenchNumbers<double>{wrench.thrust, HWY_NAMESPACE::numbers_of(wrench.torque)},
+      HWY_NAMESPACE::numbers_of(motion.v_body),
+      HWY_NAMESPACE::numbers_of(motion.omega_body),
+      speeds);
+  return {speeds.begin(), speeds.begin() + static_cast<std::ptrdiff_t>(settings_.rotors.size())};
 }
 
 Eigen::VectorXd Mixer::thrusts_of_what_is_left(const Wrench& wrench,
@@ -127,8 +101,8 @@ Eigen::VectorXd Mixer::thrusts_of_what_is_left(const Wrench& wrench,
   for (Eigen::Index i = 0; i < n; ++i) {
     const double share = shares[static_cast<std::size_t>(i)];
     const double square = share < kLeastShare ? 0.0 : share * share;
-    low[i] = square * thrust_min_ / even;
-    high[i] = square * thrust_max_ / even;
+    low[i] = square * model_.thrust_min / even;
+    high[i] = square * model_.thrust_max / even;
   }
   return even * bounded_least_squares(a, b, low, high);
 }
@@ -141,8 +115,9 @@ std::vector<double> Mixer::speeds_with_failed_rotors(const Wrench& wrench,
   for (std::size_t i = 0; i < speeds.size(); ++i) {
     if (shares[i] < kLeastShare) continue;  // told to stop
     const double turning =
-        rotor_.speed_for(thrusts[static_cast<Eigen::Index>(i)], climb_of(i, motion));
-    speeds[i] = std::clamp(turning / shares[i], rotor_.speed_min, rotor_.speed_max);
+        settings_.rotor.speed_for(thrusts[static_cast<Eigen::Index>(i)], climb_of(i, motion));
+    speeds[i] =
+        std::clamp(turning / shares[i], settings_.rotor.speed_min, settings_.rotor.speed_max);
   }
   return speeds;
 }
@@ -158,8 +133,9 @@ Wrench Mixer::wrench(const std::vector<double>& speeds, const AirMotion& motion)
   assert(static_cast<Eigen::Index>(speeds.size()) == allocation_.cols());
   Eigen::VectorXd thrusts(static_cast<Eigen::Index>(speeds.size()));
   for (std::size_t i = 0; i < speeds.size(); ++i) {
-    thrusts[static_cast<Eigen::Index>(i)] = thrust_coefficient_ * speeds[i] * speeds[i] *
-                                            rotor_.thrust_share(climb_of(i, motion), speeds[i]);
+    thrusts[static_cast<Eigen::Index>(i)] =
+        settings_.rotor.thrust_coefficient * speeds[i] * speeds[i] *
+        settings_.rotor.thrust_share(climb_of(i, motion), speeds[i]);
   }
   const Eigen::Vector4d w = allocation_ * thrusts;
   return {w[0], w.tail<3>()};

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <span>
 #include <vector>
 
@@ -18,6 +19,14 @@ struct Wrench {
 struct AirMotion {
   Vector3d v_body = Vector3d::Zero();      ///< m/s
   Vector3d omega_body = Vector3d::Zero();  ///< rad/s
+};
+
+/// What the mixer takes from a vehicle's settings, worked out once.
+struct MixerModel {
+  /// Thrusts by wrench: of each rotor for thrust, and torque about x, y, z.
+  std::array<std::array<double, 4>, kMostRotors> inverse{};
+  double thrust_min = 0.0;  ///< Of a rotor, N.
+  double thrust_max = 0.0;  ///< N
 };
 
 /// Turns a wrench into rotor speeds: the (pseudo-)inverse of the rotors' geometry, any layout.
@@ -39,6 +48,9 @@ class Mixer {
   [[nodiscard]] std::vector<double> speeds_with_failed_rotors(const Wrench& wrench,
                                                               const AirMotion& motion,
                                                               std::span<const double> shares) const;
+  /// For the same in many lanes.
+  [[nodiscard]] const MixerModel& model() const { return model_; }
+
   /// True if these can hover without spinning.
   [[nodiscard]] bool holds_heading(std::span<const double> shares) const;
 
@@ -52,13 +64,9 @@ class Mixer {
                                                         std::span<const double> shares) const;
   [[nodiscard]] double climb_of(std::size_t rotor, const AirMotion& motion) const;
 
-  RotorModel rotor_;
-  std::vector<RotorPlacement> places_;
+  VehicleSettings settings_;
   Eigen::MatrixXd allocation_;  ///< 4 x rotors: wrench = allocation * thrusts.
-  Eigen::MatrixXd inverse_;     ///< rotors x 4
-  double thrust_coefficient_;
-  double thrust_min_;
-  double thrust_max_;
+  MixerModel model_;
   double weight_ = 0.0;  ///< N
 };
 

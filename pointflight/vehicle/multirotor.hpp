@@ -61,30 +61,10 @@ class Multirotor {
   [[nodiscard]] const VehicleSettings& settings() const { return settings_; }
 
  private:
-  struct Rate;
-  struct RotorResponse;
-  struct Stages;
-  void runge_kutta(VehicleState& state,
-                   Stages& stages,
-                   double dt,
-                   const FlightConditions& conditions) const;
-  [[nodiscard]] Rate rate(const RigidBodyState& body,
-                          std::span<const RotorState> rotors,
-                          const FlightConditions& conditions) const;
-  /// Of a rotor's speed within `dt` seconds.
-  [[nodiscard]] RotorResponse response(double dt) const;
-  /// The rotors' speeds later, on their way to `targets`.
-  void advance(std::span<const RotorState> now,
-               std::span<const double> targets,
-               const RotorResponse& response,
-               std::span<RotorState> later) const;
-  [[nodiscard]] double rotor_momentum(std::span<const RotorState> rotors,
-                                      double RotorState::*member) const;
   /// The speed that rotor i goes to.
   [[nodiscard]] double target(std::size_t i,
                               double command,
                               const FlightConditions& conditions) const;
-  [[nodiscard]] double ground_effect(double height) const;
 
   VehicleSettings settings_;
 };

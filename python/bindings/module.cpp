@@ -32,6 +32,7 @@ void add_all(py::module_& module) {
   add_samples(module);
   add_simulation(module);
   add_parts(module);
+  add_flights(module);
 }
 
 }  // namespace

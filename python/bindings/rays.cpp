@@ -146,6 +146,25 @@ py::array_t<float> ranges_in(const MapObject& object,
       {static_cast<py::ssize_t>(from.size()), directions.shape(0), directions.shape(1)});
 }
 
+/// Directions (rows, columns, 3) of the centres of an image's cells: unit vectors, the same on
+/// every processor.
+py::array_t<double> grid_of(
+    std::size_t rows, std::size_t columns, double low, double high, double right, double left) {
+  std::vector<double> all;
+  all.reserve(3 * rows * columns);
+  for (std::size_t i = 0; i < rows; ++i) {
+    const double share = (static_cast<double>(i) + 0.5) / static_cast<double>(rows);
+    const auto up = math::sincos(high - (high - low) * share);
+    for (std::size_t k = 0; k < columns; ++k) {
+      const double across = (static_cast<double>(k) + 0.5) / static_cast<double>(columns);
+      const auto around = math::sincos(left - (left - right) * across);
+      all.insert(all.end(), {up.cos * around.cos, up.cos * around.sin, up.sin});
+    }
+  }
+  return array_of(std::move(all),
+                  {static_cast<py::ssize_t>(rows), static_cast<py::ssize_t>(columns), 3});
+}
+
 }  // namespace
 
 void add_rays(py::module_& module) {
@@ -161,6 +180,14 @@ void add_rays(py::module_& module) {
              py::arg("poses"),
              py::arg("directions"),
              py::arg("range_max"));
+  module.def("_grid",
+             &grid_of,
+             py::arg("rows"),
+             py::arg("columns"),
+             py::arg("low"),
+             py::arg("high"),
+             py::arg("right"),
+             py::arg("left"));
 }
 
 }  // namespace pointflight::python

@@ -22,5 +22,6 @@ void add_commands(pybind11::module_& module);
 void add_samples(pybind11::module_& module);
 void add_simulation(pybind11::module_& module);
 void add_parts(pybind11::module_& module);
+void add_flights(pybind11::module_& module);
 
 }  // namespace pointflight::python

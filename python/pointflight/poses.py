@@ -7,6 +7,8 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from . import _pointflight
+
 
 def numbers(values: ArrayLike) -> NDArray[np.float64]:
     """Float64 of whatever numpy makes real numbers of; not of complex ones, text or objects (TypeError)."""
@@ -51,8 +53,4 @@ def grid(
         raise ValueError(f"rows, columns: 1 or more are wanted, not {rows} and {columns}")
     low, high = (float(v) for v in np.asarray(elevation, dtype=np.float64))
     right, left = (float(v) for v in np.asarray(azimuth, dtype=np.float64))
-    up = (high - (high - low) * (np.arange(rows) + 0.5) / rows)[:, None]
-    around = (left - (left - right) * (np.arange(columns) + 0.5) / columns)[None, :]
-    return np.stack(
-        np.broadcast_arrays(np.cos(up) * np.cos(around), np.cos(up) * np.sin(around), np.sin(up)), axis=-1
-    )
+    return _pointflight._grid(rows, columns, low, high, right, left)

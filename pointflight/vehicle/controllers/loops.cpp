@@ -5,8 +5,13 @@
 
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/math.hpp"
+#include "pointflight/vehicle/internal/loops-inl.hpp"
+#include "pointflight/vehicle/internal/scalar_numbers-inl.hpp"
 
 namespace pointflight {
+
+namespace hw = HWY_NAMESPACE;
+
 namespace {
 
 // Of the attitude loop's natural frequency and damping. The rotor across from the lost one can only
@@ -33,18 +38,29 @@ Vector3d by_axis(const ControllerSettings& c, double LoopDesign::*member) {
 
 }  // namespace
 
+LoopGains::LoopGains(const VehicleSettings& settings) {
+  const ControllerSettings& c = settings.controller;
+  const Vector3d wn_v = velocity_frequency(c);
+  velocity_square = wn_v.cwiseProduct(wn_v);
+  velocity_damping = by_axis(c, &LoopDesign::damping).cwiseProduct(wn_v);
+  const Vector3d wn(
+      c.roll_pitch.natural_frequency, c.roll_pitch.natural_frequency, c.yaw.natural_frequency);
+  const Vector3d z(c.roll_pitch.damping, c.roll_pitch.damping, c.yaw.damping);
+  attitude_square = wn.cwiseProduct(wn);
+  attitude_damping = z.cwiseProduct(wn);
+  tilt_is_free = c.tilt_max_deg >= 90.0;
+  if (!tilt_is_free) tilt_tangent = math::tan(c.tilt_max_deg * kDegree);
+  const double slope = 2.0 * settings.rotor.torque_coefficient * settings.hover_speed();
+  yaw_lag = slope > 0.0 ? settings.rotor.inertia / slope : 0.0;
+}
+
 Matrix3d attitude_from(const Vector3d& b3, double yaw, const Matrix3d& R_now) {
-  const auto heading = math::sincos(yaw);
-  Vector3d b2 = b3.cross(Vector3d(heading.cos, heading.sin, 0.0));
-  if (b2.squaredNorm() < 1e-6) b2 = R_now.col(1) - b3.dot(R_now.col(1)) * b3;
-  b2.normalize();
-  Matrix3d rotation;
-  rotation << b2.cross(b3), b2, b3;
-  return rotation;
+  return hw::matrix_from(
+      hw::attitude_from(hw::numbers_of(b3), hw::heading_of(yaw), hw::numbers_of(R_now)));
 }
 
 LoopController::LoopController(const VehicleSettings& settings)
-    : settings_(settings), mixer_(settings) {}
+    : settings_(settings), gains_(settings), mixer_(settings) {}
 
 std::vector<double> LoopController::update(const RigidBodyState& state,
                                            const Setpoint& setpoint,
@@ -114,19 +130,15 @@ AirMotion LoopController::motion_of(const RigidBodyState& state) {
   return {state.q_world_body.conjugate() * state.v_world, state.omega_body};
 }
 
-/// A rotor that speeds up turns the body as well: by J_r dw/dt beside k_m w^2, which together
-/// answer a speed command with 1 + T s, T = J_r / (2 k_m w). A lag of that time takes it out again.
 std::vector<double> LoopController::speeds(const RigidBodyState& state,
                                            double thrust,
                                            const Vector3d& torque,
                                            double dt,
                                            ControllerMemory& memory) const {
-  const RotorModel& rotor = settings_.rotor;
-  const double slope = 2.0 * rotor.torque_coefficient * settings_.hover_speed();
-  const double lag = slope > 0.0 ? rotor.inertia / slope : 0.0;
-  memory.yaw_torque += dt / (lag + dt) * (torque.z() - memory.yaw_torque);
+  auto filtered = hw::numbers_of(torque);
+  hw::filter_yaw(gains_, dt, filtered, memory.yaw_torque);
   const AirMotion motion = motion_of(state);
-  const Wrench wanted{thrust, {torque.x(), torque.y(), memory.yaw_torque}};
+  const Wrench wanted{thrust, hw::vector_of(filtered)};
   std::vector<double> speeds =
       rotors_fail(memory) ? mixer_.speeds_with_failed_rotors(wanted, motion, memory.rotor_shares)
                           : mixer_.speeds(wanted, motion);
@@ -203,11 +215,8 @@ Vector3d LoopController::ahead(const Vector3d& torque, double rate) const {
 }
 
 Vector3d LoopController::allowed(const Vector3d& a, ControllerMemory& memory) const {
-  // sideways, up, and down to a fifth of gravity so that the rotors keep authority
-  const ControllerSettings& c = settings_.controller;
-  const Vector3d sideways = limited(Vector3d(a.x(), a.y(), 0.0), c.acceleration_max);
-  const Vector3d within(
-      sideways.x(), sideways.y(), std::clamp(a.z(), -0.8 * kGravity, c.climb_acceleration_max));
+  const Vector3d within =
+      hw::vector_of(hw::allowed_acceleration(settings_.controller, hw::numbers_of(a)));
   memory.limits.acceleration = differ(a, within);
   return within;
 }
@@ -267,24 +276,19 @@ Vector3d LoopController::position_loop(const RigidBodyState& state,
   return allowed(command.a_world + a - d, memory);
 }
 
-/// a = wn^2 integral(v_cmd - v) - 2 z wn v: v follows v_cmd as a second-order system without a
-/// zero, and holds it in wind.
 Vector3d LoopController::velocity_loop(const RigidBodyState& state,
                                        const Vector3d& v_world,
                                        double dt,
                                        ControllerMemory& memory) const {
   const ControllerSettings& c = settings_.controller;
-  const Vector3d wn = velocity_frequency(c);
-  const Vector3d z = by_axis(c, &LoopDesign::damping);
   const Vector3d v_ref = limited(v_world, c.speed_max);
   memory.limits.speed = differ(v_world, v_ref);
-  const Vector3d e_v = v_ref - state.v_world;
-  Vector3d& integral = memory.velocity_integral;
-  const Vector3d next = integral + dt * wn.cwiseProduct(wn).cwiseProduct(e_v);
-  const Vector3d damping = 2.0 * z.cwiseProduct(wn).cwiseProduct(state.v_world);
-  const Vector3d a = allowed(next - damping, memory);
-  // anti-windup: the integral is what the allowed acceleration needs
-  integral = a + damping;
+  auto integral = hw::numbers_of(memory.velocity_integral);
+  const auto wanted = hw::velocity_demand(
+      gains_, hw::numbers_of(state.v_world), hw::numbers_of(v_ref), dt, integral);
+  const Vector3d a = allowed(hw::vector_of(wanted), memory);
+  hw::keep_what_is_allowed(gains_, hw::numbers_of(state.v_world), hw::numbers_of(a), integral);
+  memory.velocity_integral = hw::vector_of(integral);
   return a;
 }
 
@@ -308,50 +312,22 @@ AttitudeDemand LoopController::demanded_attitude(const RigidBodyState& state,
                                                  double yaw,
                                                  double yaw_rate) const {
   const Vector3d f = tilt_limited(a_world + Vector3d(0, 0, kGravity));
-  const Matrix3d R_now = state.q_world_body.toRotationMatrix();
-  // in free fall any attitude will do: the present one
-  const double specific_thrust = f.norm();
-  const Vector3d b3 =
-      specific_thrust > 1e-3 ? Vector3d(f / specific_thrust) : Vector3d(R_now.col(2));
-  AttitudeDemand demand;
-  demand.R_world_body = attitude_from(b3, yaw, R_now);
-  demand.omega_body = rates_of(demand.R_world_body, specific_thrust, jerk_world, yaw_rate);
-  // the thrust that the present attitude can turn into the demanded force
-  demand.thrust = settings_.mass * std::max(0.0, f.dot(R_now.col(2)));
-  return demand;
+  const auto demand = hw::demanded_attitude(settings_,
+                                            hw::matrix_of(hw::numbers_of(state.q_world_body)),
+                                            hw::numbers_of(f),
+                                            hw::numbers_of(jerk_world),
+                                            hw::heading_of(yaw),
+                                            yaw_rate);
+  return {hw::matrix_from(demand.R), hw::vector_of(demand.omega), demand.thrust};
 }
 
 Vector3d LoopController::tilt_limited(const Vector3d& f) const {
-  const double tilt_max = settings_.controller.tilt_max_deg;
-  if (tilt_max >= 90.0) return f;
-  const double up = std::max(f.z(), 0.05 * kGravity);
-  const double sideways = std::hypot(f.x(), f.y());
-  const double sideways_max = up * math::tan(tilt_max * kDegree);
-  const double scale = sideways > sideways_max ? sideways_max / sideways : 1.0;
-  return {scale * f.x(), scale * f.y(), up};
+  return hw::vector_of(hw::tilt_limited(gains_, hw::numbers_of(f)));
 }
 
-Vector3d LoopController::rates_of(const Matrix3d& R,
-                                  double specific_thrust,
-                                  const Vector3d& jerk,
-                                  double yaw_rate) const {
-  const double most = settings_.controller.body_rate_max;
-  // h = (jerk - (b3 . jerk) b3) / |f|, w = (-h . b2, h . b1, yaw rate on b3)
-  const Vector3d b3 = R.col(2);
-  const Vector3d h = (jerk - b3.dot(jerk) * b3) / std::max(specific_thrust, 1e-3);
-  const Vector3d omega(-h.dot(R.col(1)), h.dot(R.col(0)), yaw_rate * b3.z());
-  return omega.cwiseMax(-most).cwiseMin(most);
-}
-
-/// First order: the rate follows with the damping term of the attitude loop.
 Vector3d LoopController::rate_torque(const RigidBodyState& state, const Vector3d& omega) const {
-  const double most = settings_.controller.body_rate_max;
-  const Vector3d wanted = omega.cwiseMax(-most).cwiseMin(most);
-  const Vector3d alpha =
-      2.0 *
-      attitude_damping().cwiseProduct(attitude_frequency()).cwiseProduct(wanted - state.omega_body);
-  const Vector3d spin = settings_.inertia_diagonal.cwiseProduct(state.omega_body);
-  return settings_.inertia_diagonal.cwiseProduct(alpha) + state.omega_body.cross(spin);
+  return hw::vector_of(
+      hw::rate_torque(settings_, gains_, hw::numbers_of(state.omega_body), hw::numbers_of(omega)));
 }
 
 }  // namespace pointflight

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "pointflight/vehicle/controller.hpp"
+#include "pointflight/vehicle/internal/loop_gains.hpp"
 #include "pointflight/vehicle/mixer.hpp"
 
 namespace pointflight {
@@ -36,6 +37,7 @@ class LoopController : public Controller {
                                          const Vector3d& b3_world) const;
 
   [[nodiscard]] const VehicleSettings& settings() const { return settings_; }
+  [[nodiscard]] const LoopGains& gains() const { return gains_; }
 
   /// Natural frequency (rad/s) of the attitude loop about each body axis, and its damping.
   [[nodiscard]] Vector3d attitude_frequency() const;
@@ -50,11 +52,6 @@ class LoopController : public Controller {
                                                  double yaw_rate) const;
   /// Force per mass with its tilt cut to the limit: the vertical part is kept.
   [[nodiscard]] Vector3d tilt_limited(const Vector3d& specific_force_world) const;
-  /// Rates that turn body z with the jerk, and yaw (Mellinger, Kumar 2011, eqs. 7 and 8), limited.
-  [[nodiscard]] Vector3d rates_of(const Matrix3d& R_world_body,
-                                  double specific_thrust,
-                                  const Vector3d& jerk_world,
-                                  double yaw_rate) const;
   [[nodiscard]] double momentum_of(const std::vector<double>& speeds,
                                    const std::vector<double>& shares) const;
   [[nodiscard]] Vector3d ahead(const Vector3d& torque, double rate) const;
@@ -90,6 +87,7 @@ class LoopController : public Controller {
   [[nodiscard]] Vector3d rate_torque(const RigidBodyState& state, const Vector3d& omega) const;
 
   VehicleSettings settings_;
+  LoopGains gains_;
   Mixer mixer_;
 };
 

@@ -1,0 +1,197 @@
+#include "pointflight/learn/flights.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "pointflight/core/argument.hpp"
+#include "pointflight/core/math.hpp"
+#include "pointflight/core/random.hpp"
+#include "pointflight/geometry/rotation.hpp"
+#include "pointflight/world/contact.hpp"
+
+namespace pointflight {
+namespace {
+
+constexpr double kMargin = 0.01;          // m: clearance is looked for again before it is used up
+constexpr std::size_t kMostTries = 200;   // for each position that is wanted
+constexpr std::size_t kGroupsAtOnce = 2;  // of vehicles, on one thread
+
+VehicleSettings under_geometric_control(VehicleSettings vehicle) {
+  vehicle.controller.kind = "geometric";
+  return vehicle;
+}
+
+/// How often `part` goes into `whole`. Throws std::invalid_argument if it does not.
+int whole_parts(double whole, double part, const char* what) {
+  const double count = std::round(whole / part);
+  require_argument(count >= 1.0 && count < 1e6 && std::abs(count * part - whole) < 1e-9 * whole,
+                   what);
+  return static_cast<int>(count);
+}
+
+}  // namespace
+
+Flights::Flights(std::shared_ptr<const SurfelMap> map,
+                 const VehicleSettings& vehicle,
+                 std::size_t count,
+                 const FlightsOptions& options,
+                 RangePattern pattern)
+    : map_(std::move(map)),
+      renderer_(make_renderer("beam", Scene{map_})),
+      batch_(under_geometric_control(vehicle), count, options.timing),
+      options_(options),
+      pattern_(std::move(pattern)),
+      hull_(vehicle.hull()),
+      hull_radius_(bounding_radius(hull_)),
+      periods_(whole_parts(options.action_period,
+                           batch_.control_period(),
+                           "Flights: an action takes a whole number of control periods")),
+      watch_(count),
+      poses_(count) {
+  require_argument(options.look_every > 0.0, "Flights: look_every above 0");
+  const double way = vehicle.controller.speed_max * options.action_period;
+  looks_ = std::clamp(static_cast<int>(std::ceil(way / options.look_every)), 1, periods_);
+  for (std::size_t i = 0; i < count; ++i) place(i, Vector3d::Zero(), 0.0);
+}
+
+void Flights::place(std::size_t i, const Vector3d& p_world, double yaw) {
+  RigidBodyState body;
+  body.p_world = p_world;
+  body.q_world_body = quaternion_from_rpy(0.0, 0.0, yaw);
+  batch_.place(i, body);
+  watch_[i] = Watch{};
+  watch_[i].last = body.T_world_body();
+  poses_[i] = {watch_[i].last, watch_[i].last};
+}
+
+void Flights::set_wind(std::size_t i, const Vector3d& wind_world) {
+  batch_.set_air(i, wind_world, -1e6);
+}
+
+void Flights::ask(std::size_t i, std::span<const double> action) {
+  if (options_.level == FlightLevel::kRotorSpeeds) {
+    batch_.ask_rotors(i, action.data());
+    return;
+  }
+  const Vector3d asked(action[0], action[1], action[2]);
+  if (options_.level == FlightLevel::kBodyRates) {
+    batch_.ask(i, asked, action[3]);
+    return;
+  }
+  const auto heading = math::sincos(batch_.yaw(i));
+  batch_.ask(i,
+             {heading.cos * asked.x() - heading.sin * asked.y(),
+              heading.sin * asked.x() + heading.cos * asked.y(),
+              asked.z()},
+             action[3]);
+}
+
+/// After it has moved on; its surroundings are looked at again before the clearance is used up.
+void Flights::follow(std::size_t i) {
+  Watch& watch = watch_[i];
+  const RigidBodyState body = batch_.body(i);
+  if (!body.is_finite()) {
+    watch.status.collided = true;
+    return;
+  }
+  const Pose now = body.T_world_body();
+  watch.travelled += motion_bound(watch.last, now, hull_radius_);
+  watch.status.flown += (now.translation - watch.last.translation).norm();
+  watch.last = now;
+  if (watch.known - watch.travelled < kMargin) look(watch);
+  if (watch.known <= 0.0) watch.status.collided = true;
+}
+
+void Flights::look(Watch& watch) const {
+  const auto contact = contact_with_map(*map_, hull_, watch.last, kReach);
+  watch.known = contact ? contact->distance : kReach;
+  watch.travelled = 0.0;
+}
+
+void Flights::step(std::span<const double> actions,
+                   std::span<const std::uint8_t> moves,
+                   const Executor& executor) {
+  const bool by_rotor = options_.level == FlightLevel::kRotorSpeeds;
+  const std::size_t numbers = by_rotor ? vehicle().rotors.size() : 4;
+  require_argument(actions.size() == size() * numbers, "Flights::step: a row for each vehicle");
+  require_argument(moves.empty() || moves.size() == size(), "Flights::step: moves for each");
+  constexpr std::size_t kGroup = FlightBatch::kGroup;
+  const std::size_t groups = (size() + kGroup - 1) / kGroup;
+  executor.parallel_for(groups, kGroupsAtOnce, [&](std::size_t from, std::size_t until) {
+    std::vector<double> kept(batch_.column_size() * kGroup);
+    for (std::size_t group = from; group < until; ++group) {
+      const std::size_t first = group * kGroup;
+      const std::size_t last = std::min(first + kGroup, size());
+      const auto stands = [&](std::size_t i) { return !moves.empty() && moves[i] == 0; };
+      const auto column = [&](std::size_t i) {
+        return std::span(kept).subspan((i - first) * batch_.column_size(), batch_.column_size());
+      };
+      for (std::size_t i = first; i < last; ++i) {
+        if (stands(i)) {
+          batch_.save(i, column(i));
+          continue;
+        }
+        ask(i, actions.subspan(i * numbers, numbers));
+        poses_[i].before = watch_[i].last;
+      }
+      for (int k = 0; k < looks_; ++k) {
+        const int periods = periods_ * (k + 1) / looks_ - periods_ * k / looks_;
+        batch_.fly(group, options_.level, periods);
+        for (std::size_t i = first; i < last; ++i) {
+          if (!stands(i)) follow(i);
+        }
+      }
+      for (std::size_t i = first; i < last; ++i) {
+        if (stands(i)) {
+          batch_.restore(i, column(i));
+          continue;
+        }
+        Watch& watch = watch_[i];
+        if (watch.travelled > 0.0 && watch.known - watch.travelled < kExact) look(watch);
+        watch.status.clearance = watch.known - watch.travelled;
+        if (watch.known <= 0.0) watch.status.collided = true;
+        poses_[i].now = watch.last;
+      }
+    }
+  });
+}
+
+void Flights::measure(std::span<const std::uint32_t> vehicles,
+                      std::span<float> ranges,
+                      const Executor& executor) const {
+  require_argument(ranges.size() == size() * beams(), "Flights::measure: a row for each vehicle");
+  for (const std::uint32_t i : vehicles) {
+    require_argument(i < size(), "Flights::measure: numbers of vehicles");
+  }
+  pattern_.measure(*renderer_, poses_, vehicles, ranges, executor);
+}
+
+std::vector<Vector3d> Flights::free_positions(const Aabb& box,
+                                              double clearance,
+                                              std::pair<double, double> heights,
+                                              std::size_t wanted,
+                                              std::uint64_t seed) const {
+  const RandomStream random(seed, StreamId::kLearning, 0);
+  const Vector3d size = box.size();
+  std::vector<Vector3d> positions;
+  std::uint64_t draw = 0;
+  const std::uint64_t most = 4 * kMostTries * wanted;
+  while (positions.size() < wanted && draw < most) {
+    const double x = box.min.x() + random.uniform(draw) * size.x();
+    const double y = box.min.y() + random.uniform(draw + 1) * size.y();
+    const double z = box.min.z() + random.uniform(draw + 2) * size.z();
+    const double height =
+        heights.first + random.uniform(draw + 3) * (heights.second - heights.first);
+    draw += 4;
+    const Ray down{Vector3d(x, y, z), -Vector3f::UnitZ(), static_cast<float>(size.z() + 1.0)};
+    const Hit ground = renderer_->trace(down);
+    if (!ground.is_return()) continue;
+    const Vector3d position(x, y, z - static_cast<double>(ground.range) + height);
+    if (position.z() > box.max.z() || map_->nearest(position, clearance)) continue;
+    positions.push_back(position);
+  }
+  return positions;
+}
+
+}  // namespace pointflight

@@ -1,0 +1,84 @@
+#include "pointflight/learn/range_pattern.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "pointflight/core/argument.hpp"
+#include "pointflight/geometry/rotation.hpp"
+#include "pointflight/render/internal/direction_order.hpp"
+
+namespace pointflight {
+namespace {
+
+constexpr std::size_t kRaysAtOnce = 1 << 16;  // 2 MiB of them; whole vehicles
+
+}  // namespace
+
+RangePattern::RangePattern(std::vector<Vector3f> directions,
+                           std::vector<float> shares,
+                           float range_max)
+    : directions_(std::move(directions)), shares_(std::move(shares)), range_max_(range_max) {
+  require_argument(range_max > 0.0f, "RangePattern: a range above 0");
+  require_argument(shares_.empty() || shares_.size() == directions_.size(),
+                   "RangePattern: a share for each direction");
+  for (const Vector3f& direction : directions_) {
+    require_argument(std::abs(direction.norm() - 1.0f) < 1e-4f, "RangePattern: unit vectors");
+  }
+  for (const float share : shares_) {
+    require_argument(share >= 0.0f && share <= 1.0f, "RangePattern: shares from 0 to 1");
+  }
+  order_ = direction_order(directions_, Executor(1));
+}
+
+void RangePattern::aim(const PosePair& poses, std::span<Ray> rays) const {
+  if (shares_.empty()) {
+    const Eigen::Matrix3f R = poses.now.rotation.toRotationMatrix().cast<float>();
+    for (std::size_t k = 0; k < rays.size(); ++k) {
+      rays[k] = {poses.now.translation, R * directions_[k], range_max_};
+    }
+    return;
+  }
+  for (std::size_t k = 0; k < rays.size(); ++k) {
+    const Pose at = interpolate(poses.before, poses.now, shares_[k]);
+    rays[k] = {
+        at.translation, (at.rotation * directions_[k].cast<double>()).cast<float>(), range_max_};
+  }
+}
+
+void RangePattern::measure(const Renderer& renderer,
+                           std::span<const PosePair> poses,
+                           std::span<const std::uint32_t> vehicles,
+                           std::span<float> ranges,
+                           const Executor& executor) const {
+  const std::size_t beams = size();
+  if (beams == 0) return;
+  const std::size_t at_once = std::max<std::size_t>(1, kRaysAtOnce / beams);
+  std::vector<Ray> rays(std::min(at_once, vehicles.size()) * beams);
+  std::vector<Hit> hits(rays.size());
+  std::vector<RenderJob> jobs;
+  for (std::size_t first = 0; first < vehicles.size(); first += at_once) {
+    const std::size_t count = std::min(at_once, vehicles.size() - first);
+    jobs.assign(count, RenderJob{});
+    executor.parallel_for(count, 1, [&](std::size_t i, std::size_t) {
+      const std::span own(rays.data() + i * beams, beams);
+      const PosePair& pair = poses[vehicles[first + i]];
+      aim(pair, own);
+      jobs[i].batch.rays = own;
+      jobs[i].batch.order = order_;
+      jobs[i].batch.T_world_sensor = pair.now;
+      jobs[i].batch.range_max = range_max_;
+      jobs[i].hits = std::span(hits.data() + i * beams, beams);
+    });
+    renderer.render(jobs, executor);
+    executor.parallel_for(count, 1, [&](std::size_t i, std::size_t) {
+      float* row = ranges.data() + vehicles[first + i] * beams;
+      for (std::size_t k = 0; k < beams; ++k) {
+        const Hit& hit = jobs[i].hits[k];
+        row[k] = hit.is_return() ? hit.range / range_max_ : 1.0f;
+      }
+    });
+  }
+}
+
+}  // namespace pointflight

@@ -1,0 +1,339 @@
+"""Many environments at once: `VectorEnv`."""
+
+from __future__ import annotations
+
+import enum
+import math
+import os
+from typing import Any, Dict, Iterator, List, Mapping, NamedTuple, Optional, Sequence, Tuple, Union
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .. import _pointflight
+from ..map import Map
+from ..settings import Path, Vehicle
+from .draws import draws
+from .spaces import Box, batched
+from .spaces import Dict as DictSpace
+from .tasks import TASKS, Floats, States, Task
+
+try:
+    from gymnasium.vector import AutoresetMode, VectorEnv as _Base
+except ImportError:
+    _Base = object
+
+    class AutoresetMode(enum.Enum):  # type: ignore[no-redef]
+        """When an environment that has ended begins anew, as gymnasium names it."""
+
+        NEXT_STEP = "NextStep"
+        SAME_STEP = "SameStep"
+        DISABLED = "Disabled"
+
+
+_MODES = {
+    "next_step": AutoresetMode.NEXT_STEP,
+    "same_step": AutoresetMode.SAME_STEP,
+    "disabled": AutoresetMode.DISABLED,
+}
+
+
+class Lidar(NamedTuple):
+    """Which ranges policies see: an image, row 0 the highest, column 0 the farthest to the left."""
+
+    rows: int = 16
+    """"""
+    columns: int = 64
+    """"""
+    elevation: Tuple[float, float] = (-math.radians(15), math.radians(15))
+    """Ends of the field of view, rad."""
+    azimuth: Tuple[float, float] = (-math.pi, math.pi)
+    """rad"""
+    range_max: float = 10.0
+    """m"""
+    rolling: bool = False
+    """Columns are measured one after the other while the vehicle moves, the left one first; else all at the end."""
+
+
+Observation = Dict[str, NDArray[np.float32]]
+
+
+class VectorEnv(_Base):  # type: ignore[misc]
+    """Vehicles, each alone in a map of a real place, that learn a task: gymnasium's vector interface.
+
+    Observations: "range" (n, rows, columns), ranges / range_max, 1 where nothing is hit (without a LiDAR it is
+    missing), and "state" (n, k), as the task says. Actions (n, a) from -1 to 1: velocity (ahead, left, up in the heading's
+    frame, times `speed`) and yaw rate (times `yaw_rate`); the same of acceleration (times `acceleration`); body rates (times
+    the vehicle's greatest) and thrust (-1: none, 0: its weight, 1: twice that); or a speed of each rotor (-1: the least, 0: hover, 1:
+    the greatest).
+
+    What an environment does follows from its own seed and its actions: not from how many there are, nor from threads
+    or the processor. All vehicles fly by the geometric controller, in still air.
+    """
+
+    def __init__(
+        self,
+        map: Union[Map, Path, Sequence[Union[Map, Path]]],
+        num_envs: int = 16,
+        *,
+        task: Union[str, Task] = "goal",
+        lidar: Optional[Lidar] = Lidar(),
+        action: str = "velocity",
+        vehicle: Union[Vehicle, Path] = "quad_330",
+        speed: float = 3.0,
+        yaw_rate: float = 1.0,
+        acceleration: float = 5.0,
+        action_period: float = 0.1,
+        physics_step: float = 0.005,
+        steps_per_control: int = 1,
+        autoreset: str = "next_step",
+        copy: bool = True,
+        render_mode: Optional[str] = None,
+    ) -> None:
+        """map: one, or several: environments are dealt out to them in blocks. task: "goal", "hover", or one of
+        one's own. action_period: s between actions; physics_step, s, of which `steps_per_control` are flown with the
+        same rotor commands (docs/python.md: what coarser ones cost). autoreset: "next_step", "same_step" or
+        "disabled". copy: False: observations are read-only views that the next step changes.
+        """
+        if num_envs < 1:
+            raise ValueError(f"num_envs: 1 or more, not {num_envs}")
+        if autoreset not in _MODES:
+            raise ValueError(f"autoreset: {', '.join(_MODES)}, not {autoreset!r}")
+        if render_mode is not None:
+            raise ValueError("render_mode: there is none; fly a policy in a Simulation to see it")
+        if isinstance(task, str) and task not in TASKS:
+            raise ValueError(f"task: {', '.join(TASKS)}, or a Task, not {task!r}")
+        self.num_envs, self.action, self.copy = num_envs, action, copy
+        self.task: Task = TASKS[task]() if isinstance(task, str) else task
+        self.vehicle = vehicle if isinstance(vehicle, Vehicle) else Vehicle(vehicle)
+        self.lidar, self.action_period, self.render_mode = lidar, action_period, render_mode
+        self.metadata = {"render_modes": [], "render_fps": 1.0 / action_period, "autoreset_mode": _MODES[autoreset]}
+        self._mode = _MODES[autoreset]
+        maps = [map] if isinstance(map, (Map, str, os.PathLike)) else list(map)
+        self.maps = [one if isinstance(one, Map) else Map.open(one) for one in maps]
+        if not 1 <= len(self.maps) <= num_envs:
+            raise ValueError(f"map: {len(self.maps)} maps for {num_envs} environments")
+        self._ends = [num_envs * (k + 1) // len(self.maps) for k in range(len(self.maps))]
+        directions, shares = _beams(lidar)
+        begins = [0, *self._ends[:-1]]
+        self._blocks = [slice(begin, end) for begin, end in zip(begins, self._ends)]
+        self._flights = [
+            _pointflight._Flights(
+                place._handle, self.vehicle._handle, block.stop - block.start, action, action_period, physics_step,
+                steps_per_control, directions, shares, 1.0 if lidar is None else lidar.range_max,
+            )
+            for place, block in zip(self.maps, self._blocks)
+        ]  # fmt: skip
+        self._places: Dict[Any, List[Floats]] = {}
+        self._scale_actions(speed, yaw_rate, acceleration)
+        width = self.vehicle.rotors if action == "rotor_speeds" else 4
+        self.single_action_space = Box(-1.0, 1.0, (width,), np.float32)
+        self.action_space = batched(self.single_action_space, num_envs)
+        self.last_actions = np.zeros((num_envs, width))
+        """(n, a): of the actions before."""
+        self.elapsed = np.zeros(num_envs)
+        """(n,): s since the start of the episode."""
+        self.seeds = np.zeros(num_envs, np.uint64)
+        """(n,)"""
+        self._episodes = np.zeros(num_envs, np.uint64)
+        self._steps = np.zeros(num_envs, np.int64)
+        self._ended = np.ones(num_envs, np.bool_)
+        self._was_reset = False
+        self._all = np.arange(num_envs, dtype=np.uint32)
+        self.task.begin(self)
+        spaces = {"state": Box(-np.inf, np.inf, (self.task.state_size,), np.float32)}
+        if lidar is not None:
+            spaces = {"range": Box(0.0, 1.0, (lidar.rows, lidar.columns), np.float32), **spaces}
+        self.single_observation_space = DictSpace(spaces)
+        self.observation_space = batched(self.single_observation_space, num_envs)
+
+    def _scale_actions(self, speed: float, yaw_rate: float, acceleration: float) -> None:
+        weight = self.vehicle.mass * 9.81
+        rates = self.vehicle.values["controller"]["body_rate_max"]
+        size = {"velocity": speed, "acceleration": acceleration}.get(self.action, 1.0)
+        self._zero, self._up = np.zeros(4), np.array([size, size, size, yaw_rate])
+        if self.action == "body_rates":
+            self._zero, self._up = np.array([0.0, 0.0, 0.0, weight]), np.array([rates, rates, rates, weight])
+        self._down = self._up
+        if self.action == "rotor_speeds":
+            rotor, count = self.vehicle.values["rotor"], self.vehicle.rotors
+            hover = self.vehicle.hover_speed
+            self._zero = np.full(count, hover)
+            self._up = np.full(count, rotor["speed_max"] - hover)
+            self._down = np.full(count, hover - rotor["speed_min"])
+
+    # ---- for tasks ----
+
+    def draws(self, which: NDArray[np.uint32], count: int) -> Floats:
+        """(m, count): uniform in [0, 1), addressed by the seeds of these environments and their episodes."""
+        return draws(self.seeds[which], self._episodes[which], count)
+
+    def places(
+        self, which: NDArray[np.uint32], height: Tuple[float, float], clearance: float
+    ) -> Iterator[Tuple[NDArray[np.int64], Floats]]:
+        """For each map that some of these environments are in: rows of `which`, and positions (k, 3) in the map that
+        are free by `clearance` and so high above ground, the same whatever the seeds."""
+        key = (height, clearance)
+        if key not in self._places:
+            found = []
+            for place, flights in zip(self.maps, self._flights):
+                positions = flights.free_positions(place.bounds, clearance, *height, 4096, 1)
+                if len(positions) < 2:
+                    raise ValueError(
+                        f"{place!r}: no positions that are free by {clearance} m, {height[0]} to {height[1]} m above ground"
+                    )
+                found.append(positions)
+            self._places[key] = found
+        for block, positions in zip(self._blocks, self._places[key]):
+            rows = np.flatnonzero((which >= block.start) & (which < block.stop))
+            if len(rows):
+                yield rows, positions
+
+    def place(self, which: NDArray[np.uint32], positions: Floats, facing: Floats) -> None:
+        """Vehicles begin anew, hovering at positions (m, 3) and heading for others (m, 3), world, m."""
+        for block, flights in zip(self._blocks, self._flights):
+            rows = (which >= block.start) & (which < block.stop)
+            if rows.any():
+                flights.place(which[rows] - np.uint32(block.start), positions[rows], facing[rows])
+
+    @property
+    def states(self) -> States:
+        """The true states of all vehicles."""
+        tables = [flights.table for flights in self._flights]
+        return States(tables[0] if len(tables) == 1 else np.concatenate(tables))
+
+    # ---- gymnasium's interface ----
+
+    def reset(
+        self, *, seed: Union[None, int, Sequence[Optional[int]]] = None, options: Optional[Mapping[str, Any]] = None
+    ) -> Tuple[Observation, Dict[str, Any]]:
+        """Begins anew. seed: environment i gets seed + i, or the i-th of a list; without one, each goes on to its next
+        episode. options: {"reset_mask": (n,) bool}: only these."""
+        mask = np.ones(self.num_envs, np.bool_)
+        if options is not None and "reset_mask" in options:
+            mask = np.asarray(options["reset_mask"])
+            if mask.shape != (self.num_envs,) or mask.dtype != np.bool_ or not mask.any():
+                raise ValueError(f"reset_mask: bool ({self.num_envs},) with some True is wanted")
+        if seed is None and not self._was_reset:
+            seed = int(np.random.SeedSequence().generate_state(1)[0])
+        if seed is not None:
+            seeds = [seed + i for i in range(self.num_envs)] if isinstance(seed, (int, np.integer)) else list(seed)
+            if len(seeds) != self.num_envs or any(s is not None and s < 0 for s in seeds):
+                raise ValueError(f"seed: 0 or above, or {self.num_envs} of them")
+            for i, one in enumerate(seeds):
+                if one is not None and mask[i]:
+                    self.seeds[i], self._episodes[i] = one, 0
+        self._was_reset = True
+        self._begin(self._all[mask])
+        self._measure(self._all[mask])
+        return self._observation(), {}
+
+    def step(
+        self, actions: ArrayLike
+    ) -> Tuple[Observation, Floats, NDArray[np.bool_], NDArray[np.bool_], Dict[str, Any]]:
+        """Flies on by one action period. Returns observation, reward (n,), terminated (n,), truncated (n,) and infos:
+        what the task tells, an array (n,) each, and with "same_step" "final_obs" and "final_info"."""
+        if not self._was_reset:
+            raise RuntimeError("step: reset comes first")
+        asked = np.asarray(actions, dtype=np.float64)
+        if asked.shape != self.last_actions.shape:
+            raise ValueError(f"actions: shape {self.last_actions.shape} is wanted, not {asked.shape}")
+        if not np.isfinite(asked).all():
+            raise ValueError("actions: finite numbers are wanted")
+        asked = np.clip(asked, -1.0, 1.0)
+        moves = ~self._ended
+        commands = self._zero + asked * np.where(asked < 0, self._down, self._up)
+        for block, flights in zip(self._blocks, self._flights):
+            flights.step(commands[block], moves[block])
+        difference = asked - self.last_actions
+        change = difference[:, 0] * difference[:, 0]
+        for k in range(1, difference.shape[1]):
+            change = change + difference[:, k] * difference[:, k]
+        self.last_actions = np.where(moves[:, None], asked, self.last_actions)
+        self._steps += moves
+        self.elapsed = self._steps * self.action_period
+        reward, terminated, info = self.task.judge(self, change)
+        terminated = terminated & moves
+        truncated = (self._steps >= round(self.task.time_limit / self.action_period)) & moves & ~terminated
+        reward = np.where(moves, reward, 0.0)
+        infos: Dict[str, Any] = {}
+        for name, values in info.items():
+            infos[name], infos["_" + name] = values, moves
+        ended_before, self._ended = self._ended, (terminated | truncated) | self._ended
+        if self._mode is AutoresetMode.NEXT_STEP:
+            self._begin(self._all[ended_before])
+        elif self._mode is AutoresetMode.SAME_STEP and self._ended.any():
+            infos = self._with_finals(infos)
+            self._begin(self._all[self._ended])
+        self._measure(self._all)
+        return self._observation(), reward, terminated, truncated, infos
+
+    def _with_finals(self, infos: Dict[str, Any]) -> Dict[str, Any]:
+        ended = self._ended
+        self._measure(self._all[ended])
+        last = self._observation()
+        finals = np.empty(self.num_envs, dtype=object)
+        for i in np.flatnonzero(ended):
+            finals[i] = {name: values[i].copy() for name, values in last.items()}
+        final_info = {name: values for name, values in infos.items() if not name.startswith("_")}
+        final_info.update({"_" + name: ended.copy() for name in final_info})
+        return {
+            **infos,
+            "final_obs": finals,
+            "_final_obs": ended.copy(),
+            "final_info": final_info,
+            "_final_info": ended.copy(),
+        }
+
+    def close(self, **kwargs: Any) -> None:
+        """Nothing is open."""
+
+    # ---- within ----
+
+    def _begin(self, which: NDArray[np.uint32]) -> None:
+        if len(which) == 0:
+            return
+        self._steps[which], self._ended[which] = 0, False
+        self.elapsed[which] = 0.0
+        self.last_actions[which] = 0.0
+        self.task.reset(self, which)
+        self._episodes[which] += np.uint64(1)
+
+    def _measure(self, which: NDArray[np.uint32]) -> None:
+        if self.lidar is None or len(which) == 0:
+            return
+        for block, flights in zip(self._blocks, self._flights):
+            rows = which[(which >= block.start) & (which < block.stop)]
+            if len(rows):
+                flights.measure(rows - np.uint32(block.start))
+
+    def _observation(self) -> Observation:
+        seen: Observation = {}
+        if self.lidar is not None:
+            images = [flights.ranges for flights in self._flights]
+            whole = images[0] if len(images) == 1 else np.concatenate(images)
+            whole = whole.reshape(self.num_envs, self.lidar.rows, self.lidar.columns)
+            seen["range"] = whole.copy() if self.copy and len(images) == 1 else whole
+        seen["state"] = self.task.state(self).astype(np.float32)
+        return seen
+
+    def __repr__(self) -> str:
+        return f"<VectorEnv of {self.num_envs}: {type(self.task).__name__} in {', '.join(map_name(m) for m in self.maps)}>"
+
+
+def map_name(place: Map) -> str:
+    """The last part of its path."""
+    return os.path.basename(place.info().name)
+
+
+def _beams(lidar: Optional[Lidar]) -> Tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Directions (k, 3) and shares of the period (k,) or (0,)."""
+    if lidar is None:
+        return np.zeros((0, 3), np.float32), np.zeros(0, np.float32)
+    if lidar.rows < 1 or lidar.columns < 1:
+        raise ValueError(f"lidar: 1 row and column or more, not {lidar.rows} x {lidar.columns}")
+    directions = _pointflight._grid(lidar.rows, lidar.columns, *lidar.elevation, *lidar.azimuth)
+    if not lidar.rolling:
+        return directions.reshape(-1, 3).astype(np.float32), np.zeros(0, np.float32)
+    shares = np.broadcast_to((np.arange(lidar.columns) + 0.5) / lidar.columns, (lidar.rows, lidar.columns))
+    return directions.reshape(-1, 3).astype(np.float32), shares.reshape(-1).astype(np.float32)

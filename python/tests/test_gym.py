@@ -1,0 +1,156 @@
+"""Environments for learning: gymnasium's rules, the same bits however many there are, pilots that arrive."""
+
+import unittest
+
+import numpy as np
+
+import pointflight as pf
+from gym_check import check_env, check_vector, same
+from pointflight.gym import Env, Goal, Hover, Lidar, VectorEnv
+from support import room
+
+SMALL = Lidar(4, 16, range_max=6.0)
+
+
+def goal() -> Goal:
+    """In the room of the tests."""
+    return Goal(distance=(1.5, 4.0), height=(0.8, 2.0), clearance=0.6, radius=0.5, time_limit=4.0)
+
+
+def hover() -> Hover:
+    return Hover(displacement=0.3, height=(1.0, 2.0), clearance=0.8, time_limit=2.0)
+
+
+def some(task, mode: str = "next_step", count: int = 8, **arguments) -> VectorEnv:
+    return VectorEnv(room(), count, task=task(), lidar=SMALL, autoreset=mode, **arguments)
+
+
+class GymTest(unittest.TestCase):
+    def tearDown(self) -> None:
+        pf.set_threads(0)
+
+    def test_rules_of_one(self) -> None:
+        for task in (goal, hover):
+            for action in ("velocity", "acceleration", "body_rates", "rotor_speeds"):
+                check_env(self, lambda task=task, action=action: Env(room(), task=task(), lidar=SMALL, action=action))
+        check_env(self, lambda: Env(room(), task=goal(), lidar=None))
+
+    def test_rules_of_many(self) -> None:
+        for task in (goal, hover):
+            check_vector(self, lambda mode, count, task=task: some(task, mode, count))
+
+    def test_same_bits_however_many_and_on_any_threads(self) -> None:
+        random = np.random.default_rng(1)
+        actions = random.uniform(-1, 1, (40, 33, 4))
+        runs = []
+        for threads, count in ((1, 33), (2, 33), (1, 1)):
+            pf.set_threads(threads)
+            env = some(goal, count=count)
+            log = [env.reset(seed=11)[0]]
+            for step in actions:
+                log.append(env.step(step[:count])[:4])
+            runs.append(log)
+        self.assertTrue(all(same(a, b) for a, b in zip(_flat(runs[0]), _flat(runs[1]))))
+        for many, one in zip(_flat(runs[0]), _flat(runs[2])):
+            self.assertTrue(same(np.asarray(many)[:1], one))
+
+    def test_seeds(self) -> None:
+        env = some(goal, count=3)
+        first, _ = env.reset(seed=[5, 9, 6])
+        second, _ = env.reset(seed=5)
+        self.assertTrue(same(first["state"][0], second["state"][0]))
+        self.assertTrue(same(first["state"][2], second["state"][1]))
+        mask = np.array([False, True, False])
+        third, _ = env.reset(seed=[0, 9, 0], options={"reset_mask": mask})
+        self.assertTrue(same(third["state"][0], second["state"][0]))
+        self.assertTrue(same(third["state"][1], first["state"][1]))
+
+    def test_views_and_copies(self) -> None:
+        views, copies = some(goal, copy=False), some(goal)
+        image = views.reset(seed=1)[0]["range"]
+        self.assertFalse(image.flags.writeable)
+        self.assertIs(image.base.base if image.base.base is not None else image.base, views._flights[0].ranges.base.base)
+        kept = copies.reset(seed=1)[0]["range"]
+        before = kept.copy()
+        self.assertTrue(same(kept, image.copy()))
+        for env in (views, copies):
+            env.step(np.full((8, 4), 0.5))
+        self.assertTrue(same(kept, before))
+        self.assertFalse(same(image, before))
+        del views
+        self.assertTrue(np.isfinite(image).all())
+
+    def test_ranges_are_those_of_the_map(self) -> None:
+        env = some(goal)
+        seen, _ = env.reset(seed=2)
+        for i in range(3):
+            at = np.eye(4)
+            x, y, z, w = env.states.orientation[i]
+            at[:3, :3] = [
+                [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+                [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+                [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+            ]
+            at[:3, 3] = env.states.position[i]
+            image = pf.ranges(room(), at, pf.grid(4, 16, SMALL.elevation), range_max=6.0)
+            np.testing.assert_allclose(seen["range"][i], np.minimum(image[0] / 6.0, 1.0), atol=1e-5)
+
+    def test_several_maps(self) -> None:
+        env = VectorEnv([room(), room()], 5, task=goal(), lidar=SMALL)
+        alone = VectorEnv(room(), 5, task=goal(), lidar=SMALL)
+        self.assertTrue(same(env.reset(seed=4)[0], alone.reset(seed=4)[0]))
+        actions = np.full((5, 4), 0.3)
+        for _ in range(10):
+            self.assertTrue(same(env.step(actions)[:4], alone.step(actions)[:4]))
+
+    def test_a_straight_pilot_arrives_in_an_empty_room(self) -> None:
+        env = some(goal, "disabled", 32)
+        seen, _ = env.reset(seed=0)
+        reached = np.zeros(32, bool)
+        collided = np.zeros(32, bool)
+        for _ in range(40):
+            s = seen["state"]
+            to_goal = np.stack([s[:, 0] * s[:, 2] * 30, s[:, 1] * s[:, 2] * 30, s[:, 3] * 3, 0 * s[:, 0]], 1)
+            speed = np.minimum(np.linalg.norm(to_goal, axis=1, keepdims=True), 1.0) / 3.0
+            seen, _, _, _, infos = env.step(to_goal / np.linalg.norm(to_goal, axis=1, keepdims=True) * speed)
+            reached |= infos["reached"] & infos["_reached"]
+            collided |= infos["collided"]
+        self.assertGreater(reached.sum(), 28)
+        self.assertLess(collided.sum(), 3)
+
+    def test_misuse(self) -> None:
+        for wrong in (
+            lambda: VectorEnv(room(), 0),
+            lambda: VectorEnv(room(), 2, autoreset="never"),
+            lambda: VectorEnv(room(), 2, task="win"),
+            lambda: VectorEnv(room(), 2, action="teleport", task=goal()),
+            lambda: VectorEnv([], 2),
+            lambda: VectorEnv(room(), 2, lidar=Lidar(0, 5), task=goal()),
+            lambda: VectorEnv(room(), 2, task=goal(), physics_step=0.007),
+            lambda: some(Goal).reset(),  # 20 m do not fit into the room
+            lambda: some(goal).step(np.zeros((8, 4))),
+            lambda: Env(room(), num_envs=3),
+            lambda: some(goal).reset(seed=-1),
+            lambda: some(goal).reset(options={"reset_mask": np.zeros(8, bool)}),
+        ):
+            with self.assertRaises((ValueError, TypeError, RuntimeError)):
+                wrong()
+        env = some(goal)
+        env.reset(seed=1)
+        for actions in (np.zeros(4), np.zeros((8, 3)), np.full((8, 4), np.nan), "left"):
+            with self.assertRaises((ValueError, TypeError)):
+                env.step(actions)
+
+
+def _flat(log):
+    """Observations and results one after the other."""
+    arrays = []
+    for entry in log:
+        parts = (entry,) if isinstance(entry, dict) else entry
+        for part in parts:
+            arrays += list(part.values()) if isinstance(part, dict) else [part]
+    return arrays
+
+
+if __name__ == "__main__":
+    unittest.main()
