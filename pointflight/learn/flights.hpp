@@ -38,8 +38,8 @@ class Flights {
     /// Distance of the hull to the map at the end of the last action, m: exact below `kExact`, a
     /// lower bound beyond, `kReach` at most; minus how deep if it overlaps.
     double clearance = kReach;
-    double flown = 0.0;         ///< m since it was placed.
-    bool collided = false;      ///< In or before the last action, since it was placed.
+    double flown = 0.0;     ///< m since it was placed.
+    bool collided = false;  ///< In or before the last action, since it was placed.
   };
 
   /// `count` vehicles in `map`, the ranges of `pattern`. Throws InputError as `Multirotor`,

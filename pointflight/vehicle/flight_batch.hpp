@@ -38,8 +38,10 @@ class FlightBatch {
   /// `count` vehicles that hover at the origin. Throws InputError as `Multirotor` does.
   FlightBatch(const VehicleSettings& settings, std::size_t count, const FlightTiming& timing);
   ~FlightBatch();
-  FlightBatch(FlightBatch&&) noexcept;
-  FlightBatch& operator=(FlightBatch&&) noexcept;
+  /// Leaves `other` to be assigned to or destroyed.
+  FlightBatch(FlightBatch&& other) noexcept;
+  /// The same.
+  FlightBatch& operator=(FlightBatch&& other) noexcept;
 
   /// How many there are.
   [[nodiscard]] std::size_t size() const;

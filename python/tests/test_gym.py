@@ -1,13 +1,15 @@
 """Environments for learning: gymnasium's rules, the same bits however many there are, pilots that arrive."""
 
+import types
 import unittest
 
 import numpy as np
 
 import pointflight as pf
 from gym_check import check_env, check_vector, same
-from pointflight.gym import Env, Goal, Hover, Lidar, VectorEnv
-from support import room
+from pointflight.gym import Env, Goal, Hover, Lidar, Observer, Policy, VectorEnv, evaluate, reactive
+from pointflight.gym.stable_baselines import StableBaselinesEnv
+from support import path_of, room
 
 SMALL = Lidar(4, 16, range_max=6.0)
 
@@ -117,6 +119,79 @@ class GymTest(unittest.TestCase):
             collided |= infos["collided"]
         self.assertGreater(reached.sum(), 28)
         self.assertLess(collided.sum(), 3)
+
+    def test_stable_baselines(self) -> None:
+        env = StableBaselinesEnv(some(goal, "same_step"))
+        env.seed(3)
+        seen = env.reset()
+        self.assertTrue(same(seen, some(goal).reset(seed=3)[0]))
+        ends = 0
+        random = np.random.default_rng(1)
+        for _ in range(60):
+            env.step_async(random.uniform(-1, 1, (8, 4)).astype(np.float32))
+            seen, rewards, dones, infos = env.step_wait()
+            self.assertEqual((rewards.dtype, dones.dtype, len(infos)), (np.float32, np.bool_, 8))
+            for i in np.flatnonzero(dones):
+                ends += 1
+                self.assertTrue(env.observation_space.contains(infos[i]["terminal_observation"]))
+                self.assertIs(type(infos[i]["TimeLimit.truncated"]), bool)
+            self.assertTrue(all("terminal_observation" not in infos[i] for i in np.flatnonzero(~dones)))
+        self.assertGreater(ends, 2)
+        self.assertEqual(env.get_attr("action_period", [0, 1]), [0.1, 0.1])
+        self.assertEqual(env.env_is_wrapped(object), [False] * 8)
+        with self.assertRaises(ValueError):
+            StableBaselinesEnv(some(goal))
+        with self.assertRaises(RuntimeError):
+            env.step_wait()
+
+    def test_policies_are_kept_and_evaluated(self) -> None:
+        env = some(goal, "disabled", 16)
+        random = np.random.default_rng(0)
+        width = 64 + 15
+        layers = [
+            (random.normal(0, 0.1, (8, width)).astype(np.float32), np.zeros(8, np.float32)),
+            (random.normal(0, 0.01, (3, 8)).astype(np.float32), np.zeros(3, np.float32)),
+        ]
+        policy = Policy(layers, {"base": 0.3, "range_max": 6.0})
+        policy.save(path_of("policy.npz"))
+        again = Policy.load(path_of("policy.npz"))
+        seen, _ = env.reset(seed=0)
+        np.testing.assert_array_equal(policy(seen), again(seen))
+        self.assertEqual(policy(seen).shape, (16, 4))
+        score = evaluate(env, policy, range(16))
+        self.assertEqual(score.arrived + score.collided + score.late, 16)
+        self.assertGreater(score.arrived, 10)
+        self.assertTrue(score.interval[0] < score.arrived / 16 <= score.interval[1] + 1e-9)
+        self.assertGreater(evaluate(env, reactive(env, 0.3), range(16)).arrived, 4)
+
+    def test_observer_sees_what_the_environment_does(self) -> None:
+        env = some(goal, count=1)
+        for seed in range(3):
+            seen, _ = env.reset(seed=seed)
+            for _ in range(3):  # headings that are asked for and those that are differ in a turn
+                seen = env.step([[0.4, 0.2, 0.1, 0.0]])[0]
+            states = env.states
+            x, y, z, w = states.orientation[0]
+            pose = np.eye(4)
+            pose[:3, :3] = [
+                [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+                [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+                [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+            ]
+            pose[:3, 3] = states.position[0]
+            body = types.SimpleNamespace(
+                position=states.position[0], velocity=states.velocity[0], orientation=states.orientation[0],
+                angular_velocity=states.angular_velocity[0], pose=pose,
+            )  # fmt: skip
+            observer = Observer(env.task.goal[0], SMALL, goal())
+            observer.elapsed, observer.last_action = env.elapsed[0], env.last_actions[0]
+            told = observer.of_map(body, room())
+            np.testing.assert_allclose(told["range"], seen["range"], atol=1e-5)
+            np.testing.assert_allclose(told["state"], seen["state"], atol=0.01)
+            directions = pf.grid(4, 16, SMALL.elevation).reshape(-1, 3)
+            points = directions * (told["range"].reshape(-1, 1) * 6.0)
+            again = observer.of_points(body, points)
+            np.testing.assert_allclose(again["range"], told["range"], atol=1e-5)
 
     def test_misuse(self) -> None:
         for wrong in (

@@ -4,6 +4,9 @@ gymnasium is not needed; where it is installed, spaces and base classes are its 
 """
 
 from .env import Env
+from .evaluation import Score, evaluate, reactive, wilson
+from .observer import Observer
+from .policy import Policy, features, straight
 from .tasks import TASKS, Goal, Hover, Outcome, States, Task
 from .vector import AutoresetMode, Lidar, VectorEnv
 
@@ -13,9 +16,17 @@ __all__ = [
     "Goal",
     "Hover",
     "Lidar",
+    "Observer",
     "Outcome",
+    "Policy",
+    "Score",
     "States",
     "TASKS",
     "Task",
     "VectorEnv",
+    "evaluate",
+    "features",
+    "reactive",
+    "straight",
+    "wilson",
 ]

@@ -150,8 +150,11 @@ class Goal(Task):
         self._checked.add(id(places))
 
     def state(self, env: "VectorEnv") -> Floats:
-        s = env.states
-        to_goal = s.level(self.goal - s.position)
+        return self.state_of(env.states, self.goal, env.elapsed, env.last_actions)
+
+    def state_of(self, s: States, goal: Floats, elapsed: Floats, last_actions: Floats) -> Floats:
+        """(n, state_size): the same of any vehicles, for flights outside of an environment."""
+        to_goal = s.level(goal - s.position)
         flat = np.maximum(lengths(to_goal[:, :2]), 1e-6)
         return np.concatenate(
             [
@@ -160,9 +163,9 @@ class Goal(Task):
                 np.clip(to_goal[:, 2:] / 3.0, -1.0, 1.0),
                 s.level(s.velocity) / 3.0,
                 s.tilt(),
-                env.elapsed[:, None] / self.time_limit,
+                elapsed[:, None] / self.time_limit,
                 np.minimum(1.0, 2.0 / flat)[:, None],
-                env.last_actions,
+                last_actions,
             ],
             1,
         )

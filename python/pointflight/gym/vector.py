@@ -19,7 +19,8 @@ from .spaces import Dict as DictSpace
 from .tasks import TASKS, Floats, States, Task
 
 try:
-    from gymnasium.vector import AutoresetMode, VectorEnv as _Base
+    from gymnasium.vector import AutoresetMode as AutoresetMode
+    from gymnasium.vector import VectorEnv as _Base
 except ImportError:
     _Base = object
 
@@ -217,7 +218,11 @@ class VectorEnv(_Base):  # type: ignore[misc]
         if seed is None and not self._was_reset:
             seed = int(np.random.SeedSequence().generate_state(1)[0])
         if seed is not None:
-            seeds = [seed + i for i in range(self.num_envs)] if isinstance(seed, (int, np.integer)) else list(seed)
+            seeds: List[Optional[int]]
+            if isinstance(seed, (int, np.integer)):
+                seeds = [int(seed) + i for i in range(self.num_envs)]
+            else:
+                seeds = list(seed)
             if len(seeds) != self.num_envs or any(s is not None and s < 0 for s in seeds):
                 raise ValueError(f"seed: 0 or above, or {self.num_envs} of them")
             for i, one in enumerate(seeds):
