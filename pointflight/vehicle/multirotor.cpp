@@ -39,12 +39,12 @@ void Multirotor::step(VehicleState& state,
   assert(commands.size() == settings_.rotors.size() && state.rotors.size() == commands.size());
   assert(conditions.rotor_shares.empty() || conditions.rotor_shares.size() == commands.size());
   assert(std::isfinite(dt));
-  hw::PerRotor<double> targets;
+  hw::PerRotor<double> targets;  // NOLINT: the same
   for (std::size_t i = 0; i < commands.size(); ++i) {
     targets[i] = target(i, commands[i], conditions);
   }
   hw::BodyNumbers<double> body = hw::numbers_of(state.body);
-  hw::RotorNumbers<double> rotors;
+  hw::RotorNumbers<double> rotors;  // NOLINT: as many as there are are filled in
   hw::put(state.rotors, rotors);
   const hw::AirNumbers<double> air = hw::numbers_of(conditions);
   // in two halves: a vehicle that tumbles at 7 rad/s then stays within 1e-9 m of the exact motion
@@ -74,7 +74,7 @@ double Multirotor::shaft_power(const VehicleState& state,
 
 BodyAcceleration Multirotor::acceleration(const VehicleState& state,
                                           const FlightConditions& conditions) const {
-  hw::RotorNumbers<double> rotors;
+  hw::RotorNumbers<double> rotors;  // NOLINT: as many as there are are filled in
   hw::put(state.rotors, rotors);
   const auto rate =
       hw::rate_of(settings_, hw::numbers_of(state.body), rotors.speed, hw::numbers_of(conditions));

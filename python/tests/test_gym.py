@@ -7,7 +7,20 @@ import numpy as np
 
 import pointflight as pf
 from gym_check import check_env, check_vector, same
-from pointflight.gym import Env, Goal, Hover, Lidar, Observer, Policy, VectorEnv, evaluate, reactive
+from pointflight.gym import (
+    Env,
+    Explore,
+    Goal,
+    Hover,
+    Lidar,
+    Observer,
+    Policy,
+    Race,
+    VectorEnv,
+    evaluate,
+    reactive,
+    straight,
+)
 from pointflight.gym.stable_baselines import StableBaselinesEnv
 from support import path_of, room
 
@@ -23,6 +36,14 @@ def hover() -> Hover:
     return Hover(displacement=0.3, height=(1.0, 2.0), clearance=0.8, time_limit=2.0)
 
 
+def race() -> Race:
+    return Race(goals=3, distance=(1.0, 4.0), height=(0.8, 2.0), clearance=0.6, radius=0.6, time_limit=6.0)
+
+
+def explore() -> Explore:
+    return Explore(cell=0.5, height=(0.8, 2.0), clearance=0.6, time_limit=4.0)
+
+
 def some(task, mode: str = "next_step", count: int = 8, **arguments) -> VectorEnv:
     return VectorEnv(room(), count, task=task(), lidar=SMALL, autoreset=mode, **arguments)
 
@@ -32,13 +53,13 @@ class GymTest(unittest.TestCase):
         pf.set_threads(0)
 
     def test_rules_of_one(self) -> None:
-        for task in (goal, hover):
+        for task in (goal, hover, race, explore):
             for action in ("velocity", "acceleration", "body_rates", "rotor_speeds"):
                 check_env(self, lambda task=task, action=action: Env(room(), task=task(), lidar=SMALL, action=action))
         check_env(self, lambda: Env(room(), task=goal(), lidar=None))
 
     def test_rules_of_many(self) -> None:
-        for task in (goal, hover):
+        for task in (goal, hover, race, explore):
             check_vector(self, lambda mode, count, task=task: some(task, mode, count))
 
     def test_same_bits_however_many_and_on_any_threads(self) -> None:
@@ -192,6 +213,58 @@ class GymTest(unittest.TestCase):
             points = directions * (told["range"].reshape(-1, 1) * 6.0)
             again = observer.of_points(body, points)
             np.testing.assert_allclose(again["range"], told["range"], atol=1e-5)
+
+    def test_race_goes_from_goal_to_goal(self) -> None:
+        env = some(lambda: Race(goals=3, distance=(1, 4), height=(0.8, 2.0), clearance=0.7, time_limit=20.0), "disabled", 16)
+        seen, _ = env.reset(seed=0)
+        passed = np.zeros(16, np.int64)
+        finished = np.zeros(16, bool)
+        for _ in range(200):
+            before = env.task.goal.copy()
+            seen, _, terminated, _, infos = env.step(0.3 * straight(seen))
+            moved = (env.task.goal != before).any(1)
+            np.testing.assert_array_equal(moved, (infos["passed"] > passed) & (infos["passed"] < 3))
+            passed = infos["passed"]
+            finished |= infos["reached"] & terminated
+        self.assertGreater(finished.sum(), 10)
+        self.assertTrue((passed[finished] == 3).all())
+
+    def test_exploring_counts_cells_once(self) -> None:
+        env = some(explore, "disabled", 2)
+        env.reset(seed=0)
+        still = np.zeros((2, 4))
+        _, _, _, _, infos = env.step(still)
+        self.assertGreater(infos["found"].min(), 20)
+        points, hit = env.points()
+        inside = (points > [-3.1, -2.1, -0.1]).all(2) & (points < [3.1, 2.1, 3.1]).all(2)
+        self.assertTrue(inside[hit].all())
+        for _ in range(3):
+            _, _, _, _, infos = env.step(still)
+        self.assertLess(infos["found"].max(), 5)
+        self.assertTrue((infos["cells"] >= 20).all())
+
+    def test_wind_blows_and_ranges_are_noisy_as_told(self) -> None:
+        def windy() -> Goal:
+            return Goal(distance=(1.5, 4.0), height=(0.8, 2.0), clearance=0.6, wind=4.0)
+
+        calm, blown = some(goal, count=16), some(windy, count=16)
+        calm.reset(seed=1), blown.reset(seed=1)
+        start = calm.states.position.copy()
+        np.testing.assert_array_equal(start, blown.states.position)
+        for env in (calm, blown):
+            env.step(np.zeros((16, 4)))
+        self.assertLess(np.abs(calm.states.position - start).max(), 1e-3)
+        self.assertGreater(np.abs(blown.states.position - start).max(), 1e-3)
+        exact = VectorEnv(room(), 64, task=goal(), lidar=SMALL).reset(seed=5)[0]["range"]
+        noisy_lidar = SMALL._replace(noise=0.06, dropout=0.2)
+        noisy = VectorEnv(room(), 64, task=goal(), lidar=noisy_lidar).reset(seed=5)[0]["range"]
+        again = VectorEnv(room(), 3, task=goal(), lidar=noisy_lidar).reset(seed=5)[0]["range"]
+        np.testing.assert_array_equal(noisy[:3], again)
+        lost = (noisy == 1.0) & (exact < 0.9)
+        self.assertAlmostEqual(lost.mean(), 0.2 * (exact < 0.9).mean(), delta=0.02)
+        off = (noisy - exact)[(noisy < 1.0) & (exact < 0.9)] * 6.0
+        self.assertAlmostEqual(off.std(), 0.06, delta=0.005)
+        self.assertAlmostEqual(off.mean(), 0.0, delta=0.005)
 
     def test_misuse(self) -> None:
         for wrong in (

@@ -110,12 +110,11 @@ HWY_INLINE AttitudeNumbers<N> demanded_attitude(const VehicleSettings& vehicle,
   // in free fall any attitude will do: the present one
   const N specific_thrust = norm(f);
   const Vec3<N> b3 = choose(specific_thrust > N(1e-3), f / specific_thrust, now.z);
-  AttitudeNumbers<N> demand;
-  demand.R = attitude_from(b3, heading, now);
-  demand.omega = demanded_rates(vehicle.controller, demand.R, specific_thrust, jerk, yaw_rate);
-  // the thrust that the present attitude can turn into the demanded force
-  demand.thrust = N(vehicle.mass) * greatest(N(0.0), dot(f, now.z));
-  return demand;
+  const Mat3<N> R = attitude_from(b3, heading, now);
+  // the thrust is what the present attitude can turn into the demanded force
+  return {R,
+          demanded_rates(vehicle.controller, R, specific_thrust, jerk, yaw_rate),
+          N(vehicle.mass) * greatest(N(0.0), dot(f, now.z))};
 }
 
 /// J a + w x J w.

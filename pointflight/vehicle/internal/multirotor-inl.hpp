@@ -115,18 +115,15 @@ HWY_INLINE BodyRate<N> rate_of(const VehicleSettings& vehicle,
                        magnitude(v_body.z) * v_body.z};
   push.force = push.force - N(0.5 * kAirDensity) * times(all_of<N>(vehicle.drag_area), moving);
 
-  BodyRate<N> rate;
-  rate.v = body.v;
-  rate.a = rotate(body.q, push.force) / N(vehicle.mass) - all_of<N>(Vector3d(0, 0, kGravity));
+  const Vec3<N> a =
+      rotate(body.q, push.force) / N(vehicle.mass) - all_of<N>(Vector3d(0, 0, kGravity));
   const Vec3<N> momentum = times(all_of<N>(vehicle.inertia_diagonal), body.omega) +
                            Vec3<N>{N(0.0), N(0.0), rotor_momentum(vehicle, speeds)};
   const Vec3<N> drag_torque =
       norm(body.omega) * times(all_of<N>(vehicle.rotational_drag), body.omega);
-  rate.torque = push.torque - drag_torque - cross(body.omega, momentum);
+  const Vec3<N> torque = push.torque - drag_torque - cross(body.omega, momentum);
   const Quat<N> turn = body.q * Quat<N>{body.omega.x, body.omega.y, body.omega.z, N(0.0)};
-  const N half(0.5);
-  rate.q = {half * turn.x, half * turn.y, half * turn.z, half * turn.w};
-  return rate;
+  return {body.v, a, N(0.5) * turn, torque};
 }
 
 /// The rotors' speeds later, on their way to `targets`.
@@ -149,6 +146,12 @@ HWY_INLINE void advance(const VehicleSettings& vehicle,
   }
 }
 
+/// (a + 2 b + 2 c + d) / 6
+template <template <class> class Many, class N>
+HWY_INLINE Many<N> mean_of(const Many<N>& a, const Many<N>& b, const Many<N>& c, const Many<N>& d) {
+  return N(1.0 / 6.0) * (a + N(2.0) * b + N(2.0) * c + d);
+}
+
 /// One step of RK4 for the body; rotors by their closed form, on their way to `targets`.
 template <class N>
 HWY_INLINE void runge_kutta(const VehicleSettings& vehicle,
@@ -158,8 +161,10 @@ HWY_INLINE void runge_kutta(const VehicleSettings& vehicle,
                             const AirNumbers<N>& air,
                             const StepLag& step) {
   const std::size_t count = vehicle.rotors.size();
+  // NOLINTBEGIN(cppcoreguidelines-pro-type-member-init): as many as there are rotors are filled in
   RotorNumbers<N> middle;
   RotorNumbers<N> end;
+  // NOLINTEND(cppcoreguidelines-pro-type-member-init)
   if (vehicle.rotor.natural_frequency > 0.0) {
     advance(vehicle, rotors, targets, step.half, middle);
     advance(vehicle, rotors, targets, step.whole, end);
@@ -178,12 +183,10 @@ HWY_INLINE void runge_kutta(const VehicleSettings& vehicle,
   const N spin_middle = rotor_momentum(vehicle, middle.speed);
   const N spin_end = rotor_momentum(vehicle, end.speed);
   const auto moved = [&](const BodyRate<N>& r, N h, N spin) HWY_ATTR {
-    BodyNumbers<N> s;
-    s.p = body.p + h * r.v;
-    s.v = body.v + h * r.a;
-    s.q = {body.q.x + h * r.q.x, body.q.y + h * r.q.y, body.q.z + h * r.q.z, body.q.w + h * r.q.w};
-    s.omega = by(momentum + h * r.torque - Vec3<N>{zero, zero, spin}, inertia);
-    return s;
+    return BodyNumbers<N>{body.p + h * r.v,
+                          body.v + h * r.a,
+                          body.q + h * r.q,
+                          by(momentum + h * r.torque - Vec3<N>{zero, zero, spin}, inertia)};
   };
   const N half(0.5 * step.dt);
   const N whole(step.dt);
@@ -191,21 +194,11 @@ HWY_INLINE void runge_kutta(const VehicleSettings& vehicle,
   const BodyRate<N> k2 = rate_of(vehicle, moved(k1, half, spin_middle), middle.speed, air);
   const BodyRate<N> k3 = rate_of(vehicle, moved(k2, half, spin_middle), middle.speed, air);
   const BodyRate<N> k4 = rate_of(vehicle, moved(k3, whole, spin_end), end.speed, air);
-  const N two(2.0);
-  const N sixth(1.0 / 6.0);
-  const auto mean = [&](const Vec3<N>& a, const Vec3<N>& b, const Vec3<N>& c, const Vec3<N>& d)
-                        HWY_ATTR { return sixth * (a + two * b + two * c + d); };
-  const auto mean_of_one = [&](N a, N b, N c, N d)
-                               HWY_ATTR { return sixth * (a + two * b + two * c + d); };
-  BodyRate<N> r;
-  r.v = mean(k1.v, k2.v, k3.v, k4.v);
-  r.a = mean(k1.a, k2.a, k3.a, k4.a);
-  r.q = {mean_of_one(k1.q.x, k2.q.x, k3.q.x, k4.q.x),
-         mean_of_one(k1.q.y, k2.q.y, k3.q.y, k4.q.y),
-         mean_of_one(k1.q.z, k2.q.z, k3.q.z, k4.q.z),
-         mean_of_one(k1.q.w, k2.q.w, k3.q.w, k4.q.w)};
-  r.torque = mean(k1.torque, k2.torque, k3.torque, k4.torque);
-  body = moved(r, whole, spin_end);
+  const BodyRate<N> mean{mean_of(k1.v, k2.v, k3.v, k4.v),
+                         mean_of(k1.a, k2.a, k3.a, k4.a),
+                         mean_of(k1.q, k2.q, k3.q, k4.q),
+                         mean_of(k1.torque, k2.torque, k3.torque, k4.torque)};
+  body = moved(mean, whole, spin_end);
   body.q = normalized(body.q);
   for (std::size_t i = 0; i < count; ++i) {
     const auto backwards = end.speed[i] < zero;

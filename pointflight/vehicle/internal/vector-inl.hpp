@@ -77,6 +77,18 @@ struct Quat {
   N x, y, z, w;
 };
 
+/// Component by component: what integrators do.
+///@{
+template <class N>
+HWY_INLINE Quat<N> operator+(const Quat<N>& a, const Quat<N>& b) {
+  return {a.x + b.x, a.y + b.y, a.z + b.z, a.w + b.w};
+}
+template <class N>
+HWY_INLINE Quat<N> operator*(N s, const Quat<N>& a) {
+  return {s * a.x, s * a.y, s * a.z, s * a.w};
+}
+///@}
+
 template <class N>
 HWY_INLINE Quat<N> conjugate(const Quat<N>& q) {
   return {-q.x, -q.y, -q.z, q.w};

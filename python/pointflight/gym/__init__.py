@@ -7,18 +7,20 @@ from .env import Env
 from .evaluation import Score, evaluate, reactive, wilson
 from .observer import Observer
 from .policy import Policy, features, straight
-from .tasks import TASKS, Goal, Hover, Outcome, States, Task
+from .tasks import TASKS, Explore, Goal, Hover, Outcome, Race, States, Task
 from .vector import AutoresetMode, Lidar, VectorEnv
 
 __all__ = [
     "AutoresetMode",
     "Env",
+    "Explore",
     "Goal",
     "Hover",
     "Lidar",
     "Observer",
     "Outcome",
     "Policy",
+    "Race",
     "Score",
     "States",
     "TASKS",

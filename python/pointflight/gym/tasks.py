@@ -1,8 +1,8 @@
-"""What is to be learned: `Hover`, `Goal`. Derive `Task` for one's own; all arrays have a row for each environment."""
+"""What is to be learned: `Goal`, `Race`, `Explore`, `Hover`. Derive `Task` for one's own; all arrays have a row for each environment."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Dict, NamedTuple, Set, Tuple
+from typing import TYPE_CHECKING, Any, Dict, List, NamedTuple, Set, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -87,7 +87,8 @@ class Task:
         raise NotImplementedError
 
     def judge(self, env: "VectorEnv", change: Floats) -> Outcome:
-        """After an action. change: (n,), the squared difference of the actions to the ones before."""
+        """After an action. change: (n,), the squared difference of the actions to the ones before. What is said of
+        those that stood still (`env.moved`) does not count."""
         raise NotImplementedError
 
 
@@ -106,12 +107,13 @@ class Goal(Task):
         height: Tuple[float, float] = (1.5, 3.0),
         clearance: float = 1.0,
         radius: float = 1.0,
+        wind: float = 0.0,
         time_limit: float = 20.0,
     ) -> None:
         """distance: from start to goal, horizontal, m. height: of both above ground, m. clearance: of both, m. radius:
-        the goal is reached within it, m."""
+        the goal is reached within it, m. wind: each episode has a steady one, up to so much along world x and y, m/s."""
         self.distance, self.height, self.clearance, self.radius = distance, height, clearance, radius
-        self.time_limit = time_limit
+        self.wind, self.time_limit = wind, time_limit
 
     def begin(self, env: "VectorEnv") -> None:
         self.state_size = 11 + env.single_action_space.shape[0]
@@ -120,23 +122,33 @@ class Goal(Task):
         self._checked: Set[int] = set()
 
     def reset(self, env: "VectorEnv", which: NDArray[np.uint32]) -> None:
-        tries = 64
-        u = env.draws(which, 1 + tries)
+        u = env.draws(which, 3 + self._tries)
         start = np.empty((len(which), 3))
-        goal = np.empty((len(which), 3))
         for rows, places in env.places(which, self.height, self.clearance):
-            count = len(places)
             self._check(places)
-            start[rows] = places[(u[rows, 0] * count).astype(np.int64)]
-            candidates = places[(u[rows, 1:] * count).astype(np.int64)]
-            apart = candidates[:, :, :2] - start[rows][:, None, :2]
-            d = np.sqrt(apart[:, :, 0] * apart[:, :, 0] + apart[:, :, 1] * apart[:, :, 1])
-            # the first that is as far away as it should be, else the nearest to that
-            off = np.maximum(np.maximum(self.distance[0] - d, d - self.distance[1]), 0.0)
-            goal[rows] = candidates[np.arange(len(off)), off.argmin(1)]
+            start[rows] = places[(u[rows, 0] * len(places)).astype(np.int64)]
+        goal = self._goals(env, which, start, u[:, 3:])
         env.place(which, start, goal)
+        if self.wind > 0.0:
+            winds = np.zeros((len(which), 3))
+            winds[:, :2] = self.wind * (2.0 * u[:, 1:3] - 1.0)
+            env.set_wind(which, winds)
         self.goal[which] = goal
         self.away[which] = lengths(goal - start)
+
+    _tries = 64
+
+    def _goals(self, env: "VectorEnv", which: NDArray[np.uint32], start: Floats, u: Floats) -> Floats:
+        """(m, 3): of the positions that u (m, tries) draws the first that is as far away as it should be, else the
+        nearest to that."""
+        goal = np.empty((len(which), 3))
+        for rows, places in env.places(which, self.height, self.clearance):
+            candidates = places[(u[rows] * len(places)).astype(np.int64)]
+            apart = candidates[:, :, :2] - start[rows][:, None, :2]
+            d = np.sqrt(apart[:, :, 0] * apart[:, :, 0] + apart[:, :, 1] * apart[:, :, 1])
+            off = np.maximum(np.maximum(self.distance[0] - d, d - self.distance[1]), 0.0)
+            goal[rows] = candidates[np.arange(len(off)), off.argmin(1)]
+        return goal
 
     def _check(self, places: Floats) -> None:
         if id(places) in self._checked:
@@ -179,6 +191,111 @@ class Goal(Task):
         reward = reward - 5.0 * s.collided + 5.0 * reached
         info = {"reached": reached, "collided": s.collided, "clearance": s.clearance.copy(), "flown": s.flown.copy()}
         return Outcome(reward, s.collided | reached, info)
+
+
+class Race(Goal):
+    """Goals one after the other, each 8 to 15 m from the one before: all of them, as quickly as it can.
+
+    The state is that of `Goal`, so that its policies race as well.
+    """
+
+    def __init__(
+        self,
+        *,
+        goals: int = 5,
+        distance: Tuple[float, float] = (8.0, 15.0),
+        height: Tuple[float, float] = (1.5, 3.0),
+        clearance: float = 1.0,
+        radius: float = 1.0,
+        wind: float = 0.0,
+        time_limit: float = 40.0,
+    ) -> None:
+        """goals: how many. The rest as of `Goal`."""
+        if goals < 1:
+            raise ValueError(f"goals: 1 or more, not {goals}")
+        super().__init__(
+            distance=distance, height=height, clearance=clearance, radius=radius, wind=wind, time_limit=time_limit
+        )
+        self.goals = goals
+
+    def begin(self, env: "VectorEnv") -> None:
+        super().begin(env)
+        self.passed = np.zeros(env.num_envs, np.int64)
+
+    def reset(self, env: "VectorEnv", which: NDArray[np.uint32]) -> None:
+        super().reset(env, which)
+        self.passed[which] = 0
+
+    def judge(self, env: "VectorEnv", change: Floats) -> Outcome:
+        reward, terminated, info = super().judge(env, change)
+        reached = info["reached"] & env.moved
+        self.passed = self.passed + reached
+        finished = self.passed >= self.goals
+        on = np.flatnonzero(reached & ~finished).astype(np.uint32)
+        if len(on):
+            # the next goal's draws follow those of the ones before
+            u = env.draws(on, 3 + self._tries * self.goals)
+            at = 3 + self._tries * self.passed[on]
+            rows = u[np.arange(len(on))[:, None], at[:, None] + np.arange(self._tries)[None, :]]
+            self.goal[on] = self._goals(env, on, self.goal[on], rows)
+            self.away[on] = lengths(self.goal[on] - env.states.position[on])
+        info = {**info, "reached": finished & reached, "passed": self.passed.copy()}
+        return Outcome(reward - 0.03, info["collided"] | finished, info)
+
+
+class Explore(Task):
+    """See as much as there is: each cell that a beam hits for the first time counts.
+
+    state (6 + actions): velocity in the heading's frame / 3 m/s (3), tilt (2), share of the time that is gone, the last
+    action. Cells are counted by the ranges that policies see, so a LiDAR is needed.
+    """
+
+    def __init__(
+        self,
+        *,
+        cell: float = 1.0,
+        height: Tuple[float, float] = (1.5, 3.0),
+        clearance: float = 1.0,
+        time_limit: float = 40.0,
+    ) -> None:
+        """cell: its side, m."""
+        self.cell, self.height, self.clearance, self.time_limit = cell, height, clearance, time_limit
+
+    def begin(self, env: "VectorEnv") -> None:
+        if env.lidar is None:
+            raise ValueError("Explore: a LiDAR is needed")
+        self.state_size = 6 + env.single_action_space.shape[0]
+        self.cells = np.zeros(env.num_envs, np.int64)
+        self._seen: List[NDArray[np.int64]] = [np.zeros(0, np.int64)] * env.num_envs
+
+    def reset(self, env: "VectorEnv", which: NDArray[np.uint32]) -> None:
+        u = env.draws(which, 4)
+        start = np.empty((len(which), 3))
+        for rows, places in env.places(which, self.height, self.clearance):
+            start[rows] = places[(u[rows, 0] * len(places)).astype(np.int64)]
+        env.place(which, start, start + 2.0 * u[:, 1:4] - 1.0)
+        self.cells[which] = 0
+        for i in which:
+            self._seen[i] = np.zeros(0, np.int64)
+
+    def state(self, env: "VectorEnv") -> Floats:
+        s = env.states
+        return np.concatenate(
+            [s.level(s.velocity) / 3.0, s.tilt(), env.elapsed[:, None] / self.time_limit, env.last_actions], 1
+        )
+
+    def judge(self, env: "VectorEnv", change: Floats) -> Outcome:
+        s = env.states
+        found = np.zeros(env.num_envs, np.int64)
+        points, hit = env.points()
+        numbers = np.floor(points / self.cell).astype(np.int64) + (1 << 20)
+        keys = (numbers[..., 0] << 42) | (numbers[..., 1] << 21) | numbers[..., 2]
+        for i in range(env.num_envs):
+            now = np.union1d(self._seen[i], keys[i][hit[i]])
+            found[i], self._seen[i] = len(now) - len(self._seen[i]), now
+        self.cells = self.cells + found
+        reward = 0.02 * found - 0.02 * change - 0.4 * np.maximum(0.0, 0.45 - s.clearance) - 5.0 * s.collided
+        return Outcome(reward, s.collided, {"collided": s.collided, "found": found, "cells": self.cells.copy()})
 
 
 class Hover(Task):
@@ -235,5 +352,5 @@ class Hover(Task):
         return Outcome(reward, lost, {"collided": s.collided, "off": off})
 
 
-TASKS = {"goal": Goal, "hover": Hover}
+TASKS = {"goal": Goal, "race": Race, "explore": Explore, "hover": Hover}
 """By name."""

@@ -54,6 +54,10 @@ class Lidar(NamedTuple):
     """m"""
     rolling: bool = False
     """Columns are measured one after the other while the vehicle moves, the left one first; else all at the end."""
+    noise: float = 0.0
+    """Standard deviation of ranges, m; bell-shaped, at most 3.46 of it."""
+    dropout: float = 0.0
+    """Share of beams that see nothing."""
 
 
 Observation = Dict[str, NDArray[np.float32]]
@@ -69,7 +73,7 @@ class VectorEnv(_Base):  # type: ignore[misc]
     the greatest).
 
     What an environment does follows from its own seed and its actions: not from how many there are, nor from threads
-    or the processor. All vehicles fly by the geometric controller, in still air.
+    or the processor. All vehicles fly by the geometric controller.
     """
 
     def __init__(
@@ -91,8 +95,8 @@ class VectorEnv(_Base):  # type: ignore[misc]
         copy: bool = True,
         render_mode: Optional[str] = None,
     ) -> None:
-        """map: one, or several: environments are dealt out to them in blocks. task: "goal", "hover", or one of
-        one's own. action_period: s between actions; physics_step, s, of which `steps_per_control` are flown with the
+        """map: one, or several: environments are dealt out to them in blocks. task: "goal", "race", "explore", "hover", or one
+        of one's own. action_period: s between actions; physics_step, s, of which `steps_per_control` are flown with the
         same rotor commands (docs/python.md: what coarser ones cost). autoreset: "next_step", "same_step" or
         "disabled". copy: False: observations are read-only views that the next step changes.
         """
@@ -116,6 +120,7 @@ class VectorEnv(_Base):  # type: ignore[misc]
             raise ValueError(f"map: {len(self.maps)} maps for {num_envs} environments")
         self._ends = [num_envs * (k + 1) // len(self.maps) for k in range(len(self.maps))]
         directions, shares = _beams(lidar)
+        self._directions = directions.astype(np.float64)
         begins = [0, *self._ends[:-1]]
         self._blocks = [slice(begin, end) for begin, end in zip(begins, self._ends)]
         self._flights = [
@@ -134,6 +139,8 @@ class VectorEnv(_Base):  # type: ignore[misc]
         """(n, a): of the actions before."""
         self.elapsed = np.zeros(num_envs)
         """(n,): s since the start of the episode."""
+        self.moved = np.zeros(num_envs, np.bool_)
+        """(n,): by the last action; those that had ended stand still."""
         self.seeds = np.zeros(num_envs, np.uint64)
         """(n,)"""
         self._episodes = np.zeros(num_envs, np.uint64)
@@ -197,6 +204,33 @@ class VectorEnv(_Base):  # type: ignore[misc]
             if rows.any():
                 flights.place(which[rows] - np.uint32(block.start), positions[rows], facing[rows])
 
+    def points(self) -> Tuple[Floats, NDArray[np.bool_]]:
+        """Where the beams of the last action's observation hit, (n, beams, 3), m, world, and which did, (n, beams).
+        Those of a rolling LiDAR are taken as if they were measured at its end."""
+        if self.lidar is None:
+            raise ValueError("points: there is no LiDAR")
+        s = self.states
+        ranges = self._ranges().astype(np.float64)
+        x, y, z, w = (s.orientation[:, k, None] for k in range(4))
+        dx, dy, dz = (self._directions[None, :, k] for k in range(3))
+        ahead = ranges * self.lidar.range_max
+        world = np.empty((*ranges.shape, 3))
+        rows = (
+            (1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)),
+            (2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)),
+            (2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)),
+        )
+        for k, (a, b, c) in enumerate(rows):
+            world[..., k] = s.position[:, k, None] + ahead * (a * dx + b * dy + c * dz)
+        return world, ranges < 1.0
+
+    def set_wind(self, which: NDArray[np.uint32], winds: Floats) -> None:
+        """The steady wind (m, 3) that these vehicles fly in until they are placed again, m/s, world."""
+        for block, flights in zip(self._blocks, self._flights):
+            rows = (which >= block.start) & (which < block.stop)
+            if rows.any():
+                flights.set_wind(which[rows] - np.uint32(block.start), winds[rows])
+
     @property
     def states(self) -> States:
         """The true states of all vehicles."""
@@ -246,7 +280,7 @@ class VectorEnv(_Base):  # type: ignore[misc]
         if not np.isfinite(asked).all():
             raise ValueError("actions: finite numbers are wanted")
         asked = np.clip(asked, -1.0, 1.0)
-        moves = ~self._ended
+        moves = self.moved = ~self._ended
         commands = self._zero + asked * np.where(asked < 0, self._down, self._up)
         for block, flights in zip(self._blocks, self._flights):
             flights.step(commands[block], moves[block])
@@ -257,6 +291,7 @@ class VectorEnv(_Base):  # type: ignore[misc]
         self.last_actions = np.where(moves[:, None], asked, self.last_actions)
         self._steps += moves
         self.elapsed = self._steps * self.action_period
+        self._measure(self._all[moves])
         reward, terminated, info = self.task.judge(self, change)
         terminated = terminated & moves
         truncated = (self._steps >= round(self.task.time_limit / self.action_period)) & moves & ~terminated
@@ -265,17 +300,18 @@ class VectorEnv(_Base):  # type: ignore[misc]
         for name, values in info.items():
             infos[name], infos["_" + name] = values, moves
         ended_before, self._ended = self._ended, (terminated | truncated) | self._ended
+        again = np.zeros(0, np.uint32)
         if self._mode is AutoresetMode.NEXT_STEP:
-            self._begin(self._all[ended_before])
+            again = self._all[ended_before]
         elif self._mode is AutoresetMode.SAME_STEP and self._ended.any():
             infos = self._with_finals(infos)
-            self._begin(self._all[self._ended])
-        self._measure(self._all)
+            again = self._all[self._ended]
+        self._begin(again)
+        self._measure(again)
         return self._observation(), reward, terminated, truncated, infos
 
     def _with_finals(self, infos: Dict[str, Any]) -> Dict[str, Any]:
         ended = self._ended
-        self._measure(self._all[ended])
         last = self._observation()
         finals = np.empty(self.num_envs, dtype=object)
         for i in np.flatnonzero(ended):
@@ -312,15 +348,32 @@ class VectorEnv(_Base):  # type: ignore[misc]
             if len(rows):
                 flights.measure(rows - np.uint32(block.start))
 
+    def _ranges(self) -> NDArray[np.float32]:
+        """(n, beams): a view if all are in one map."""
+        images = [flights.ranges for flights in self._flights]
+        return images[0] if len(images) == 1 else np.concatenate(images)
+
     def _observation(self) -> Observation:
         seen: Observation = {}
         if self.lidar is not None:
-            images = [flights.ranges for flights in self._flights]
-            whole = images[0] if len(images) == 1 else np.concatenate(images)
-            whole = whole.reshape(self.num_envs, self.lidar.rows, self.lidar.columns)
-            seen["range"] = whole.copy() if self.copy and len(images) == 1 else whole
+            whole = self._ranges().reshape(self.num_envs, self.lidar.rows, self.lidar.columns)
+            if self.lidar.noise > 0.0 or self.lidar.dropout > 0.0:
+                seen["range"] = self._measured(whole, self.lidar)
+            else:
+                seen["range"] = whole.copy() if self.copy and len(self.maps) == 1 else whole
         seen["state"] = self.task.state(self).astype(np.float32)
         return seen
+
+    def _measured(self, ranges: NDArray[np.float32], lidar: Lidar) -> NDArray[np.float32]:
+        """With noise and dropout: draws are addressed by seed, episode, step and beam."""
+        beams = lidar.rows * lidar.columns
+        steps = self._steps.astype(np.uint64) + (self._episodes << np.uint64(32)) + np.uint64(1 << 31)
+        u = draws(self.seeds, steps, 5 * beams).reshape(self.num_envs, lidar.rows, lidar.columns, 5)
+        # the sum of four uniform numbers less 2: variance 1 / 3
+        bell = (u[..., 0] + u[..., 1] + u[..., 2] + u[..., 3] - 2.0) * math.sqrt(3.0)
+        noisy = ranges + (lidar.noise / lidar.range_max * bell).astype(np.float32)
+        lost = (ranges >= 1.0) | (u[..., 4] < lidar.dropout)
+        return np.where(lost, np.float32(1.0), np.clip(noisy, np.float32(0.0), np.float32(1.0)))
 
     def __repr__(self) -> str:
         return f"<VectorEnv of {self.num_envs}: {type(self.task).__name__} in {', '.join(map_name(m) for m in self.maps)}>"
@@ -337,6 +390,8 @@ def _beams(lidar: Optional[Lidar]) -> Tuple[NDArray[np.float32], NDArray[np.floa
         return np.zeros((0, 3), np.float32), np.zeros(0, np.float32)
     if lidar.rows < 1 or lidar.columns < 1:
         raise ValueError(f"lidar: 1 row and column or more, not {lidar.rows} x {lidar.columns}")
+    if not (lidar.noise >= 0.0 and 0.0 <= lidar.dropout <= 1.0):
+        raise ValueError(f"lidar: noise 0 or above and dropout 0 to 1, not {lidar.noise} and {lidar.dropout}")
     directions = _pointflight._grid(lidar.rows, lidar.columns, *lidar.elevation, *lidar.azimuth)
     if not lidar.rolling:
         return directions.reshape(-1, 3).astype(np.float32), np.zeros(0, np.float32)
