@@ -49,8 +49,11 @@ Flights::Flights(std::shared_ptr<const SurfelMap> map,
                            "Flights: an action takes a whole number of control periods")),
       watch_(count),
       poses_(count) {
-  require_argument(options.look_every > 0.0, "Flights: look_every above 0");
-  const double way = vehicle.controller.speed_max * options.action_period;
+  require_argument(options.look_every > 0.0 && options.speed_max >= 0.0,
+                   "Flights: look_every above 0, speed_max not below");
+  const double most = vehicle.controller.speed_max;
+  const double speed = options.speed_max > 0.0 ? std::min(options.speed_max, most) : most;
+  const double way = speed * options.action_period;
   looks_ = std::clamp(static_cast<int>(std::ceil(way / options.look_every)), 1, periods_);
   for (std::size_t i = 0; i < count; ++i) place(i, Vector3d::Zero(), 0.0);
 }

@@ -19,8 +19,10 @@ struct FlightsOptions {
   FlightLevel level = FlightLevel::kVelocity;  ///< What actions are.
   double action_period = 0.1;                  ///< s; whole control periods.
   FlightTiming timing;                         ///< Of control and physics.
-  /// Collisions are looked for each time that a vehicle at `speed_max` has flown so far, m.
+  /// Collisions are looked for each time that a vehicle at its greatest speed has flown so far, m.
   double look_every = 0.05;
+  /// That actions ask for, m/s; 0: the controller's greatest.
+  double speed_max = 0.0;
 };
 
 /// Many vehicles, each alone in a map of its own or in one that they share: stepped together by

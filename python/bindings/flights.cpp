@@ -170,6 +170,7 @@ std::shared_ptr<FlightsObject> make_flights(const MapObject& map,
                                             double action_period,
                                             double physics_step,
                                             int steps_per_control,
+                                            double speed_max,
                                             const Array<float>& directions,
                                             const Array<float>& shares,
                                             float range_max) {
@@ -185,6 +186,7 @@ std::shared_ptr<FlightsObject> make_flights(const MapObject& map,
   options.action_period = action_period;
   options.timing.physics_step = physics_step;
   options.timing.steps_per_control = steps_per_control;
+  options.speed_max = speed_max;
   return std::make_shared<FlightsObject>(
       map,
       vehicle,
@@ -206,6 +208,7 @@ void add_flights(py::module_& module) {
            py::arg("action_period"),
            py::arg("physics_step"),
            py::arg("steps_per_control"),
+           py::arg("speed_max"),
            py::arg("directions"),
            py::arg("shares"),
            py::arg("range_max"))

@@ -1,6 +1,7 @@
 #include <pybind11/pybind11.h>
 
 #include "pointflight/core/input_error.hpp"
+#include "pointflight/core/resources.hpp"
 #include "pointflight/core/version.hpp"
 #include "python/bindings/map_object.hpp"
 #include "python/bindings/run_objects.hpp"
@@ -24,6 +25,7 @@ void add_all(py::module_& module) {
              "not depend on it.");
   module.def(
       "threads", [] { return executor()->threads(); }, "How many threads work runs on.");
+  module.def("_add_data_folder", &add_data_folder, py::arg("folder"));
   add_map(module);
   add_rays(module);
   add_lidar(module);

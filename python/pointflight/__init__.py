@@ -5,6 +5,9 @@ up. A pose is a matrix (4, 4) that maps points of the sensor to the world (`pose
 is an `InputError`, one line; arrays of a wrong shape are a `ValueError` that names them.
 """
 
+import os as _os
+
+from . import _pointflight
 from ._pointflight import (
     Acceleration,
     Arm,
@@ -45,6 +48,10 @@ from .rays import Hits, ranges, raycast
 from .runs import DataSet, Flight, Run, RunScan, Scans, columns, poses_of, read_pcd, read_table
 from .settings import Scenario, Vehicle
 from .simulation import Command, CommandRejected, Recording, Sample, Simulation
+
+_data = _os.path.join(_os.path.dirname(_os.path.abspath(__file__)), "data")
+if _os.path.isdir(_data):  # a wheel has it
+    _pointflight._add_data_folder(_data)
 
 __all__ = [
     "Acceleration",

@@ -126,7 +126,7 @@ class VectorEnv(_Base):  # type: ignore[misc]
         self._flights = [
             _pointflight._Flights(
                 place._handle, self.vehicle._handle, block.stop - block.start, action, action_period, physics_step,
-                steps_per_control, directions, shares, 1.0 if lidar is None else lidar.range_max,
+                steps_per_control, math.sqrt(3) * speed if action == "velocity" else 0.0, directions, shares, 1.0 if lidar is None else lidar.range_max,
             )
             for place, block in zip(self.maps, self._blocks)
         ]  # fmt: skip
