@@ -50,10 +50,11 @@ def main() -> None:
                 actions = random.normal(0.0, 0.5, (repeats, COUNT, 4))
                 steps.append(cpu(lambda: [env.step(a) for a in actions]) / repeats)
                 if lidar is not None:
-                    rays.append(cpu(lambda: [env._flights[0].measure(everyone) for _ in range(repeats)]) / repeats)
+                    rays.append(cpu(lambda: [env._measure(everyone) for _ in range(repeats)]) / repeats)
             step, ray = min(steps), min(rays, default=0.0)
             ratio = step / (1.05 * ray + 6.0)
-            print(f"| {os.path.basename(path)} | {name} | {step:.1f} | {ray:.1f} | {ratio:.2f} | {1e6 / step:,.0f} |", flush=True)
+            row = (os.path.basename(path), name, f"{step:.1f}", f"{ray:.1f}", f"{ratio:.2f}", f"{1e6 / step:,.0f}")
+            print("| " + " | ".join(row) + " |", flush=True)
 
 
 if __name__ == "__main__":

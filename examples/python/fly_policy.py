@@ -11,6 +11,8 @@ import numpy as np
 import pointflight as pf
 from pointflight.gym import Goal, Lidar, Observer, Policy, VectorEnv, wilson
 
+if len(sys.argv) < 3:
+    sys.exit(__doc__)
 place, policy = pf.Map.open(sys.argv[1]), Policy.load(sys.argv[2])
 flights = int(sys.argv[3]) if len(sys.argv) > 3 else 20
 lidar = Lidar(policy.about["rows"], policy.about["columns"], elevation=(-math.radians(15), math.radians(15)))

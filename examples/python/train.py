@@ -14,6 +14,8 @@ from torch import nn
 import pointflight as pf
 from pointflight.gym import Lidar, Policy, VectorEnv, evaluate, features, straight
 
+if len(sys.argv) < 3:
+    sys.exit(__doc__)
 place, output = pf.Map.open(sys.argv[1]), sys.argv[2]
 budget, seed = (float(sys.argv[3]) if len(sys.argv) > 3 else 400.0), int(sys.argv[4]) if len(sys.argv) > 4 else 0
 lidar = Lidar(3, 60, elevation=(-math.radians(15), math.radians(15)))
@@ -79,7 +81,8 @@ while spent < budget:
     spent = time.process_time() - began - evaluating
     if spent >= next_look or spent >= budget:
         looked = time.process_time()
-        score = evaluate(VectorEnv(place, 100, lidar=lidar, autoreset="disabled"), policy(), range(20_000_000, 20_000_100))
+        test = VectorEnv(place, 100, lidar=lidar, autoreset="disabled")
+        score = evaluate(test, policy(), range(20_000_000, 20_000_100))
         print(f"{spent:.0f} s: {score.arrived} of 100 arrive, {score.collided} collide", flush=True)
         policy(f"{spent:.0f} CPU s, seed {seed}").save(output)
         evaluating += time.process_time() - looked

@@ -69,7 +69,7 @@ void Flights::place(std::size_t i, const Vector3d& p_world, double yaw) {
 }
 
 void Flights::set_wind(std::size_t i, const Vector3d& wind_world) {
-  batch_.set_air(i, wind_world, -1e6);
+  batch_.set_air(i, wind_world, FlightBatch::kFarBelow);
 }
 
 void Flights::ask(std::size_t i, std::span<const double> action) {

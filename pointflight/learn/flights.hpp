@@ -107,7 +107,6 @@ class Flights {
 
   std::shared_ptr<const SurfelMap> map_;
   std::unique_ptr<const Renderer> renderer_;
-  std::shared_ptr<const Renderer> ground_;
   FlightBatch batch_;
   FlightsOptions options_;
   RangePattern pattern_;

@@ -11,7 +11,6 @@
 namespace pointflight {
 namespace {
 
-constexpr double kFarBelow = -1e6;  // m: ground that nothing is felt of
 constexpr std::align_val_t kAlignment{64};
 
 }  // namespace

@@ -34,6 +34,8 @@ class FlightBatch {
  public:
   /// Vehicles [k * kGroup, (k + 1) * kGroup) are flown together.
   static constexpr std::size_t kGroup = 8;
+  /// A height of the ground that nothing is felt of, m.
+  static constexpr double kFarBelow = -1e6;
 
   /// `count` vehicles that hover at the origin. Throws InputError as `Multirotor` does.
   FlightBatch(const VehicleSettings& settings, std::size_t count, const FlightTiming& timing);
@@ -51,7 +53,7 @@ class FlightBatch {
   [[nodiscard]] double control_period() const;
 
   /// A vehicle begins anew in calm air far above the ground, with a state of the body, rotors at
-  /// hover speed. About 0.1 us.
+  /// hover speed.
   void place(std::size_t vehicle, const RigidBodyState& body);
   /// The air of a vehicle from now on.
   void set_air(std::size_t vehicle, const Vector3d& wind_world, double ground_z);

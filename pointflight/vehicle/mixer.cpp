@@ -15,6 +15,9 @@
 #include "pointflight/vehicle/internal/scalar_numbers-inl.hpp"
 
 namespace pointflight {
+
+namespace hw = HWY_NAMESPACE;
+
 namespace {
 
 // What gives way to what, if not all can be had: squared, these weigh shares of the weight, and
@@ -60,20 +63,18 @@ Mixer::Mixer(const VehicleSettings& settings)
 
 /// Along a rotor's axis, m/s.
 double Mixer::climb_of(std::size_t rotor, const AirMotion& motion) const {
-  return HWY_NAMESPACE::climb_of(settings_.rotors[rotor],
-                                 HWY_NAMESPACE::numbers_of(motion.v_body),
-                                 HWY_NAMESPACE::numbers_of(motion.omega_body));
+  return hw::climb_of(
+      settings_.rotors[rotor], hw::numbers_of(motion.v_body), hw::numbers_of(motion.omega_body));
 }
 
 std::vector<double> Mixer::speeds(const Wrench& wrench, const AirMotion& motion) const {
-  HWY_NAMESPACE::PerRotor<double> speeds;
-  HWY_NAMESPACE::speeds_for(
-      settings_,
-      model_,
-      HWY_NAMESPACE::WrenchNumbers<double>{wrench.thrust, HWY_NAMESPACE::numbers_of(wrench.torque)},
-      HWY_NAMESPACE::numbers_of(motion.v_body),
-      HWY_NAMESPACE::numbers_of(motion.omega_body),
-      speeds);
+  hw::PerRotor<double> speeds;
+  hw::speeds_for(settings_,
+                 model_,
+                 hw::WrenchNumbers<double>{wrench.thrust, hw::numbers_of(wrench.torque)},
+                 hw::numbers_of(motion.v_body),
+                 hw::numbers_of(motion.omega_body),
+                 speeds);
   return {speeds.begin(), speeds.begin() + static_cast<std::ptrdiff_t>(settings_.rotors.size())};
 }
 

@@ -57,6 +57,7 @@ void add_settings(py::module_& module) {
       .def_property_readonly("title", [](const VehicleSettings& v) { return v.title; })
       .def_property_readonly("json", [](const VehicleSettings& v) { return json_of(v); })
       .def_property_readonly("mass", [](const VehicleSettings& v) { return v.mass; })
+      .def_property_readonly("weight", [](const VehicleSettings& v) { return v.mass * kGravity; })
       .def_property_readonly("rotor_count",
                              [](const VehicleSettings& v) { return v.rotors.size(); })
       .def_property_readonly("hover_speed",

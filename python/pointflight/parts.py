@@ -23,7 +23,7 @@ class Controller:
     def update(
         self, state: BodyState, setpoint: Any, dt: float, memory: Optional[_pointflight.ControllerMemory] = None
     ) -> Tuple[NDArray[Any], _pointflight.ControllerMemory]:
-        """Rotor speeds (n,) in rad/s for a period of dt seconds, and what it remembers, to be given back the next time."""
+        """Rotor speeds (n,) in rad/s for a period of dt seconds, and what it remembers, to be given back next."""
         return self._handle.update(state, setpoint, dt, memory)
 
 
@@ -33,8 +33,9 @@ def add_controller(
     """A controller for `controller: NAME` of vehicles.
 
     make: is called once for each vehicle, with it, and gives a function of (state, setpoint, dt, memory) that gives
-    rotor speeds (n,) in rad/s for the next dt seconds, and its memory, None at first. The setpoint is one of RotorSpeeds, BodyRates, Attitude,
-    Acceleration, Velocity, Position. Memory must not change once it was given: saved states of the run hold it.
+    rotor speeds (n,) in rad/s for the next dt seconds, and its memory, None at first. The setpoint is one of
+    RotorSpeeds, BodyRates, Attitude, Acceleration, Velocity, Position. Memory must not change once it was given: saved
+    states of the run hold it.
 
     An exception ends the step and comes out of it as it is.
     """

@@ -38,6 +38,16 @@ def pose(
     )
 
 
+def rotations(quaternions: ArrayLike) -> NDArray[np.float64]:
+    """(n, 3, 3) of unit quaternions (n, 4): x, y, z, w."""
+    x, y, z, w = numbers(quaternions).T
+    turned = np.empty((len(x), 3, 3))
+    turned[:, 0] = np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)], 1)
+    turned[:, 1] = np.stack([2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)], 1)
+    turned[:, 2] = np.stack([2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)], 1)
+    return turned
+
+
 def grid(
     rows: int,
     columns: int,

@@ -14,14 +14,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _pointflight
 from .lidar import Scan
+from .poses import rotations
 from .settings import Path, Scenario
 
 Table = NDArray[Any]
 
 
 def read_table(path: Path) -> Table:
-    """A table with a line of names as a structured array (n,): float64, empty cells NaN, or text if a cell of the column
-    is no number. `pandas.DataFrame(table)` takes it. Raises InputError with file and line."""
+    """A table with a line of names as a structured array (n,): float64, empty cells NaN, or text if a cell of the
+    column is no number. `pandas.DataFrame(table)` takes it. Raises InputError with file and line."""
     name = os.fspath(path)
     try:
         with open(name, newline="", encoding="utf-8") as file:
@@ -77,11 +78,8 @@ def read_pcd(path: Path) -> Scan:
 
 def poses_of(table: Table) -> NDArray[np.float64]:
     """(n, 4, 4) of a table's columns px, py, pz, qw, qx, qy, qz."""
-    w, x, y, z = (table[name] for name in ("qw", "qx", "qy", "qz"))
     poses = np.zeros((len(table), 4, 4))
-    poses[:, 0, :3] = np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)], 1)
-    poses[:, 1, :3] = np.stack([2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)], 1)
-    poses[:, 2, :3] = np.stack([2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)], 1)
+    poses[:, :3, :3] = rotations(columns(table, "qx", "qy", "qz", "qw"))
     poses[:, :3, 3] = columns(table, "px", "py", "pz")
     poses[:, 3, 3] = 1
     return poses
@@ -126,7 +124,8 @@ class Scans(Sequence[RunScan]):
         points = read_pcd(os.path.join(self._folder, str(row["file"])))
         points.beams = int(row["beams"])
         return RunScan(
-            points, int(row["lidar"]), int(row["scan"]), float(row["start"]), float(row["end"]), self._poses[i], points.beams
+            points, int(row["lidar"]), int(row["scan"]), float(row["start"]), float(row["end"]), self._poses[i],
+            points.beams,
         )  # fmt: skip
 
 

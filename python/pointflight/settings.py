@@ -137,6 +137,11 @@ class Vehicle:
         return self._handle.mass
 
     @property
+    def weight(self) -> float:
+        """N, by the gravity that the dynamics use."""
+        return self._handle.weight
+
+    @property
     def rotors(self) -> int:
         """How many it has."""
         return self._handle.rotor_count

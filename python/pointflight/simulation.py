@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 from types import TracebackType
-from typing import Any, Dict, Iterator, List, Mapping, Optional, Sequence, Tuple, Type, Union
+from typing import Any, Dict, Iterator, List, Mapping, Optional, Sequence, Tuple, Type, Union, get_args
 
 from . import _pointflight
 from ._pointflight import (
@@ -63,23 +63,8 @@ Command = Union[
     Disarm,
 ]
 
-# in the order of the compiled part's variant
-_BIT = {
-    kind: 1 << i
-    for i, kind in enumerate(
-        (
-            StateSample,
-            OdometrySample,
-            ImuSample,
-            Measurement,
-            ScanSample,
-            CollisionEvent,
-            VehicleEvent,
-            ObstacleSample,
-            StatusSample,
-        )
-    )
-}
+# numbered as the compiled part's variant is
+_BIT = {kind: 1 << i for i, kind in enumerate(get_args(Sample))}
 _ALL = (1 << len(_BIT)) - 1
 
 

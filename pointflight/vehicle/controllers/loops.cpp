@@ -23,8 +23,7 @@ constexpr double kSpinningDamping = 0.2;
 constexpr double kDampingLead = -0.45;
 
 Vector3d limited(const Vector3d& v, double length) {
-  const double norm = v.norm();
-  return norm > length ? Vector3d(v * (length / norm)) : v;
+  return hw::vector_of(hw::limited(hw::numbers_of(v), length));
 }
 
 bool differ(const Vector3d& a, const Vector3d& b) {
@@ -114,9 +113,7 @@ std::vector<double> LoopController::update(const RigidBodyState& state,
   if (memory.level != setpoint.index()) {
     // no jump when the level changes in flight: the velocity loop starts from zero acceleration,
     // the position loop from the disturbance that it knew
-    memory.velocity_integral = by_axis(settings_.controller, &LoopDesign::damping)
-                                   .cwiseProduct(velocity_frequency(settings_.controller))
-                                   .cwiseProduct(2.0 * state.v_world);
+    memory.velocity_integral = gains_.velocity_damping.cwiseProduct(2.0 * state.v_world);
     memory.expected.reset();
     memory.level = setpoint.index();
   }

@@ -27,8 +27,7 @@ enum FlightRow : std::size_t {
   kRotorRows = 26,  ///< Then speeds, accelerations and commands of the rotors.
 };
 
-/// One batch: rows of `stride` columns, of which [begin, end) fly on; both are multiples of
-/// `kFlightLanes`.
+/// The rows of one batch, `stride` columns each.
 struct FlightTable {
   double* rows = nullptr;
   std::size_t stride = 0;
@@ -49,7 +48,8 @@ struct FlightPlan {
   double control_dt = 0.0;  ///< s
 };
 
-/// `periods` control periods of the vehicles in columns [begin, end).
+/// `periods` control periods of the vehicles in columns [begin, end), both multiples of
+/// `kFlightLanes`.
 void fly_on(const FlightPlan& plan,
             const FlightTable& table,
             FlightLevel level,

@@ -16,7 +16,7 @@ from .vector import Lidar, Observation
 
 
 class Observer:
-    """Observations of the task `Goal` for one vehicle, of states and points from anywhere: a `Simulation`, ROS, a run."""
+    """Observations of the task `Goal` for one vehicle, of states and points from a `Simulation`, ROS, a run."""
 
     def __init__(self, goal: ArrayLike, lidar: Lidar, task: Optional[Goal] = None) -> None:
         """goal: (3,), m, world. lidar and task: those of the environment that the policy has learned in."""

@@ -54,7 +54,9 @@ class StableBaselinesEnv(_Base):  # type: ignore[misc]
             each[i]["TimeLimit.truncated"] = bool(truncated[i] and not terminated[i])
         return seen, reward.astype(np.float32), dones, each
 
-    def step(self, actions: NDArray[Any]) -> Tuple[Observation, NDArray[np.float32], NDArray[np.bool_], List[Dict[str, Any]]]:
+    def step(
+        self, actions: NDArray[Any]
+    ) -> Tuple[Observation, NDArray[np.float32], NDArray[np.bool_], List[Dict[str, Any]]]:
         """Both."""
         self.step_async(actions)
         return self.step_wait()

@@ -1,4 +1,7 @@
-"""What is to be learned: `Goal`, `Race`, `Explore`, `Hover`. Derive `Task` for one's own; all arrays have a row for each environment."""
+"""What is to be learned: `Goal`, `Race`, `Explore`, `Hover`. Derive `Task` for one's own.
+
+All arrays have a row for each environment.
+"""
 
 from __future__ import annotations
 
@@ -111,7 +114,7 @@ class Goal(Task):
         time_limit: float = 20.0,
     ) -> None:
         """distance: from start to goal, horizontal, m. height: of both above ground, m. clearance: of both, m. radius:
-        the goal is reached within it, m. wind: each episode has a steady one, up to so much along world x and y, m/s."""
+        the goal is reached within it, m. wind: each episode has a steady one, up to so much along x and y, m/s."""
         self.distance, self.height, self.clearance, self.radius = distance, height, clearance, radius
         self.wind, self.time_limit = wind, time_limit
 
@@ -123,10 +126,9 @@ class Goal(Task):
 
     def reset(self, env: "VectorEnv", which: NDArray[np.uint32]) -> None:
         u = env.draws(which, 3 + self._tries)
-        start = np.empty((len(which), 3))
-        for rows, places in env.places(which, self.height, self.clearance):
+        for _, places in env.places(which, self.height, self.clearance):
             self._check(places)
-            start[rows] = places[(u[rows, 0] * len(places)).astype(np.int64)]
+        start = env.positions(which, u[:, 0], self.height, self.clearance)
         goal = self._goals(env, which, start, u[:, 3:])
         env.place(which, start, goal)
         if self.wind > 0.0:
@@ -157,7 +159,8 @@ class Goal(Task):
         d = np.sqrt(some[:, :, 0] * some[:, :, 0] + some[:, :, 1] * some[:, :, 1])
         if not ((d >= self.distance[0]) & (d <= self.distance[1])).any():
             raise ValueError(
-                f"distance: no two free positions are {self.distance[0]} to {self.distance[1]} m apart, {d.max():.1f} m at most"
+                f"distance: no two free positions are {self.distance[0]} to {self.distance[1]} m apart, "
+                f"{d.max():.1f} m at most"
             )
         self._checked.add(id(places))
 
@@ -270,9 +273,7 @@ class Explore(Task):
 
     def reset(self, env: "VectorEnv", which: NDArray[np.uint32]) -> None:
         u = env.draws(which, 4)
-        start = np.empty((len(which), 3))
-        for rows, places in env.places(which, self.height, self.clearance):
-            start[rows] = places[(u[rows, 0] * len(places)).astype(np.int64)]
+        start = env.positions(which, u[:, 0], self.height, self.clearance)
         env.place(which, start, start + 2.0 * u[:, 1:4] - 1.0)
         self.cells[which] = 0
         for i in which:
@@ -323,9 +324,7 @@ class Hover(Task):
 
     def reset(self, env: "VectorEnv", which: NDArray[np.uint32]) -> None:
         u = env.draws(which, 6)
-        target = np.empty((len(which), 3))
-        for rows, places in env.places(which, self.height, self.clearance):
-            target[rows] = places[(u[rows, 0] * len(places)).astype(np.int64)]
+        target = env.positions(which, u[:, 0], self.height, self.clearance)
         start = target + self.displacement * (2.0 * u[:, 1:4] - 1.0)
         facing = start + 2.0 * u[:, 3:6] - 1.0
         env.place(which, start, facing)

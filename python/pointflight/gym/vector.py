@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .. import _pointflight
 from ..map import Map
+from ..poses import rotations
 from ..settings import Path, Vehicle
 from .draws import draws
 from .spaces import Box, batched
@@ -43,9 +44,9 @@ class Lidar(NamedTuple):
     """Which ranges policies see: an image, row 0 the highest, column 0 the farthest to the left."""
 
     rows: int = 16
-    """"""
+    """From the highest elevation to the lowest."""
     columns: int = 64
-    """"""
+    """From the left end of the azimuth to the right."""
     elevation: Tuple[float, float] = (-math.radians(15), math.radians(15))
     """Ends of the field of view, rad."""
     azimuth: Tuple[float, float] = (-math.pi, math.pi)
@@ -67,10 +68,10 @@ class VectorEnv(_Base):  # type: ignore[misc]
     """Vehicles, each alone in a map of a real place, that learn a task: gymnasium's vector interface.
 
     Observations: "range" (n, rows, columns), ranges / range_max, 1 where nothing is hit (without a LiDAR it is
-    missing), and "state" (n, k), as the task says. Actions (n, a) from -1 to 1: velocity (ahead, left, up in the heading's
-    frame, times `speed`) and yaw rate (times `yaw_rate`); the same of acceleration (times `acceleration`); body rates (times
-    the vehicle's greatest) and thrust (-1: none, 0: its weight, 1: twice that); or a speed of each rotor (-1: the least, 0: hover, 1:
-    the greatest).
+    missing), and "state" (n, k), as the task says. Actions (n, a) from -1 to 1: velocity (ahead, left, up in the
+    heading's frame, times `speed`) and yaw rate (times `yaw_rate`); the same of acceleration (times `acceleration`); body
+    rates (times the vehicle's greatest) and thrust (-1: none, 0: its weight, 1: twice that); or a speed of each rotor
+    (-1: the least, 0: hover, 1: the greatest).
 
     What an environment does follows from its own seed and its actions: not from how many there are, nor from threads
     or the processor. All vehicles fly by the geometric controller.
@@ -95,8 +96,8 @@ class VectorEnv(_Base):  # type: ignore[misc]
         copy: bool = True,
         render_mode: Optional[str] = None,
     ) -> None:
-        """map: one, or several: environments are dealt out to them in blocks. task: "goal", "race", "explore", "hover", or one
-        of one's own. action_period: s between actions; physics_step, s, of which `steps_per_control` are flown with the
+        """map: one, or several: environments are dealt out to them in blocks. task: "goal", "race", "explore", "hover",
+        or one of one's own. action_period: s between actions; physics_step, s, of which `steps_per_control` are flown with the
         same rotor commands (docs/python.md: what coarser ones cost). autoreset: "next_step", "same_step" or
         "disabled". copy: False: observations are read-only views that the next step changes.
         """
@@ -118,15 +119,15 @@ class VectorEnv(_Base):  # type: ignore[misc]
         self.maps = [one if isinstance(one, Map) else Map.open(one) for one in maps]
         if not 1 <= len(self.maps) <= num_envs:
             raise ValueError(f"map: {len(self.maps)} maps for {num_envs} environments")
-        self._ends = [num_envs * (k + 1) // len(self.maps) for k in range(len(self.maps))]
         directions, shares = _beams(lidar)
         self._directions = directions.astype(np.float64)
-        begins = [0, *self._ends[:-1]]
-        self._blocks = [slice(begin, end) for begin, end in zip(begins, self._ends)]
+        bounds = [num_envs * k // len(self.maps) for k in range(len(self.maps) + 1)]
+        self._blocks = [slice(begin, end) for begin, end in zip(bounds[:-1], bounds[1:])]
+        greatest = math.sqrt(3.0) * speed if action == "velocity" else 0.0  # along all three axes at once
         self._flights = [
             _pointflight._Flights(
                 place._handle, self.vehicle._handle, block.stop - block.start, action, action_period, physics_step,
-                steps_per_control, math.sqrt(3) * speed if action == "velocity" else 0.0, directions, shares, 1.0 if lidar is None else lidar.range_max,
+                steps_per_control, greatest, directions, shares, 1.0 if lidar is None else lidar.range_max,
             )
             for place, block in zip(self.maps, self._blocks)
         ]  # fmt: skip
@@ -156,7 +157,7 @@ class VectorEnv(_Base):  # type: ignore[misc]
         self.observation_space = batched(self.single_observation_space, num_envs)
 
     def _scale_actions(self, speed: float, yaw_rate: float, acceleration: float) -> None:
-        weight = self.vehicle.mass * 9.81
+        weight = self.vehicle.weight
         rates = self.vehicle.values["controller"]["body_rate_max"]
         size = {"velocity": speed, "acceleration": acceleration}.get(self.action, 1.0)
         self._zero, self._up = np.zeros(4), np.array([size, size, size, yaw_rate])
@@ -188,21 +189,27 @@ class VectorEnv(_Base):  # type: ignore[misc]
                 positions = flights.free_positions(place.bounds, clearance, *height, 4096, 1)
                 if len(positions) < 2:
                     raise ValueError(
-                        f"{place!r}: no positions that are free by {clearance} m, {height[0]} to {height[1]} m above ground"
+                        f"{place!r}: no positions that are free by {clearance} m, "
+                        f"{height[0]} to {height[1]} m above ground"
                     )
                 found.append(positions)
             self._places[key] = found
-        for block, positions in zip(self._blocks, self._places[key]):
-            rows = np.flatnonzero((which >= block.start) & (which < block.stop))
-            if len(rows):
-                yield rows, positions
+        for k, rows, _ in self._parts(which):
+            yield rows, self._places[key][k]
+
+    def positions(
+        self, which: NDArray[np.uint32], u: Floats, height: Tuple[float, float], clearance: float
+    ) -> Floats:
+        """(m, 3): of `places`, those that draws u (m,) choose."""
+        chosen = np.empty((len(which), 3))
+        for rows, places in self.places(which, height, clearance):
+            chosen[rows] = places[(u[rows] * len(places)).astype(np.int64)]
+        return chosen
 
     def place(self, which: NDArray[np.uint32], positions: Floats, facing: Floats) -> None:
         """Vehicles begin anew, hovering at positions (m, 3) and heading for others (m, 3), world, m."""
-        for block, flights in zip(self._blocks, self._flights):
-            rows = (which >= block.start) & (which < block.stop)
-            if rows.any():
-                flights.place(which[rows] - np.uint32(block.start), positions[rows], facing[rows])
+        for k, rows, own in self._parts(which):
+            self._flights[k].place(own, positions[rows], facing[rows])
 
     def points(self) -> Tuple[Floats, NDArray[np.bool_]]:
         """Where the beams of the last action's observation hit, (n, beams, 3), m, world, and which did, (n, beams).
@@ -211,25 +218,19 @@ class VectorEnv(_Base):  # type: ignore[misc]
             raise ValueError("points: there is no LiDAR")
         s = self.states
         ranges = self._ranges().astype(np.float64)
-        x, y, z, w = (s.orientation[:, k, None] for k in range(4))
-        dx, dy, dz = (self._directions[None, :, k] for k in range(3))
+        dx, dy, dz = self._directions.T
         ahead = ranges * self.lidar.range_max
+        turned = rotations(s.orientation)[..., None]
         world = np.empty((*ranges.shape, 3))
-        rows = (
-            (1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)),
-            (2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)),
-            (2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)),
-        )
-        for k, (a, b, c) in enumerate(rows):
-            world[..., k] = s.position[:, k, None] + ahead * (a * dx + b * dy + c * dz)
+        for k in range(3):
+            along = turned[:, k, 0] * dx + turned[:, k, 1] * dy + turned[:, k, 2] * dz
+            world[..., k] = s.position[:, k, None] + ahead * along
         return world, ranges < 1.0
 
     def set_wind(self, which: NDArray[np.uint32], winds: Floats) -> None:
         """The steady wind (m, 3) that these vehicles fly in until they are placed again, m/s, world."""
-        for block, flights in zip(self._blocks, self._flights):
-            rows = (which >= block.start) & (which < block.stop)
-            if rows.any():
-                flights.set_wind(which[rows] - np.uint32(block.start), winds[rows])
+        for k, rows, own in self._parts(which):
+            self._flights[k].set_wind(own, winds[rows])
 
     @property
     def states(self) -> States:
@@ -331,22 +332,29 @@ class VectorEnv(_Base):  # type: ignore[misc]
 
     # ---- within ----
 
+    def _parts(
+        self, which: NDArray[np.uint32]
+    ) -> Iterator[Tuple[int, NDArray[np.int64], NDArray[np.uint32]]]:
+        """For each map that some of these environments are in: its number, rows of `which`, and their numbers there."""
+        for k, block in enumerate(self._blocks):
+            rows = np.flatnonzero((which >= block.start) & (which < block.stop))
+            if len(rows):
+                yield k, rows, which[rows] - np.uint32(block.start)
+
     def _begin(self, which: NDArray[np.uint32]) -> None:
         if len(which) == 0:
             return
         self._steps[which], self._ended[which] = 0, False
         self.elapsed[which] = 0.0
         self.last_actions[which] = 0.0
+        self._episodes[which] += np.uint64(1)  # first: the task's later draws are of this episode too
         self.task.reset(self, which)
-        self._episodes[which] += np.uint64(1)
 
     def _measure(self, which: NDArray[np.uint32]) -> None:
-        if self.lidar is None or len(which) == 0:
+        if self.lidar is None:
             return
-        for block, flights in zip(self._blocks, self._flights):
-            rows = which[(which >= block.start) & (which < block.stop)]
-            if len(rows):
-                flights.measure(rows - np.uint32(block.start))
+        for k, _, own in self._parts(which):
+            self._flights[k].measure(own)
 
     def _ranges(self) -> NDArray[np.float32]:
         """(n, beams): a view if all are in one map."""
@@ -376,7 +384,8 @@ class VectorEnv(_Base):  # type: ignore[misc]
         return np.where(lost, np.float32(1.0), np.clip(noisy, np.float32(0.0), np.float32(1.0)))
 
     def __repr__(self) -> str:
-        return f"<VectorEnv of {self.num_envs}: {type(self.task).__name__} in {', '.join(map_name(m) for m in self.maps)}>"
+        names = ", ".join(map_name(place) for place in self.maps)
+        return f"<VectorEnv of {self.num_envs}: {type(self.task).__name__} in {names}>"
 
 
 def map_name(place: Map) -> str:
