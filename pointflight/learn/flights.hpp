@@ -9,8 +9,11 @@
 
 #include "pointflight/core/parallel.hpp"
 #include "pointflight/learn/range_pattern.hpp"
+#include "pointflight/learn/traffic.hpp"
 #include "pointflight/map/surfel_map.hpp"
 #include "pointflight/vehicle/flight_batch.hpp"
+#include "pointflight/world/obstacles.hpp"
+#include "pointflight/world/wind.hpp"
 
 namespace pointflight {
 
@@ -23,11 +26,26 @@ struct FlightsOptions {
   double look_every = 0.05;
   /// That actions ask for, m/s; 0: the controller's greatest.
   double speed_max = 0.0;
+  /// Vehicles 0 to team - 1 are together in their map, see and hit each other, and so are the next
+  /// ones: 1, 2, 4 or 8.
+  std::size_t team = 1;
+  std::shared_ptr<const Obstacles> obstacles;  ///< Or null.
+  double obstacle_speed = 0.0;                 ///< Of the fastest of them, m/s.
+  WindSettings wind;                           ///< Gusts; the mean is each vehicle's own.
 };
 
-/// Many vehicles, each alone in a map of its own or in one that they share: stepped together by
-/// actions, with collisions and ranges. Results do not depend on threads, on how many there are, or
-/// on the instruction set.
+/// Where and how a vehicle begins anew.
+struct FlightStart {
+  Vector3d p_world = Vector3d::Zero();     ///< m
+  double yaw = 0.0;                        ///< rad
+  SimTime time;                            ///< On the clock of the obstacles.
+  std::uint64_t seed = 0;                  ///< Of its gusts.
+  Vector3d wind_world = Vector3d::Zero();  ///< Mean, m/s.
+  double load_share = 1.0;                 ///< `FlightConditions::load_share`
+};
+
+/// Many vehicles, each alone in a map or in a team: stepped together by actions, with collisions
+/// and ranges. Results do not depend on threads, on how many there are, or on the instruction set.
 class Flights {
  public:
   /// Clearance is known up to here, m.
@@ -37,8 +55,8 @@ class Flights {
 
   /// How a flight stands.
   struct Status {
-    /// Distance of the hull to the map at the end of the last action, m: exact below `kExact`, a
-    /// lower bound beyond, `kReach` at most; minus how deep if it overlaps.
+    /// Distance of the hull to the map, and to what moves, at the end of the last action, m: exact
+    /// below `kExact`, a lower bound beyond, `kReach` at most; minus how deep if it overlaps.
     double clearance = kReach;
     double flown = 0.0;     ///< m since it was placed.
     bool collided = false;  ///< In or before the last action, since it was placed.
@@ -59,10 +77,13 @@ class Flights {
   /// As given, with the geometric controller.
   [[nodiscard]] const VehicleSettings& vehicle() const { return batch_.settings(); }
 
-  /// Vehicle `i` begins anew: at rest, hovering. Well below a microsecond.
-  void place(std::size_t i, const Vector3d& p_world, double yaw);
-  /// The air of a vehicle, until it is placed again.
-  void set_wind(std::size_t i, const Vector3d& wind_world);
+  /// Vehicle `i` begins anew: at rest, hovering, with all its rotors. Below a microsecond.
+  void place(std::size_t i, const FlightStart& start);
+  /// Of its commanded speed that a rotor reaches, 0 to 1, until it is placed again.
+  void set_rotor(std::size_t i, std::size_t rotor, double share);
+  /// How far the hull of a vehicle at a position would be from obstacles at a time, m, `kReach` at
+  /// most.
+  [[nodiscard]] double clearance_of_obstacles(const Vector3d& p_world, SimTime time) const;
 
   /// One action of all vehicles: rows of four, velocity or acceleration ahead, left, up in the
   /// heading's frame and yaw rate, or body rates and thrust; or of a speed for each rotor. SI.
@@ -100,10 +121,25 @@ class Flights {
     double known = 0.0;      ///< Clearance when it was last looked for, m.
     double travelled = 0.0;  ///< Since then, of any point of the hull, m.
     Pose last;               ///< When it was last moved on.
+    SimTime time;            ///< Then, on the clock of the obstacles.
+    double apart = kReach;   ///< From what moves, m.
+  };
+  /// The air around a vehicle.
+  struct Gusts {
+    Vector3d mean = Vector3d::Zero();
+    std::uint64_t seed = 0;
+    GustState state;
+    std::uint64_t looks = 0;
   };
   void ask(std::size_t i, std::span<const double> action);
-  void follow(std::size_t i);
+  void blow(std::size_t i, double seconds);
+  void follow(std::size_t i, Duration passed);
   void look(Watch& watch) const;
+  void look_around(std::size_t i);
+  [[nodiscard]] std::vector<Body> bodies_around(std::uint32_t vehicle) const;
+  void fly_group(std::size_t first,
+                 std::span<const double> actions,
+                 std::span<const std::uint8_t> moves);
 
   std::shared_ptr<const SurfelMap> map_;
   std::unique_ptr<const Renderer> renderer_;
@@ -116,6 +152,8 @@ class Flights {
   int looks_ = 1;    ///< For collisions, in an action.
   std::vector<Watch> watch_;
   std::vector<PosePair> poses_;
+  std::vector<Gusts> gusts_;  ///< Empty in steady winds.
+  std::optional<Traffic> traffic_;
 };
 
 }  // namespace pointflight

@@ -13,13 +13,25 @@ namespace {
 
 constexpr std::size_t kRaysAtOnce = 1 << 16;  // 2 MiB of them; whole vehicles
 
+/// What moves around a vehicle, for as long as its rays are under way.
+struct Around {
+  std::vector<Body> bodies;
+  std::vector<Duration> offsets;
+};
+
 }  // namespace
 
 RangePattern::RangePattern(std::vector<Vector3f> directions,
                            std::vector<float> shares,
-                           float range_max)
-    : directions_(std::move(directions)), shares_(std::move(shares)), range_max_(range_max) {
+                           float range_max,
+                           std::size_t pooled)
+    : directions_(std::move(directions)),
+      shares_(std::move(shares)),
+      range_max_(range_max),
+      pooled_(pooled) {
   require_argument(range_max > 0.0f, "RangePattern: a range above 0");
+  require_argument(pooled >= 1 && directions_.size() % pooled == 0,
+                   "RangePattern: whole groups of directions");
   require_argument(shares_.empty() || shares_.size() == directions_.size(),
                    "RangePattern: a share for each direction");
   for (const Vector3f& direction : directions_) {
@@ -46,20 +58,34 @@ void RangePattern::aim(const PosePair& poses, std::span<Ray> rays) const {
   }
 }
 
+/// Of each direction since the start of the period; empty if all are measured at its end.
+std::vector<Duration> RangePattern::offsets(const PosePair& poses) const {
+  std::vector<Duration> offsets;
+  offsets.reserve(shares_.size());
+  const double period = to_seconds(poses.time - poses.before_time);
+  for (const float share : shares_) {
+    offsets.push_back(from_seconds(static_cast<double>(share) * period));
+  }
+  return offsets;
+}
+
 void RangePattern::measure(const Renderer& renderer,
                            std::span<const PosePair> poses,
                            std::span<const std::uint32_t> vehicles,
                            std::span<float> ranges,
-                           const Executor& executor) const {
-  const std::size_t beams = size();
+                           const Executor& executor,
+                           const BodiesOf& bodies_of) const {
+  const std::size_t beams = directions_.size();
   if (beams == 0) return;
   const std::size_t at_once = std::max<std::size_t>(1, kRaysAtOnce / beams);
   std::vector<Ray> rays(std::min(at_once, vehicles.size()) * beams);
   std::vector<Hit> hits(rays.size());
   std::vector<RenderJob> jobs;
+  std::vector<Around> around;
   for (std::size_t first = 0; first < vehicles.size(); first += at_once) {
     const std::size_t count = std::min(at_once, vehicles.size() - first);
     jobs.assign(count, RenderJob{});
+    around.assign(bodies_of ? count : 0, Around{});
     executor.parallel_for(count, 1, [&](std::size_t i, std::size_t) {
       const std::span own(rays.data() + i * beams, beams);
       const PosePair& pair = poses[vehicles[first + i]];
@@ -69,13 +95,21 @@ void RangePattern::measure(const Renderer& renderer,
       jobs[i].batch.T_world_sensor = pair.now;
       jobs[i].batch.range_max = range_max_;
       jobs[i].hits = std::span(hits.data() + i * beams, beams);
+      if (!bodies_of) return;
+      around[i] = {bodies_of(vehicles[first + i]), offsets(pair)};
+      jobs[i].batch.bodies = around[i].bodies;
+      jobs[i].batch.time_offsets = around[i].offsets;
+      jobs[i].batch.time = shares_.empty() ? pair.time : pair.before_time;
+      jobs[i].batch.snapshot_time = pair.time;
     });
     renderer.render(jobs, executor);
     executor.parallel_for(count, 1, [&](std::size_t i, std::size_t) {
-      float* row = ranges.data() + vehicles[first + i] * beams;
+      const std::span row = ranges.subspan(vehicles[first + i] * size(), size());
+      std::fill(row.begin(), row.end(), 1.0f);
       for (std::size_t k = 0; k < beams; ++k) {
         const Hit& hit = jobs[i].hits[k];
-        row[k] = hit.is_return() ? hit.range / range_max_ : 1.0f;
+        float& least = row[k / pooled_];
+        if (hit.is_return()) least = std::min(least, hit.range / range_max_);
       }
     });
   }

@@ -271,6 +271,19 @@ std::string Scenario::location(const std::string& key) const {
   return line == lines.end() ? path : fmt::format("{}:{}", path, line->second);
 }
 
+ObstacleWorld Scenario::obstacle_world(std::shared_ptr<const SurfelMap> map) const {
+  ObstacleWorld world;
+  world.map = std::move(map);
+  world.seed = static_cast<std::uint64_t>(seed);
+  world.folder = folder();
+  world.location = [this](std::size_t entry, const char* key) {
+    const std::string name = fmt::format("obstacles[{}].{}", entry, key);
+    const std::string item = fmt::format("obstacles[{}]", entry);
+    return location(lines.contains(name) ? name : item) + ": " + name;
+  };
+  return world;
+}
+
 std::shared_ptr<const SurfelMap> Scenario::open_map() const {
   auto opened = at("map", [&] { return SurfelMap::open(resolve_path(map, folder())); });
   if (map_hash.empty() || map_hash == opened->hash()) return opened;

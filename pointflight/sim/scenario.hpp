@@ -163,6 +163,9 @@ struct Scenario {
     return at_key(location(key), key, action);
   }
 
+  /// What its obstacles are made from; the scenario must outlive it. Nothing is kept free.
+  [[nodiscard]] ObstacleWorld obstacle_world(std::shared_ptr<const SurfelMap> map) const;
+
   /// Opens the map. Throws InputError if it is another than `map_hash` says.
   [[nodiscard]] std::shared_ptr<const SurfelMap> open_map() const;
 };

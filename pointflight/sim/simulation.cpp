@@ -54,15 +54,7 @@ Simulation::Simulation(const Scenario& scenario,
   }
   check_names(scenario, fleet);
   check_reach(scenario, fleet);
-  ObstacleWorld world;
-  world.map = setup->map;
-  world.seed = static_cast<std::uint64_t>(scenario.seed);
-  world.folder = scenario.folder();
-  world.location = [&](std::size_t entry, const char* key) {
-    const std::string name = fmt::format("obstacles[{}].{}", entry, key);
-    const std::string item = fmt::format("obstacles[{}]", entry);
-    return scenario.location(scenario.lines.contains(name) ? name : item) + ": " + name;
-  };
+  ObstacleWorld world = scenario.obstacle_world(setup->map);
   double busy = 0.0;
   std::vector<std::shared_ptr<const VehicleAgent>> agents;
   for (std::size_t i = 0; i < fleet.size(); ++i) {

@@ -24,7 +24,7 @@ struct FlightBatch::Table {
                      "FlightBatch: steps above zero");
     check_settings(settings, settings.path.empty() ? "vehicle" : settings.path);
     table.stride = (count + kGroup - 1) / kGroup * kGroup;
-    row_count = kRotorRows + 3 * settings.rotors.size();
+    row_count = kRotorRows + 4 * settings.rotors.size();
     table.rows =
         static_cast<double*>(::operator new(row_count* table.stride * sizeof(double), kAlignment));
     std::fill_n(table.rows, row_count * table.stride, 0.0);
@@ -95,16 +95,27 @@ void FlightBatch::place(std::size_t vehicle, const RigidBodyState& body) {
         t.gains.velocity_damping.cwiseProduct(Vector3d(2.0 * body.v_world)));
   t.table.row(kYaw)[vehicle] = yaw_of(body.q_world_body);
   t.table.row(kGround)[vehicle] = kFarBelow;
+  t.table.row(kLoadShare)[vehicle] = 1.0;
   const std::size_t rotors = t.vehicle.rotors.size();
   for (std::size_t i = 0; i < rotors; ++i) {
     t.table.row(kRotorRows + i)[vehicle] = t.vehicle.hover_speed();
     t.table.row(kRotorRows + 2 * rotors + i)[vehicle] = t.vehicle.hover_speed();
+    t.table.row(kRotorRows + 3 * rotors + i)[vehicle] = 1.0;
   }
 }
 
 void FlightBatch::set_air(std::size_t vehicle, const Vector3d& wind_world, double ground_z) {
   table_->set(kWind, vehicle, wind_world);
   table_->table.row(kGround)[vehicle] = ground_z;
+}
+
+void FlightBatch::set_load(std::size_t vehicle, double share) {
+  table_->table.row(kLoadShare)[vehicle] = share;
+}
+
+void FlightBatch::set_rotor(std::size_t vehicle, std::size_t rotor, double share) {
+  const std::size_t rotors = table_->vehicle.rotors.size();
+  table_->table.row(kRotorRows + 3 * rotors + rotor)[vehicle] = share;
 }
 
 void FlightBatch::ask(std::size_t vehicle, const Vector3d& asked, double turn) {

@@ -52,11 +52,15 @@ class FlightBatch {
   /// s
   [[nodiscard]] double control_period() const;
 
-  /// A vehicle begins anew in calm air far above the ground, with a state of the body, rotors at
-  /// hover speed.
+  /// A vehicle begins anew in calm air far above the ground, as its file has it, with a state of
+  /// the body, rotors at hover speed.
   void place(std::size_t vehicle, const RigidBodyState& body);
   /// The air of a vehicle from now on.
   void set_air(std::size_t vehicle, const Vector3d& wind_world, double ground_z);
+  /// As `FlightConditions::load_share`, from now on.
+  void set_load(std::size_t vehicle, double share);
+  /// Of its commanded speed that a rotor reaches from now on, 0 to 1.
+  void set_rotor(std::size_t vehicle, std::size_t rotor, double share);
   /// What it is told from now on, of levels but rotor speeds; `turn`: yaw rate (rad/s), or thrust
   /// (N) beside body rates.
   void ask(std::size_t vehicle, const Vector3d& asked, double turn);

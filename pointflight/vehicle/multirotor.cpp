@@ -80,7 +80,8 @@ BodyAcceleration Multirotor::acceleration(const VehicleState& state,
       hw::rate_of(settings_, hw::numbers_of(state.body), rotors.speed, hw::numbers_of(conditions));
   const double spin_up = hw::rotor_momentum(settings_, rotors.acceleration);
   const Vector3d torque = hw::vector_of(rate.torque) - Vector3d(0, 0, spin_up);
-  return {hw::vector_of(rate.a), torque.cwiseQuotient(settings_.inertia_diagonal)};
+  const Vector3d inertia = conditions.load_share * settings_.inertia_diagonal;
+  return {hw::vector_of(rate.a), torque.cwiseQuotient(inertia)};
 }
 
 }  // namespace pointflight

@@ -15,6 +15,9 @@ struct FlightConditions {
   /// Height of the ground below the body's origin, world z, m.
   double ground_z = -std::numeric_limits<double>::infinity();
   double speed_share = 1.0;  ///< Of the rotors' greatest speed that the battery allows.
+  /// Of the mass and inertia in its file that it flies with: a payload that its controller does not
+  /// know of.
+  double load_share = 1.0;
   /// Of its commanded speed that each rotor reaches, 0 to 1; empty: all of it.
   std::vector<double> rotor_shares;
 };

@@ -29,7 +29,6 @@ constexpr Named<AtBorder> kBorders[] = {{AtBorder::kReplace, "replace"},
 constexpr double kFar = 1e7;          // m
 constexpr std::size_t kMost = 50000;  // labels have 16 bits in a scan's file
 constexpr Duration kSlice = std::chrono::milliseconds(200);
-constexpr std::size_t kSlicesKept = 8;
 
 /// One shape on one motion.
 class MovingObstacle : public Obstacle {
@@ -154,7 +153,9 @@ void describe(SettingsVisitor& v, ObstacleSettings& s) {
 
 Obstacles::Obstacles(const std::vector<ObstacleSettings>& settings,
                      const ObstacleWorld& world,
-                     const Executor& executor) {
+                     const Executor& executor,
+                     std::size_t slices)
+    : slices_kept_(slices) {
   if (!world.map || !world.location) throw std::invalid_argument("obstacles need a map and places");
   for (std::size_t entry = 0; entry < settings.size(); ++entry) {
     const ObstacleSettings& s = settings[entry];
@@ -226,7 +227,7 @@ std::shared_ptr<const Obstacles::Slice> Obstacles::slice(std::int64_t number) co
   auto made = std::make_shared<const Slice>(Slice{std::move(bodies), BoxTree(std::move(boxes))});
   const std::lock_guard lock(known_->mutex);
   known_->slices[number] = made;  // another thread may have made the same
-  if (known_->slices.size() > kSlicesKept) known_->slices.erase(known_->slices.begin());
+  if (known_->slices.size() > slices_kept_) known_->slices.erase(known_->slices.begin());
   return made;
 }
 

@@ -98,10 +98,12 @@ class Obstacle {
 class Obstacles {
  public:
   Obstacles() = default;
-  /// Reads files, imports clouds, looks for free positions. Throws InputError.
+  /// Reads files, imports clouds, looks for free positions. `near` is quick within the latest
+  /// `slices` of 0.2 s that it was asked about. Throws InputError.
   Obstacles(const std::vector<ObstacleSettings>& settings,
             const ObstacleWorld& world,
-            const Executor& executor);
+            const Executor& executor,
+            std::size_t slices = 8);
 
   /// How many there are at any time; what replaces one counts as the same.
   [[nodiscard]] std::size_t size() const { return obstacles_.size(); }
@@ -130,6 +132,7 @@ class Obstacles {
   [[nodiscard]] std::shared_ptr<const Slice> slice(std::int64_t number) const;
 
   std::vector<std::unique_ptr<Obstacle>> obstacles_;
+  std::size_t slices_kept_ = 8;
   std::unique_ptr<Known> known_ = std::make_unique<Known>();
 };
 

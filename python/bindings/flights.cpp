@@ -1,12 +1,15 @@
 // Many flights at once, for learning.
 #include "pointflight/learn/flights.hpp"
 
+#include <algorithm>
+#include <cmath>
 #include <memory>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "pointflight/core/math.hpp"
+#include "pointflight/sim/scenario.hpp"
 #include "python/bindings/arrays.hpp"
 #include "python/bindings/map_object.hpp"
 #include "python/bindings/run_objects.hpp"
@@ -30,6 +33,9 @@ enum Column : std::size_t {
 
 using Numbers = Array<std::uint32_t>;
 
+constexpr py::ssize_t kStartColumns = 11;  // of what `place` is given
+constexpr std::size_t kSlices = 1000;      // 200 s of the obstacles' clock
+
 /// Flights with the arrays that Python sees.
 class FlightsObject {
  public:
@@ -47,31 +53,54 @@ class FlightsObject {
 
   [[nodiscard]] std::size_t size() const { return flights_.size(); }
 
-  /// At positions (m, 3), heading for others (m, 3).
-  void place(const Numbers& which, const Array<double>& positions, const Array<double>& facing) {
+  /// Starts: rows of position (3), what it heads for (3), mean wind (3), share of the load, time.
+  void place(const Numbers& which, const Array<double>& starts, const Array<std::uint64_t>& seeds) {
     const std::vector<std::uint32_t> numbers = numbers_of(which);
     const auto count = static_cast<py::ssize_t>(numbers.size());
-    require_shape(positions, "positions", {count, 3});
-    require_shape(facing, "facing", {count, 3});
+    require_shape(starts, "starts", {count, kStartColumns});
+    require_shape(seeds, "seeds", {count});
     for (py::ssize_t k = 0; k < count; ++k) {
-      const std::uint32_t i = numbers[static_cast<std::size_t>(k)];
-      const Vector3d at(positions.at(k, 0), positions.at(k, 1), positions.at(k, 2));
-      const double yaw = math::atan2(facing.at(k, 1) - at.y(), facing.at(k, 0) - at.x());
-      if (!at.allFinite() || !std::isfinite(yaw)) {
-        throw py::value_error("positions, facing: finite numbers are wanted");
+      const double* row = starts.data() + k * kStartColumns;
+      if (!std::all_of(row, row + kStartColumns, [](double v) { return std::abs(v) < 1e8; }) ||
+          row[9] <= 0.0) {
+        throw py::value_error("starts: finite numbers are wanted, and loads above 0");
       }
-      flights_.place(i, at, yaw);
+      FlightStart start;
+      start.p_world = {row[0], row[1], row[2]};
+      start.yaw = math::atan2(row[4] - row[1], row[3] - row[0]);
+      start.wind_world = {row[6], row[7], row[8]};
+      start.load_share = row[9];
+      start.time = SimTime{} + from_seconds(row[10]);
+      start.seed = seeds.at(k);
+      const std::uint32_t i = numbers[static_cast<std::size_t>(k)];
+      flights_.place(i, start);
       write(i);
     }
   }
 
-  void set_wind(const Numbers& which, const Array<double>& winds) {
+  /// A share for each of these vehicles.
+  void set_rotor(const Numbers& which, std::size_t rotor, const Array<double>& shares) {
     const std::vector<std::uint32_t> numbers = numbers_of(which);
-    require_shape(winds, "winds", {static_cast<py::ssize_t>(numbers.size()), 3});
+    require_shape(shares, "shares", {static_cast<py::ssize_t>(numbers.size())});
     for (std::size_t k = 0; k < numbers.size(); ++k) {
-      const double* row = winds.data() + 3 * k;
-      flights_.set_wind(numbers[k], {row[0], row[1], row[2]});
+      flights_.set_rotor(numbers[k], rotor, shares.data()[k]);
     }
+  }
+
+  /// (m,) of positions (m, 3) at times (m,).
+  [[nodiscard]] py::array_t<double> clearance_of_obstacles(const Array<double>& positions,
+                                                           const Array<double>& times) const {
+    require_shape(positions, "positions", {-1, 3});
+    require_shape(times, "times", {positions.shape(0)});
+    std::vector<double> found;
+    for (py::ssize_t k = 0; k < positions.shape(0); ++k) {
+      const Vector3d at(positions.at(k, 0), positions.at(k, 1), positions.at(k, 2));
+      if (!at.allFinite() || !(std::abs(times.at(k)) < 1e8)) {
+        throw py::value_error("positions, times: finite numbers are wanted");
+      }
+      found.push_back(flights_.clearance_of_obstacles(at, SimTime{} + from_seconds(times.at(k))));
+    }
+    return array_of(std::move(found), {positions.shape(0)});
   }
 
   void step(const Array<double>& actions, const Array<std::uint8_t>& moves) {
@@ -163,6 +192,13 @@ FlightLevel level_of(const std::string& name) {
   throw py::value_error("action: velocity, acceleration, body_rates or rotor_speeds, not " + name);
 }
 
+std::shared_ptr<const Obstacles> obstacles_of(const Scenario& scenario,
+                                              const std::shared_ptr<const SurfelMap>& map) {
+  if (scenario.obstacles.empty()) return nullptr;
+  return std::make_shared<const Obstacles>(
+      scenario.obstacles, scenario.obstacle_world(map), *executor(), kSlices);
+}
+
 std::shared_ptr<FlightsObject> make_flights(const MapObject& map,
                                             const VehicleSettings& vehicle,
                                             std::size_t count,
@@ -173,7 +209,10 @@ std::shared_ptr<FlightsObject> make_flights(const MapObject& map,
                                             double speed_max,
                                             const Array<float>& directions,
                                             const Array<float>& shares,
-                                            float range_max) {
+                                            float range_max,
+                                            std::size_t pooled,
+                                            const Scenario& scenario,
+                                            std::size_t team) {
   if (count < 1 || count > 1'000'000) throw py::value_error("count: 1 to 1000000");
   require_shape(directions, "directions", {-1, 3});
   require_shape(shares, "shares", {-1});
@@ -187,12 +226,15 @@ std::shared_ptr<FlightsObject> make_flights(const MapObject& map,
   options.timing.physics_step = physics_step;
   options.timing.steps_per_control = steps_per_control;
   options.speed_max = speed_max;
-  return std::make_shared<FlightsObject>(
-      map,
-      vehicle,
-      count,
-      options,
-      RangePattern(std::move(beams), {shares.data(), shares.data() + shares.size()}, range_max));
+  options.team = team;
+  options.wind = scenario.air.wind;
+  options.obstacles = obstacles_of(scenario, map.map);
+  for (const ObstacleSettings& settings : scenario.obstacles) {
+    options.obstacle_speed = std::max({options.obstacle_speed, settings.speed, settings.speed_max});
+  }
+  RangePattern pattern(
+      std::move(beams), {shares.data(), shares.data() + shares.size()}, range_max, pooled);
+  return std::make_shared<FlightsObject>(map, vehicle, count, options, std::move(pattern));
 }
 
 }  // namespace
@@ -211,9 +253,16 @@ void add_flights(py::module_& module) {
            py::arg("speed_max"),
            py::arg("directions"),
            py::arg("shares"),
-           py::arg("range_max"))
-      .def("place", &Object::place, py::arg("which"), py::arg("positions"), py::arg("facing"))
-      .def("set_wind", &Object::set_wind, py::arg("which"), py::arg("winds"))
+           py::arg("range_max"),
+           py::arg("pooled"),
+           py::arg("scenario"),
+           py::arg("team"))
+      .def("place", &Object::place, py::arg("which"), py::arg("starts"), py::arg("seeds"))
+      .def("set_rotor", &Object::set_rotor, py::arg("which"), py::arg("rotor"), py::arg("shares"))
+      .def("clearance_of_obstacles",
+           &Object::clearance_of_obstacles,
+           py::arg("positions"),
+           py::arg("times"))
       .def("step", &Object::step, py::arg("actions"), py::arg("moves"))
       .def("measure", &Object::measure, py::arg("which"))
       .def("free_positions",

@@ -11,6 +11,7 @@
 #include "pointflight/core/output_file.hpp"
 #include "pointflight/map/surfel.hpp"
 #include "pointflight/survey/cloud_map.hpp"
+#include "pointflight/world/free_space.hpp"
 #include "python/bindings/arrays.hpp"
 #include "python/bindings/map_object.hpp"
 #include "python/bindings/work.hpp"
@@ -118,6 +119,37 @@ py::array_t<SurfelRow> surfels_of(const MapObject& object) {
   return array_of(std::move(rows), {count});
 }
 
+/// (k, 3); none if no position is free.
+py::array_t<double> tour_of(const MapObject& object,
+                            double length,
+                            double radius,
+                            double margin,
+                            const std::optional<std::vector<double>>& start) {
+  if (!(length > 0.0 && length < 1e6 && radius > 0.0 && radius + margin > 0.0 && margin < 1e3)) {
+    throw py::value_error("tour: a length and a radius above 0 are wanted, in m");
+  }
+  TourOptions options;
+  options.length_min = length;
+  options.radius = radius;
+  options.margin = margin;
+  if (start) {
+    if (start->size() != 3) throw py::value_error("start: (3,) is wanted");
+    options.start = Vector3d((*start)[0], (*start)[1], (*start)[2]);
+    if (!options.start->allFinite()) throw py::value_error("start: finite numbers are wanted");
+  }
+  std::optional<Tour> tour;
+  {
+    const py::gil_scoped_release unlocked;
+    tour = find_tour(*object.map, options, *executor());
+  }
+  std::vector<double> rows;
+  if (tour) {
+    for (const Vector3d& p : tour->points_world) rows.insert(rows.end(), {p.x(), p.y(), p.z()});
+  }
+  const auto count = static_cast<py::ssize_t>(rows.size() / 3);
+  return array_of(std::move(rows), {count, 3});
+}
+
 }  // namespace
 
 void add_map(py::module_& module) {
@@ -148,6 +180,12 @@ void add_map(py::module_& module) {
       .def("__len__", [](const MapObject& m) { return m.map->surfel_count(); })
       .def("_nearest", &nearest_to, py::arg("points"), py::arg("reach"))
       .def("_surfels", &surfels_of)
+      .def("_tour",
+           &tour_of,
+           py::arg("length"),
+           py::arg("radius"),
+           py::arg("margin"),
+           py::arg("start"))
       .def("verify", [](const MapObject& m) {
         const py::gil_scoped_release unlocked;
         m.map->verify();

@@ -6,7 +6,7 @@ import dataclasses
 import json
 import os
 import tempfile
-from typing import Any, Callable, Iterable, Optional, Tuple, Union
+from typing import Any, Callable, Iterable, Optional, Sequence, Tuple, Union
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -145,6 +145,22 @@ class Map:
         """Distances (n,) from points (n, 3), world, m, to the nearest surfel's box, 0 inside it, and the centres (n, 3)
         of these surfels; infinite and NaN if none is within `reach`."""
         return self._handle._nearest(numbers(points), reach)
+
+    def tour(
+        self,
+        *,
+        length: float = 60.0,
+        radius: float = 0.3,
+        margin: float = 0.4,
+        start: Optional[Sequence[float]] = None,
+    ) -> NDArray[np.float64]:
+        """Corners (k, 3), world, m, of a way of straight legs through free space, of at least this length if the map
+        allows, along which a ball of `radius` has `margin` left: what `pointflight fly MAP` flies. start: (3,), where it
+        begins. Raises ValueError if no position is free."""
+        found = self._handle._tour(length, radius, margin, None if start is None else [float(v) for v in start])
+        if len(found) == 0:
+            raise ValueError(f"{self!r}: no position is free by {radius + margin} m")
+        return found
 
     def surfels(self) -> NDArray[Any]:
         """All surfels as a structured array (n,), unpacked:

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 
@@ -31,6 +32,13 @@ std::shared_ptr<const SurfelMap> pillars() {
     return map_of(scene, 0.1);
   }();
   return map;
+}
+
+FlightStart at(const Vector3d& p_world, double yaw) {
+  FlightStart start;
+  start.p_world = p_world;
+  start.yaw = yaw;
+  return start;
 }
 
 /// 16 x 4 directions all around.
@@ -71,7 +79,8 @@ Flown fly(std::size_t count, int actions, int threads, bool rolling) {
                   {directions(), rolling ? shares() : std::vector<float>{}, 10.0f});
   std::vector<std::uint32_t> all;
   for (std::size_t i = 0; i < count; ++i) {
-    flights.place(i, {2.0, 2.0 + 0.05 * static_cast<double>(i), 2.0}, 0.1 * static_cast<double>(i));
+    flights.place(
+        i, at({2.0, 2.0 + 0.05 * static_cast<double>(i), 2.0}, 0.1 * static_cast<double>(i)));
     all.push_back(static_cast<std::uint32_t>(i));
   }
   Flown flown;
@@ -130,9 +139,9 @@ TEST(Flights, RangesAreThoseOfTheRenderer) {
 TEST(Flights, CollideWhereTheHullDoes) {
   const Executor executor(1);
   Flights flights(pillars(), load_vehicle("quad_330"), 3, {}, {directions(), {}, 10.0f});
-  flights.place(0, {2.0, 5.75, 2.0}, 0.0);   // towards the first pillar
-  flights.place(1, {2.0, 3.0, 2.0}, 0.0);    // past it
-  flights.place(2, {2.0, 10.0, 2.0}, 1.57);  // towards the wall
+  flights.place(0, at({2.0, 5.75, 2.0}, 0.0));   // towards the first pillar
+  flights.place(1, at({2.0, 3.0, 2.0}, 0.0));    // past it
+  flights.place(2, at({2.0, 10.0, 2.0}, 1.57));  // towards the wall
   const std::vector<double> ahead = {2, 0, 0, 0, 2, 0, 0, 0, 2, 0, 0, 0};
   const Solid hull = flights.vehicle().hull();
   int hit_pillar = -1;
@@ -156,7 +165,7 @@ TEST(Flights, CollideWhereTheHullDoes) {
   EXPECT_GE(hit_pillar, 5);
   EXPECT_FALSE(flights.status(1).collided);
   EXPECT_TRUE(flights.status(2).collided);
-  flights.place(0, {2.0, 3.0, 2.0}, 0.0);
+  flights.place(0, at({2.0, 3.0, 2.0}, 0.0));
   EXPECT_FALSE(flights.status(0).collided);
 }
 
@@ -165,8 +174,8 @@ TEST(Flights, ThoseThatDoNotMoveStandStill) {
   Flights moving(pillars(), load_vehicle("quad_330"), 9, {}, {directions(), {}, 10.0f});
   Flights halting(pillars(), load_vehicle("quad_330"), 9, {}, {directions(), {}, 10.0f});
   for (std::size_t i = 0; i < 9; ++i) {
-    moving.place(i, {2.0, 2.0, 2.0}, 0.0);
-    halting.place(i, {2.0, 2.0, 2.0}, 0.0);
+    moving.place(i, at({2.0, 2.0, 2.0}, 0.0));
+    halting.place(i, at({2.0, 2.0, 2.0}, 0.0));
   }
   std::vector<double> asked(36, 0.7);
   std::vector<std::uint8_t> moves(9, 1);
@@ -187,7 +196,7 @@ TEST(Flights, AgreeWithTheFullEngine) {
   VehicleSettings vehicle = load_vehicle("quad_330");
   vehicle.controller.kind = "geometric";
   Flights flights(pillars(), vehicle, 1, {}, {directions(), {}, 10.0f});
-  flights.place(0, {2.0, 2.0, 2.0}, 0.3);
+  flights.place(0, at({2.0, 2.0, 2.0}, 0.3));
   const Autopilot autopilot(vehicle, Duration{0});
   const Multirotor dynamics(vehicle);
   VehicleState state = dynamics.hover_at({2.0, 2.0, 2.0}, 0.3);
@@ -241,6 +250,103 @@ TEST(Flights, RefuseWhatDoesNotFit) {
   std::vector<float> ranges(2 * 64);
   EXPECT_THROW(flights.measure(std::vector<std::uint32_t>{2}, ranges, executor),
                std::invalid_argument);
+}
+
+/// A ball that flies to and fro along y, 3 m ahead of where vehicles start.
+std::shared_ptr<const Obstacles> a_ball() {
+  ObstacleSettings ball;
+  ball.motion = ObstacleMotion::kLoop;
+  ball.waypoints = {{5.0, 2.0, 2.0}, {5.0, 4.0, 2.0}};
+  ball.size.radius = 0.4;
+  ObstacleWorld world;
+  world.map = pillars();
+  world.location = [](std::size_t, const char* key) { return std::string(key); };
+  return std::make_shared<const Obstacles>(std::vector{ball}, world, Executor(1));
+}
+
+TEST(Flights, ObstaclesAreWhereTheyAreWhenEachBeamIsMeasured) {
+  const Executor executor(1);
+  FlightsOptions options;
+  options.obstacles = a_ball();
+  options.obstacle_speed = 1.0;
+  const std::vector<Vector3f> ahead(3, Vector3f::UnitX());
+  for (const bool rolling : {false, true}) {
+    const std::vector<float> shares =
+        rolling ? std::vector{0.0f, 0.5f, 1.0f} : std::vector<float>{};
+    Flights flights(pillars(), load_vehicle("quad_330"), 2, options, {ahead, shares, 10.0f});
+    // the ball's middle is in the beam when it is 1 s old and leaves it 0.4 s later
+    FlightStart start = at({2.0, 3.0, 2.0}, 0.0);
+    start.time = SimTime{} + from_seconds(1.33);
+    flights.place(0, start);
+    start.time = SimTime{} + from_seconds(0.95);
+    flights.place(1, start);
+    flights.step(std::vector<double>(8, 0.0), {}, executor);
+    std::vector<float> ranges(6);
+    flights.measure(std::vector<std::uint32_t>{0, 1}, ranges, executor);
+    for (std::size_t k = 0; k < 3; ++k) {
+      for (std::size_t i = 0; i < 2; ++i) {
+        const double time =
+            (i == 0 ? 1.33 : 0.95) + (rolling ? 0.05 * static_cast<double>(k) : 0.1);
+        const double off = std::abs(3.0 - (2.0 + time));
+        const double expected = off < 0.4 ? 3.0 - std::sqrt(0.16 - off * off) : 10.0;
+        EXPECT_NEAR(10.0 * static_cast<double>(ranges[i * 3 + k]), expected, 2e-3)
+            << rolling << i << k;
+      }
+    }
+  }
+}
+
+TEST(Flights, CollideWithObstaclesAndWithinTheirTeam) {
+  const Executor executor(1);
+  FlightsOptions options;
+  options.obstacles = a_ball();
+  options.obstacle_speed = 1.0;
+  options.team = 2;
+  Flights flights(pillars(), load_vehicle("quad_330"), 4, options, {directions(), {}, 10.0f});
+  const double radius = bounding_radius(flights.vehicle().hull());
+  // vehicle 0 waits where the ball comes along; 2 and 3 fly against each other
+  FlightStart start = at({5.0, 3.8, 2.0}, 0.0);
+  flights.place(0, start);
+  flights.place(1, at({2.0, 2.0, 2.0}, 0.0));
+  flights.place(2, at({2.0, 8.0, 2.0}, 0.0));
+  flights.place(3, at({5.0, 8.0, 2.0}, 0.0));
+  const std::vector<double> asked = {0, 0, 0, 0, 0, 0, 0, 0, 1.5, 0, 0, 0, -1.5, 0, 0, 0};
+  int first = -1;
+  int second = -1;
+  for (int k = 0; k < 20; ++k) {
+    flights.step(asked, {}, executor);
+    const double apart = (flights.body(3).p_world - flights.body(2).p_world).norm() - 2.0 * radius;
+    if (apart > 0.0 && apart < Flights::kExact) {
+      EXPECT_NEAR(flights.status(2).clearance, apart, 1e-6);
+    }
+    if (first < 0 && flights.status(0).collided) first = k;
+    if (second < 0 && flights.status(2).collided) second = k;
+    EXPECT_EQ(flights.status(2).collided, flights.status(3).collided);
+  }
+  // the ball needs 1.8 m less both radii
+  EXPECT_EQ(first, static_cast<int>((1.8 - 0.4 - radius) / 0.1));
+  EXPECT_GT(second, 8);
+  EXPECT_FALSE(flights.status(1).collided);
+  EXPECT_THROW(Flights(pillars(), load_vehicle("quad_330"), 3, options, {directions(), {}, 10.0f}),
+               std::invalid_argument);
+}
+
+TEST(Flights, PooledRangesAreTheLeast) {
+  const Executor executor(1);
+  Flights single(pillars(), load_vehicle("quad_330"), 1, {}, {directions(), {}, 10.0f});
+  Flights pooled(pillars(), load_vehicle("quad_330"), 1, {}, {directions(), {}, 10.0f, 4});
+  ASSERT_EQ(pooled.beams(), 16u);
+  std::vector<float> all(64);
+  std::vector<float> least(16);
+  for (Flights* flights : {&single, &pooled}) {
+    flights->place(0, at({2.0, 3.0, 2.0}, 0.4));
+  }
+  single.measure(std::vector<std::uint32_t>{0}, all, executor);
+  pooled.measure(std::vector<std::uint32_t>{0}, least, executor);
+  for (std::size_t k = 0; k < 16; ++k) {
+    EXPECT_EQ(least[k], *std::min_element(&all[4 * k], &all[4 * k] + 4));
+  }
+  EXPECT_THROW(RangePattern(directions(), {}, 10.0f, 5), std::invalid_argument);
 }
 
 }  // namespace

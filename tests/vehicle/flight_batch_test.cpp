@@ -85,6 +85,9 @@ VehicleState alone(const VehicleSettings& vehicle,
     FlightConditions conditions;
     conditions.wind_world = a.wind;
     conditions.ground_z = 1.0;
+    conditions.load_share = 1.0 + 0.02 * static_cast<double>(i);
+    conditions.rotor_shares.assign(vehicle.rotors.size(), 1.0);
+    conditions.rotor_shares[i % vehicle.rotors.size()] = 0.98;
     for (int k = 0; k < 40; ++k) {
       const auto speeds = autopilot.rotor_speeds(pilot, state.body, false, SimTime{}, dt);
       for (int step = 0; step < timing.steps_per_control; ++step) {
@@ -113,6 +116,8 @@ std::vector<VehicleState> together(const VehicleSettings& vehicle,
       batch.ask(i, a.vector, level == FlightLevel::kAcceleration ? 0.0 : a.turn);
       if (level == FlightLevel::kRotorSpeeds) batch.ask_rotors(i, a.rotors.data());
       batch.set_air(i, a.wind, 1.0);
+      batch.set_load(i, 1.0 + 0.02 * static_cast<double>(i));
+      batch.set_rotor(i, i % vehicle.rotors.size(), 0.98);
     }
     for (int k = 0; k < 40; k += periods) batch.fly(level, periods);
   }

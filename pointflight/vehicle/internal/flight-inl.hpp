@@ -18,7 +18,8 @@ template <class N>
 struct FlightNumbers {
   BodyNumbers<N> body;
   RotorNumbers<N> rotors;
-  Vec3<N> integral;  ///< Of the velocity loop.
+  PerRotor<N> rotor_shares;  ///< Of their commanded speeds that they reach.
+  Vec3<N> integral;          ///< Of the velocity loop.
   N yaw_torque, yaw;
   Vec3<N> asked;
   N turn;
@@ -87,7 +88,7 @@ HWY_INLINE void integrate(const FlightPlan& plan,
   PerRotor<N> targets;
   for (std::size_t i = 0; i < plan.vehicle->rotors.size(); ++i) {
     const N whole = least(greatest(commands[i], N(rotor.speed_min)), N(rotor.speed_max));
-    targets[i] = choose(commands[i] > N(0.0), whole, N(0.0));
+    targets[i] = choose(commands[i] > N(0.0), flight.rotor_shares[i] * whole, N(0.0));
   }
   for (int part = 0; part < plan.held * plan.parts; ++part) {
     runge_kutta(*plan.vehicle, flight.body, flight.rotors, targets, flight.air, plan.lag);

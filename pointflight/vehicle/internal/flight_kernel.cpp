@@ -54,9 +54,11 @@ HWY_INLINE void load(const Columns& columns, std::size_t rotors, FlightNumbers<L
   columns.load(kAskedTurn, flight.turn);
   columns.load(kWind, flight.air.wind);
   columns.load(kGround, flight.air.ground_z);
+  columns.load(kLoadShare, flight.air.load_share);
   for (std::size_t i = 0; i < rotors; ++i) {
     columns.load(kRotorRows + i, flight.rotors.speed[i]);
     columns.load(kRotorRows + rotors + i, flight.rotors.acceleration[i]);
+    columns.load(kRotorRows + 3 * rotors + i, flight.rotor_shares[i]);
   }
 }
 

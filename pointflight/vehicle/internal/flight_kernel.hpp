@@ -24,7 +24,8 @@ enum FlightRow : std::size_t {
   kAskedTurn = 21,  ///< Yaw rate, or thrust of body rates.
   kWind = 22,       ///< 3
   kGround = 25,
-  kRotorRows = 26,  ///< Then speeds, accelerations and commands of the rotors.
+  kLoadShare = 26,
+  kRotorRows = 27,  ///< Then speeds, accelerations, commands and shares of the rotors.
 };
 
 /// The rows of one batch, `stride` columns each.

@@ -39,6 +39,7 @@ template <class N>
 struct AirNumbers {
   Vec3<N> wind;
   N ground_z;
+  N load_share;
 };
 
 /// Time derivative of a body's state.
@@ -115,10 +116,11 @@ HWY_INLINE BodyRate<N> rate_of(const VehicleSettings& vehicle,
                        magnitude(v_body.z) * v_body.z};
   push.force = push.force - N(0.5 * kAirDensity) * times(all_of<N>(vehicle.drag_area), moving);
 
-  const Vec3<N> a =
-      rotate(body.q, push.force) / N(vehicle.mass) - all_of<N>(Vector3d(0, 0, kGravity));
-  const Vec3<N> momentum = times(all_of<N>(vehicle.inertia_diagonal), body.omega) +
-                           Vec3<N>{N(0.0), N(0.0), rotor_momentum(vehicle, speeds)};
+  const Vec3<N> a = rotate(body.q, push.force) / (N(vehicle.mass) * air.load_share) -
+                    all_of<N>(Vector3d(0, 0, kGravity));
+  const Vec3<N> inertia = air.load_share * all_of<N>(vehicle.inertia_diagonal);
+  const Vec3<N> momentum =
+      times(inertia, body.omega) + Vec3<N>{N(0.0), N(0.0), rotor_momentum(vehicle, speeds)};
   const Vec3<N> drag_torque =
       norm(body.omega) * times(all_of<N>(vehicle.rotational_drag), body.omega);
   const Vec3<N> torque = push.torque - drag_torque - cross(body.omega, momentum);
@@ -176,7 +178,7 @@ HWY_INLINE void runge_kutta(const VehicleSettings& vehicle,
   }
   // the momentum of body and rotors together is what is integrated: what a rotor gains by speeding
   // up the body loses, to the last bit
-  const Vec3<N> inertia = all_of<N>(vehicle.inertia_diagonal);
+  const Vec3<N> inertia = air.load_share * all_of<N>(vehicle.inertia_diagonal);
   const N zero(0.0);
   const Vec3<N> momentum =
       times(inertia, body.omega) + Vec3<N>{zero, zero, rotor_momentum(vehicle, rotors.speed)};

@@ -39,7 +39,7 @@ inline RigidBodyState state_of(const BodyNumbers<double>& b) {
       vector_of(b.p), vector_of(b.v), Quaterniond(b.q.w, b.q.x, b.q.y, b.q.z), vector_of(b.omega)};
 }
 inline AirNumbers<double> numbers_of(const FlightConditions& conditions) {
-  return {numbers_of(conditions.wind_world), conditions.ground_z};
+  return {numbers_of(conditions.wind_world), conditions.ground_z, conditions.load_share};
 }
 inline void put(const std::vector<RotorState>& rotors, RotorNumbers<double>& numbers) {
   for (std::size_t i = 0; i < rotors.size(); ++i) {

@@ -3,17 +3,24 @@
 gymnasium is not needed; where it is installed, spaces and base classes are its own.
 """
 
+from .conditions import Conditions
+from .courses import TASKS, Corridor, Formation
 from .env import Env
-from .evaluation import Score, evaluate, reactive, wilson
+from .evaluation import Score, advantages, evaluate, wilson
+from .images import Lidar
 from .observer import Observer
-from .policy import Policy, features, straight
-from .tasks import TASKS, Explore, Goal, Hover, Outcome, Race, States, Task
-from .vector import AutoresetMode, Lidar, VectorEnv
+from .pilots import hold, in_formation, reactive, straight, wander
+from .policy import Policy, features
+from .tasks import Explore, Goal, Hover, Outcome, Race, States, Task
+from .vector import AutoresetMode, VectorEnv
 
 __all__ = [
     "AutoresetMode",
+    "Conditions",
+    "Corridor",
     "Env",
     "Explore",
+    "Formation",
     "Goal",
     "Hover",
     "Lidar",
@@ -26,9 +33,13 @@ __all__ = [
     "TASKS",
     "Task",
     "VectorEnv",
+    "advantages",
     "evaluate",
     "features",
+    "hold",
+    "in_formation",
     "reactive",
     "straight",
+    "wander",
     "wilson",
 ]

@@ -1,16 +1,17 @@
-"""How well a pilot does: `evaluate`, and a pilot that was not learned."""
+"""How well a pilot does: `evaluate`."""
 
 from __future__ import annotations
 
 import math
-from typing import Callable, Dict, NamedTuple, Sequence, Tuple
+from typing import NamedTuple, Sequence, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .vector import Observation, VectorEnv
+from .pilots import Pilot
+from .tasks import Floats
+from .vector import VectorEnv
 
-Pilot = Callable[[Observation], NDArray[np.float32]]
 
 
 class Score(NamedTuple):
@@ -19,15 +20,24 @@ class Score(NamedTuple):
     flights: int
     """"""
     arrived: int
-    """Reached the goal without touching anything."""
+    """Reached the goal without touching anything; of tasks without goals: flew until the time was up."""
     collided: int
     """"""
     late: int
-    """Neither, when the time was up."""
+    """Neither."""
     interval: Tuple[float, float]
     """Of the share that arrives: Wilson's, 95 %."""
     seconds: float
     """Mean of those that arrived."""
+    reward: float
+    """Mean sum of an episode."""
+
+    def __str__(self) -> str:
+        low, high = self.interval
+        return (
+            f"{self.arrived} of {self.flights} arrive ({100 * low:.0f} to {100 * high:.0f} %), {self.collided} collide, "
+            f"{self.seconds:.1f} s, reward {self.reward:.2f}"
+        )
 
 
 def wilson(hits: int, count: int, z: float = 1.96) -> Tuple[float, float]:
@@ -39,55 +49,37 @@ def wilson(hits: int, count: int, z: float = 1.96) -> Tuple[float, float]:
 
 
 def evaluate(env: VectorEnv, pilot: Pilot, seeds: Sequence[int]) -> Score:
-    """One flight on each seed. The environment's task is `Goal`, its number that of the seeds."""
-    if len(seeds) != env.num_envs:
-        raise ValueError(f"seeds: {env.num_envs} are wanted, one for each environment")
-    seen, _ = env.reset(seed=list(seeds))
-    over = np.zeros(env.num_envs, bool)
-    ends: Dict[str, NDArray[np.bool_]] = {name: np.zeros(env.num_envs, bool) for name in ("reached", "collided")}
-    seconds = np.zeros(env.num_envs)
+    """One flight on each seed; the environment has as many vehicles, or teams, as there are seeds. A team counts once."""
+    count, teams = env.num_envs, env.num_envs // env.team
+    if len(seeds) != teams:
+        raise ValueError(f"seeds: {teams} are wanted, one for each environment")
+    seen, _ = env.reset(seed=[int(seed) for seed in seeds for _ in range(env.team)])
+    over = np.zeros(count, bool)
+    arrived, collided = np.zeros(count, bool), np.zeros(count, bool)
+    seconds, rewards = np.zeros(count), np.zeros(count)
     while not over.all():
-        seen, _, terminated, truncated, infos = env.step(pilot(seen))
+        seen, reward, terminated, truncated, infos = env.step(pilot(seen))
         seconds[~over] += env.action_period
+        rewards[~over] += reward[~over]
         now = (terminated | truncated) & ~over
-        for name, values in ends.items():
-            values |= infos[name] & now
+        arrived |= infos.get("reached", ~terminated) & now
+        collided |= infos["collided"] & now
         over |= now
-    arrived, collided = int(ends["reached"].sum()), int(ends["collided"].sum())
-    mean = float(seconds[ends["reached"]].mean()) if arrived else math.nan
-    late = env.num_envs - arrived - collided
-    return Score(env.num_envs, arrived, collided, late, wilson(arrived, env.num_envs), mean)
+    arrived, collided = arrived[:: env.team], collided.reshape(teams, -1).any(1)
+    there, hit = int(arrived.sum()), int(collided.sum())
+    mean = float(seconds[:: env.team][arrived].mean()) if there else math.nan
+    return Score(teams, there, hit, teams - there - hit, wilson(there, teams), mean, float(rewards.mean()))
 
 
-def reactive(env: VectorEnv, speed: float = 0.5) -> Pilot:
-    """A hand-made pilot: of 72 level ways that are 0.6 m free on both sides for 3 m, the one nearest to the goal, at a
-    share of the full speed. It looks at all beams as if they were level, so give it few rows near the horizon."""
-    lidar = env.lidar
-    if lidar is None:
-        raise ValueError("reactive: it flies by ranges")
-    range_max = lidar.range_max
-    left, right = lidar.azimuth[1], lidar.azimuth[0]
-    columns = left - (left - right) * (np.arange(lidar.columns) + 0.5) / lidar.columns
-    azimuth = np.broadcast_to(columns, (lidar.rows, lidar.columns)).reshape(-1)
-    ways = np.arange(72) * 2 * np.pi / 72
-
-    def pilot(seen: Observation) -> NDArray[np.float32]:
-        s = seen["state"]
-        ranges = seen["range"].reshape(len(s), -1) * range_max
-        to_goal = np.arctan2(s[:, 1], s[:, 0])
-        half = np.arcsin(np.minimum(1.0, 0.6 / np.maximum(ranges, 1e-3)))
-        free = np.full((len(s), 72), 20.0)
-        for k, way in enumerate(ways):
-            off = np.abs((azimuth[None, :] - way + np.pi) % (2 * np.pi) - np.pi)
-            in_way = (off <= half) & (ranges < 0.999 * range_max)
-            free[:, k] = np.where(in_way, ranges, 20.0).min(1)
-        toward = np.cos(ways[None, :] - to_goal[:, None])
-        toward[free < np.minimum(3.0, s[:, 2:3] * 30.0)] = -2.0
-        best = toward.argmax(1)
-        moving = speed * (toward.max(1) > -2.0)
-        climb = np.clip(s[:, 3] * 3.0, -1.0, 1.0) * 0.3
-        ahead, left_of = np.cos(ways[best]) * moving, np.sin(ways[best]) * moving
-        actions: NDArray[np.float32] = np.stack([ahead, left_of, climb, 0 * climb], 1).astype(np.float32)
-        return actions
-
-    return pilot
+def advantages(
+    rewards: Floats, values: NDArray[np.float32], ends: NDArray[np.bool_], gamma: float, share: float
+) -> NDArray[np.float32]:
+    """(t, n) of rewards (t, n), values (t + 1, n) and whether an episode has ended with the step (t, n): generalised
+    advantages (Schulman et al., arXiv 1506.02438), share: its lambda."""
+    live = gamma * ~ends
+    errors = rewards + live * values[1:] - values[:-1]
+    found = np.zeros_like(errors)
+    later = np.zeros(errors.shape[1])
+    for t in reversed(range(len(errors))):
+        found[t] = later = errors[t] + share * live[t] * later
+    return found.astype(np.float32)

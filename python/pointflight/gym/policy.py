@@ -1,4 +1,4 @@
-"""Policies for the task `Goal` as numpy alone flies them: what features are, and `Policy`."""
+"""Policies as numpy alone flies them: what features are, and `Policy`."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..settings import Path
-from .vector import Observation
+from .images import Lidar, Observation
+from .pilots import straight
 
 Floats = NDArray[np.float32]
 
@@ -23,21 +24,17 @@ def features(observation: Observation, range_max: float) -> Floats:
     return np.concatenate([near, state], 1, dtype=np.float32)
 
 
-def straight(observation: Observation) -> Floats:
-    """(n, 4): the straight way to the goal at full speed, without turning."""
-    s = observation["state"]
-    way = np.stack([s[:, 0] * s[:, 2] * 30.0, s[:, 1] * s[:, 2] * 30.0, s[:, 3] * 3.0, 0.0 * s[:, 0]], 1)
-    unit: Floats = way / np.maximum(np.sqrt((way * way).sum(1, keepdims=True)), 1e-6)
-    return unit
-
-
 class Policy:
-    """A network of tanh layers that adds to a share of the straight way."""
+    """A network of tanh layers; its outputs, which may be fewer than actions have numbers, add to a share of the
+    straight way to the goal."""
 
     def __init__(self, layers: List[Tuple[Floats, Floats]], about: Mapping[str, Any]) -> None:
-        """layers: weights (out, in) and biases (out,). about: "base", the share of the straight way, and what else is
-        to be kept with it: the LiDAR, how it was trained."""
+        """layers: weights (out, in) and biases (out,). about: `VectorEnv.about()` and "base", the share of the straight
+        way that its actions add to, 0 unless the task is `Goal` or `Race`."""
         self.layers, self.about = layers, dict(about)
+        seen = self.about.get("lidar")
+        self.lidar = None if seen is None else Lidar(**{k: tuple(v) if isinstance(v, list) else v for k, v in seen.items()})
+        """What it sees by."""
 
     @staticmethod
     def load(path: Path) -> Policy:
@@ -55,12 +52,14 @@ class Policy:
         np.savez(path, **arrays)
 
     def __call__(self, observation: Observation) -> Floats:
-        """Actions (n, 4), -1 to 1."""
-        x = features(observation, float(self.about["range_max"]))
+        """Actions (n, a), -1 to 1."""
+        x = features(observation, 1.0 if self.lidar is None else self.lidar.range_max)
         for i, (weight, bias) in enumerate(self.layers):
             x = x @ weight.T + bias
             if i + 1 < len(self.layers):
                 x = np.tanh(x)
-        added = np.zeros((len(x), 4), np.float32)
-        added[:, : x.shape[1]] = x
-        return np.clip(float(self.about["base"]) * straight(observation) + added, -1.0, 1.0)
+        actions = np.zeros((len(x), max(4, x.shape[1])), np.float32)
+        actions[:, : x.shape[1]] = x
+        if self.about["base"] != 0.0:
+            actions += np.float32(self.about["base"]) * straight(observation)
+        return np.clip(actions, -1.0, 1.0)

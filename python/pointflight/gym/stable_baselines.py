@@ -7,7 +7,8 @@ from typing import Any, Dict, List, Optional, Sequence, Tuple, Type
 import numpy as np
 from numpy.typing import NDArray
 
-from .vector import AutoresetMode, Observation, VectorEnv
+from .images import Observation
+from .vector import AutoresetMode, VectorEnv
 
 try:
     from stable_baselines3.common.vec_env import VecEnv as _Base

@@ -1,4 +1,5 @@
-"""What is to be learned: `Goal`, `Race`, `Explore`, `Hover`. Derive `Task` for one's own.
+"""What is to be learned: `Goal`, `Race`, `Explore`, `Hover` (courses.py: `Corridor`, `Formation`). Derive `Task` for one's
+own.
 
 All arrays have a row for each environment.
 """
@@ -77,6 +78,8 @@ class Task:
     """s; then an episode is truncated."""
     state_size = 0
     """Numbers of one state."""
+    team = 1
+    """Vehicles that do it together."""
 
     def begin(self, env: "VectorEnv") -> None:
         """Once, before anything else."""
@@ -110,13 +113,12 @@ class Goal(Task):
         height: Tuple[float, float] = (1.5, 3.0),
         clearance: float = 1.0,
         radius: float = 1.0,
-        wind: float = 0.0,
         time_limit: float = 20.0,
     ) -> None:
         """distance: from start to goal, horizontal, m. height: of both above ground, m. clearance: of both, m. radius:
-        the goal is reached within it, m. wind: each episode has a steady one, up to so much along x and y, m/s."""
+        the goal is reached within it, m."""
         self.distance, self.height, self.clearance, self.radius = distance, height, clearance, radius
-        self.wind, self.time_limit = wind, time_limit
+        self.time_limit = time_limit
 
     def begin(self, env: "VectorEnv") -> None:
         self.state_size = 11 + env.single_action_space.shape[0]
@@ -125,16 +127,12 @@ class Goal(Task):
         self._checked: Set[int] = set()
 
     def reset(self, env: "VectorEnv", which: NDArray[np.uint32]) -> None:
-        u = env.draws(which, 3 + self._tries)
+        u = env.draws(which, 1 + self._tries)
         for _, places in env.places(which, self.height, self.clearance):
             self._check(places)
         start = env.positions(which, u[:, 0], self.height, self.clearance)
-        goal = self._goals(env, which, start, u[:, 3:])
+        goal = self._goals(env, which, start, u[:, 1:])
         env.place(which, start, goal)
-        if self.wind > 0.0:
-            winds = np.zeros((len(which), 3))
-            winds[:, :2] = self.wind * (2.0 * u[:, 1:3] - 1.0)
-            env.set_wind(which, winds)
         self.goal[which] = goal
         self.away[which] = lengths(goal - start)
 
@@ -210,14 +208,13 @@ class Race(Goal):
         height: Tuple[float, float] = (1.5, 3.0),
         clearance: float = 1.0,
         radius: float = 1.0,
-        wind: float = 0.0,
         time_limit: float = 40.0,
     ) -> None:
         """goals: how many. The rest as of `Goal`."""
         if goals < 1:
             raise ValueError(f"goals: 1 or more, not {goals}")
         super().__init__(
-            distance=distance, height=height, clearance=clearance, radius=radius, wind=wind, time_limit=time_limit
+            distance=distance, height=height, clearance=clearance, radius=radius, time_limit=time_limit
         )
         self.goals = goals
 
@@ -237,8 +234,8 @@ class Race(Goal):
         on = np.flatnonzero(reached & ~finished).astype(np.uint32)
         if len(on):
             # the next goal's draws follow those of the ones before
-            u = env.draws(on, 3 + self._tries * self.goals)
-            at = 3 + self._tries * self.passed[on]
+            u = env.draws(on, 1 + self._tries * self.goals)
+            at = 1 + self._tries * self.passed[on]
             rows = u[np.arange(len(on))[:, None], at[:, None] + np.arange(self._tries)[None, :]]
             self.goal[on] = self._goals(env, on, self.goal[on], rows)
             self.away[on] = lengths(self.goal[on] - env.states.position[on])
@@ -349,7 +346,3 @@ class Hover(Task):
         lost = s.collided | (off > 3.0 * self.displacement + 1.0)
         reward = 1.0 / (1.0 + off * off) - 0.02 * change - 0.05 * lengths(s.velocity) - 10.0 * lost
         return Outcome(reward, lost, {"collided": s.collided, "off": off})
-
-
-TASKS = {"goal": Goal, "race": Race, "explore": Explore, "hover": Hover}
-"""By name."""

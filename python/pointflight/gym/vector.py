@@ -5,7 +5,8 @@ from __future__ import annotations
 import enum
 import math
 import os
-from typing import Any, Dict, Iterator, List, Mapping, NamedTuple, Optional, Sequence, Tuple, Union
+from types import MappingProxyType
+from typing import Any, Dict, Iterator, List, Mapping, Optional, Sequence, Tuple, Union
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,10 +15,13 @@ from .. import _pointflight
 from ..map import Map
 from ..poses import rotations
 from ..settings import Path, Vehicle
+from .conditions import Conditions
+from .courses import TASKS
 from .draws import draws
+from .images import Lidar, Observation, beams_of, grid_of, measured
 from .spaces import Box, batched
 from .spaces import Dict as DictSpace
-from .tasks import TASKS, Floats, States, Task
+from .tasks import Floats, States, Task
 
 try:
     from gymnasium.vector import AutoresetMode as AutoresetMode
@@ -38,30 +42,6 @@ _MODES = {
     "same_step": AutoresetMode.SAME_STEP,
     "disabled": AutoresetMode.DISABLED,
 }
-
-
-class Lidar(NamedTuple):
-    """Which ranges policies see: an image, row 0 the highest, column 0 the farthest to the left."""
-
-    rows: int = 16
-    """From the highest elevation to the lowest."""
-    columns: int = 64
-    """From the left end of the azimuth to the right."""
-    elevation: Tuple[float, float] = (-math.radians(15), math.radians(15))
-    """Ends of the field of view, rad."""
-    azimuth: Tuple[float, float] = (-math.pi, math.pi)
-    """rad"""
-    range_max: float = 10.0
-    """m"""
-    rolling: bool = False
-    """Columns are measured one after the other while the vehicle moves, the left one first; else all at the end."""
-    noise: float = 0.0
-    """Standard deviation of ranges, m; bell-shaped, at most 3.46 of it."""
-    dropout: float = 0.0
-    """Share of beams that see nothing."""
-
-
-Observation = Dict[str, NDArray[np.float32]]
 
 
 class VectorEnv(_Base):  # type: ignore[misc]
@@ -86,6 +66,9 @@ class VectorEnv(_Base):  # type: ignore[misc]
         lidar: Optional[Lidar] = Lidar(),
         action: str = "velocity",
         vehicle: Union[Vehicle, Path] = "quad_330",
+        scenario: Mapping[str, Any] = MappingProxyType({}),
+        vary: Mapping[str, Tuple[ArrayLike, ArrayLike]] = MappingProxyType({}),
+        team: Optional[int] = None,
         speed: float = 3.0,
         yaw_rate: float = 1.0,
         acceleration: float = 5.0,
@@ -96,8 +79,9 @@ class VectorEnv(_Base):  # type: ignore[misc]
         copy: bool = True,
         render_mode: Optional[str] = None,
     ) -> None:
-        """map: one, or several: environments are dealt out to them in blocks. task: "goal", "race", "explore", "hover",
-        or one of one's own. action_period: s between actions; physics_step, s, of which `steps_per_control` are flown with the
+        """map: one, or several: environments are dealt out to them in blocks. task: a name of `TASKS`, or one of one's own.
+        scenario, vary: what happens around, as `Conditions` takes it. team: vehicles 0 to team - 1 are in one place, see
+        and hit each other and end together, and so are the next ones (1, 2, 4 or 8; without: the task's). action_period: s between actions; physics_step, s, of which `steps_per_control` are flown with the
         same rotor commands (docs/python.md: what coarser ones cost). autoreset: "next_step", "same_step" or
         "disabled". copy: False: observations are read-only views that the next step changes.
         """
@@ -115,23 +99,31 @@ class VectorEnv(_Base):  # type: ignore[misc]
         self.lidar, self.action_period, self.render_mode = lidar, action_period, render_mode
         self.metadata = {"render_modes": [], "render_fps": 1.0 / action_period, "autoreset_mode": _MODES[autoreset]}
         self._mode = _MODES[autoreset]
+        self.team = self.task.team if team is None else team
+        if self.team not in (1, 2, 4, 8) or num_envs % self.team != 0:
+            raise ValueError(f"team: 1, 2, 4 or 8, and whole ones, not {self.team} of {num_envs}")
+        self.conditions = Conditions(scenario, vary, num_envs, self.team)
         maps = [map] if isinstance(map, (Map, str, os.PathLike)) else list(map)
         self.maps = [one if isinstance(one, Map) else Map.open(one) for one in maps]
-        if not 1 <= len(self.maps) <= num_envs:
-            raise ValueError(f"map: {len(self.maps)} maps for {num_envs} environments")
-        directions, shares = _beams(lidar)
-        self._directions = directions.astype(np.float64)
-        bounds = [num_envs * k // len(self.maps) for k in range(len(self.maps) + 1)]
+        if not 1 <= len(self.maps) <= num_envs // self.team:
+            raise ValueError(f"map: {len(self.maps)} maps for {num_envs // self.team} environments")
+        directions, shares = beams_of(lidar)
+        self._directions = np.zeros((0, 3)) if lidar is None else grid_of(lidar)
+        teams = num_envs // self.team
+        bounds = [teams * k // len(self.maps) * self.team for k in range(len(self.maps) + 1)]
         self._blocks = [slice(begin, end) for begin, end in zip(bounds[:-1], bounds[1:])]
         greatest = math.sqrt(3.0) * speed if action == "velocity" else 0.0  # along all three axes at once
         self._flights = [
             _pointflight._Flights(
                 place._handle, self.vehicle._handle, block.stop - block.start, action, action_period, physics_step,
                 steps_per_control, greatest, directions, shares, 1.0 if lidar is None else lidar.range_max,
+                1 if lidar is None else lidar.pool[0] * lidar.pool[1],
+                self.conditions.scenario_in(place.info().name)._handle, self.team,
             )
             for place, block in zip(self.maps, self._blocks)
         ]  # fmt: skip
         self._places: Dict[Any, List[Floats]] = {}
+        self._scale = {"speed": speed, "yaw_rate": yaw_rate, "acceleration": acceleration}
         self._scale_actions(speed, yaw_rate, acceleration)
         width = self.vehicle.rotors if action == "rotor_speeds" else 4
         self.single_action_space = Box(-1.0, 1.0, (width,), np.float32)
@@ -149,12 +141,23 @@ class VectorEnv(_Base):  # type: ignore[misc]
         self._ended = np.ones(num_envs, np.bool_)
         self._was_reset = False
         self._all = np.arange(num_envs, dtype=np.uint32)
+        self._image: Optional[NDArray[np.float32]] = None
         self.task.begin(self)
         spaces = {"state": Box(-np.inf, np.inf, (self.task.state_size,), np.float32)}
         if lidar is not None:
             spaces = {"range": Box(0.0, 1.0, (lidar.rows, lidar.columns), np.float32), **spaces}
         self.single_observation_space = DictSpace(spaces)
         self.observation_space = batched(self.single_observation_space, num_envs)
+
+    def about(self) -> Dict[str, Any]:
+        """What whoever flies a policy that has learned here needs to know: `Policy.about`."""
+        kind = next((name for name, task in TASKS.items() if type(self.task) is task), type(self.task).__name__)
+        scale = {name: float(value) for name, value in self._scale.items()}
+        about = {"task": kind, "time_limit": self.task.time_limit, "action": self.action, **scale}
+        about["action_period"] = self.action_period
+        if self.lidar is not None:
+            about["lidar"] = self.lidar._asdict()
+        return about
 
     def _scale_actions(self, speed: float, yaw_rate: float, acceleration: float) -> None:
         weight = self.vehicle.weight
@@ -176,6 +179,11 @@ class VectorEnv(_Base):  # type: ignore[misc]
     def draws(self, which: NDArray[np.uint32], count: int) -> Floats:
         """(m, count): uniform in [0, 1), addressed by the seeds of these environments and their episodes."""
         return draws(self.seeds[which], self._episodes[which], count)
+
+    def maps_of(self, which: NDArray[np.uint32]) -> Iterator[Tuple[int, NDArray[np.int64]]]:
+        """For each map that some of these environments are in: its number in `maps`, and rows of `which`."""
+        for k, rows, _ in self._parts(which):
+            yield k, rows
 
     def places(
         self, which: NDArray[np.uint32], height: Tuple[float, float], clearance: float
@@ -200,20 +208,39 @@ class VectorEnv(_Base):  # type: ignore[misc]
     def positions(
         self, which: NDArray[np.uint32], u: Floats, height: Tuple[float, float], clearance: float
     ) -> Floats:
-        """(m, 3): of `places`, those that draws u (m,) choose."""
+        """(m, 3): of `places`, those that draws u (m,) choose, or the next that are clear of obstacles, too."""
         chosen = np.empty((len(which), 3))
         for rows, places in self.places(which, height, clearance):
-            chosen[rows] = places[(u[rows] * len(places)).astype(np.int64)]
+            first = (u[rows] * len(places)).astype(np.int64)
+            chosen[rows] = places[first]
+            if not self.conditions.has_obstacles:
+                continue
+            for k in range(1, 16):
+                blocked = rows[~self.is_clear(which[rows], chosen[rows], clearance)]
+                if len(blocked) == 0:
+                    break
+                chosen[blocked] = places[((u[blocked] * len(places)).astype(np.int64) + k) % len(places)]
         return chosen
+
+    def is_clear(self, which: NDArray[np.uint32], positions: Floats, clearance: float) -> NDArray[np.bool_]:
+        """(m,): whether positions (m, 3) are so far away from obstacles, m, 1.5 at most, when the episodes begin."""
+        clear = np.ones(len(which), np.bool_)
+        for k, rows, own in self._parts(which):
+            clock = self.conditions.clock[which[rows]]
+            clear[rows] = self._flights[k].clearance_of_obstacles(positions[rows], clock) >= min(clearance, 1.5)
+        return clear
 
     def place(self, which: NDArray[np.uint32], positions: Floats, facing: Floats) -> None:
         """Vehicles begin anew, hovering at positions (m, 3) and heading for others (m, 3), world, m."""
+        starts = self.conditions.starts(which, positions, facing)
+        seeds = self.conditions.gust_seeds(which, self.seeds, self._episodes)
         for k, rows, own in self._parts(which):
-            self._flights[k].place(own, positions[rows], facing[rows])
+            self._flights[k].place(own, starts[rows], seeds[rows])
 
     def points(self) -> Tuple[Floats, NDArray[np.bool_]]:
-        """Where the beams of the last action's observation hit, (n, beams, 3), m, world, and which did, (n, beams).
-        Those of a rolling LiDAR are taken as if they were measured at its end."""
+        """Where the beams of the last action's observation hit, (n, cells, 3), m, world, and which did, (n, cells).
+        Those of a rolling LiDAR are taken as if they were measured at its end, pooled ones as if in the middle of
+        their cell."""
         if self.lidar is None:
             raise ValueError("points: there is no LiDAR")
         s = self.states
@@ -227,11 +254,6 @@ class VectorEnv(_Base):  # type: ignore[misc]
             world[..., k] = s.position[:, k, None] + ahead * along
         return world, ranges < 1.0
 
-    def set_wind(self, which: NDArray[np.uint32], winds: Floats) -> None:
-        """The steady wind (m, 3) that these vehicles fly in until they are placed again, m/s, world."""
-        for k, rows, own in self._parts(which):
-            self._flights[k].set_wind(own, winds[rows])
-
     @property
     def states(self) -> States:
         """The true states of all vehicles."""
@@ -243,23 +265,27 @@ class VectorEnv(_Base):  # type: ignore[misc]
     def reset(
         self, *, seed: Union[None, int, Sequence[Optional[int]]] = None, options: Optional[Mapping[str, Any]] = None
     ) -> Tuple[Observation, Dict[str, Any]]:
-        """Begins anew. seed: environment i gets seed + i, or the i-th of a list; without one, each goes on to its next
-        episode. options: {"reset_mask": (n,) bool}: only these."""
+        """Begins anew. seed: environment i gets seed + i (those of team i), or the i-th of a list; without one, each goes
+        on to its next episode. options: {"reset_mask": (n,) bool}: only these, whole teams."""
         mask = np.ones(self.num_envs, np.bool_)
         if options is not None and "reset_mask" in options:
             mask = np.asarray(options["reset_mask"])
             if mask.shape != (self.num_envs,) or mask.dtype != np.bool_ or not mask.any():
                 raise ValueError(f"reset_mask: bool ({self.num_envs},) with some True is wanted")
+            if (self._of_teams(mask) != mask).any():
+                raise ValueError(f"reset_mask: whole teams of {self.team} are wanted")
         if seed is None and not self._was_reset:
             seed = int(np.random.SeedSequence().generate_state(1)[0])
         if seed is not None:
             seeds: List[Optional[int]]
             if isinstance(seed, (int, np.integer)):
-                seeds = [int(seed) + i for i in range(self.num_envs)]
+                seeds = [int(seed) + i // self.team for i in range(self.num_envs)]
             else:
                 seeds = list(seed)
             if len(seeds) != self.num_envs or any(s is not None and s < 0 for s in seeds):
                 raise ValueError(f"seed: 0 or above, or {self.num_envs} of them")
+            if any(seeds[i] != seeds[i - i % self.team] for i in range(self.num_envs)):
+                raise ValueError(f"seed: one and the same for all {self.team} of a team")
             for i, one in enumerate(seeds):
                 if one is not None and mask[i]:
                     self.seeds[i], self._episodes[i] = one, 0
@@ -283,6 +309,9 @@ class VectorEnv(_Base):  # type: ignore[misc]
         asked = np.clip(asked, -1.0, 1.0)
         moves = self.moved = ~self._ended
         commands = self._zero + asked * np.where(asked < 0, self._down, self._up)
+        for rotor, left in self.conditions.rotor_shares(self.elapsed).items():
+            for k, rows, own in self._parts(self._all[moves]):
+                self._flights[k].set_rotor(own, rotor, left[moves][rows])
         for block, flights in zip(self._blocks, self._flights):
             flights.step(commands[block], moves[block])
         difference = asked - self.last_actions
@@ -294,7 +323,7 @@ class VectorEnv(_Base):  # type: ignore[misc]
         self.elapsed = self._steps * self.action_period
         self._measure(self._all[moves])
         reward, terminated, info = self.task.judge(self, change)
-        terminated = terminated & moves
+        terminated = self._of_teams(terminated & moves)
         truncated = (self._steps >= round(self.task.time_limit / self.action_period)) & moves & ~terminated
         reward = np.where(moves, reward, 0.0)
         infos: Dict[str, Any] = {}
@@ -348,7 +377,14 @@ class VectorEnv(_Base):  # type: ignore[misc]
         self.elapsed[which] = 0.0
         self.last_actions[which] = 0.0
         self._episodes[which] += np.uint64(1)  # first: the task's later draws are of this episode too
+        self.conditions.begin(which, self.seeds, self._episodes)
         self.task.reset(self, which)
+
+    def _of_teams(self, some: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """(n,): in whose team any is."""
+        if self.team == 1:
+            return some
+        return np.repeat(some.reshape(-1, self.team).any(1), self.team)
 
     def _measure(self, which: NDArray[np.uint32]) -> None:
         if self.lidar is None:
@@ -364,24 +400,28 @@ class VectorEnv(_Base):  # type: ignore[misc]
     def _observation(self) -> Observation:
         seen: Observation = {}
         if self.lidar is not None:
-            whole = self._ranges().reshape(self.num_envs, self.lidar.rows, self.lidar.columns)
-            if self.lidar.noise > 0.0 or self.lidar.dropout > 0.0:
-                seen["range"] = self._measured(whole, self.lidar)
-            else:
-                seen["range"] = whole.copy() if self.copy and len(self.maps) == 1 else whole
+            seen["range"] = self._seen(self._ranges().reshape(self.num_envs, self.lidar.rows, self.lidar.columns))
         seen["state"] = self.task.state(self).astype(np.float32)
         return seen
 
-    def _measured(self, ranges: NDArray[np.float32], lidar: Lidar) -> NDArray[np.float32]:
-        """With noise and dropout: draws are addressed by seed, episode, step and beam."""
-        beams = lidar.rows * lidar.columns
-        steps = self._steps.astype(np.uint64) + (self._episodes << np.uint64(32)) + np.uint64(1 << 31)
-        u = draws(self.seeds, steps, 5 * beams).reshape(self.num_envs, lidar.rows, lidar.columns, 5)
-        # the sum of four uniform numbers less 2: variance 1 / 3
-        bell = (u[..., 0] + u[..., 1] + u[..., 2] + u[..., 3] - 2.0) * math.sqrt(3.0)
-        noisy = ranges + (lidar.noise / lidar.range_max * bell).astype(np.float32)
-        lost = (ranges >= 1.0) | (u[..., 4] < lidar.dropout)
-        return np.where(lost, np.float32(1.0), np.clip(noisy, np.float32(0.0), np.float32(1.0)))
+    def _seen(self, whole: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Images (n, rows, columns) with what goes wrong."""
+        lidar = self.lidar
+        assert lidar is not None
+        address = (self.seeds, self._episodes, self._steps)
+        image = whole
+        if lidar.noise > 0.0 or lidar.dropout > 0.0:
+            image = measured(image, lidar, *address)
+        dead = self.conditions.dead(self.elapsed)
+        if dead is not None:
+            image = np.where(dead[:, None, None], np.float32(1.0), image)
+        lost = self.conditions.dropped(self.elapsed, *address)
+        if lost is not None:
+            fresh = ~lost | (self._steps == 0)
+            before = np.ones_like(image) if self._image is None else self._image
+            image = np.where(fresh[:, None, None], image, before)
+            self._image = image.copy()
+        return image.copy() if self.copy and len(self.maps) == 1 and image is whole else image
 
     def __repr__(self) -> str:
         names = ", ".join(map_name(place) for place in self.maps)
@@ -392,17 +432,3 @@ def map_name(place: Map) -> str:
     """The last part of its path."""
     return os.path.basename(place.info().name)
 
-
-def _beams(lidar: Optional[Lidar]) -> Tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Directions (k, 3) and shares of the period (k,) or (0,)."""
-    if lidar is None:
-        return np.zeros((0, 3), np.float32), np.zeros(0, np.float32)
-    if lidar.rows < 1 or lidar.columns < 1:
-        raise ValueError(f"lidar: 1 row and column or more, not {lidar.rows} x {lidar.columns}")
-    if not (lidar.noise >= 0.0 and 0.0 <= lidar.dropout <= 1.0):
-        raise ValueError(f"lidar: noise 0 or above and dropout 0 to 1, not {lidar.noise} and {lidar.dropout}")
-    directions = _pointflight._grid(lidar.rows, lidar.columns, *lidar.elevation, *lidar.azimuth)
-    if not lidar.rolling:
-        return directions.reshape(-1, 3).astype(np.float32), np.zeros(0, np.float32)
-    shares = np.broadcast_to((np.arange(lidar.columns) + 0.5) / lidar.columns, (lidar.rows, lidar.columns))
-    return directions.reshape(-1, 3).astype(np.float32), shares.reshape(-1).astype(np.float32)
