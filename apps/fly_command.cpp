@@ -13,6 +13,7 @@
 #include "apps/flags.hpp"
 #include "apps/fly_links.hpp"
 #include "apps/input_kind.hpp"
+#include "apps/policy_flags.hpp"
 #include "apps/ros_flags.hpp"
 #include "apps/run_cost.hpp"
 #include "apps/scenario_command.hpp"
@@ -52,6 +53,7 @@ struct FlyFlags {
   bool no_scans = false;
   bool no_picture = false;
   bool json = false;
+  std::string policy;  ///< Path of a .npz; empty: none.
   RosFlags ros;
   ShareFlags share;
 };
@@ -261,6 +263,7 @@ std::vector<std::unique_ptr<FlightPart>> parts_of(const FlyFlags& flags, int thr
   const Existing existing = flags.force ? Existing::kReplace : Existing::kRefuse;
   std::vector<std::unique_ptr<FlightPart>> parts;
   parts.push_back(std::make_unique<SharePart>(flags.share, flags.output));
+  parts.push_back(std::make_unique<PolicyPart>(flags.policy));
   parts.push_back(std::make_unique<FolderPart>(
       FolderOptions{flags.output, existing, !flags.no_picture}, threads));
   parts.push_back(std::make_unique<TerminalPart>());
@@ -373,6 +376,7 @@ void add_fly_command(CLI::App& parent, int& exit_code) {
       flags->snapshot,
       "Take all beams of a scan from one pose, without motion distortion, as in the paper");
   app->footer("Example: pointflight fly forest.pfmap -o run --record run.mcap");
+  add_policy_flag(*app, flags->policy);
   add_ros_flags(*app, flags->ros);
   add_view_flags(*app, flags->ros.view);
   add_share_flags(*app, flags->share);

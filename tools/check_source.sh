@@ -24,7 +24,7 @@ allowed() {
     survey) echo "$ground map map/import map/edit render lidar" ;;
     fidelity) echo "$ground map render lidar survey" ;;
     sim) echo "$step" ;;
-    learn) echo "$ground map render lidar vehicle world" ;;
+    learn) echo "$step run" ;;
     run) echo "$step" ;;
     picture) echo "$step run survey fidelity" ;;
     ros/common) echo "$step run" ;;

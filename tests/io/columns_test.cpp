@@ -1,23 +1,24 @@
 // What columns of files mean, by their names and by what stands in them.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
-#include <zip.h>
-
-#include <cstring>
 
 #include "pointflight/io/internal/column_names.hpp"
 #include "tests/io/clouds.hpp"
+#include "tests/io/numpy_files.hpp"
 #include "tests/support.hpp"
 
 namespace pointflight {
 namespace {
 
+using testing::bytes_of;
 using testing::error_of;
 using testing::expect_contains;
 using testing::expect_points;
+using testing::npy;
 using testing::read_all;
 using testing::TemporaryFolder;
 using testing::write_file;
+using testing::write_npz;
 
 using Names = std::vector<std::string>;
 
@@ -150,13 +151,6 @@ TEST(Xyz, WhatWasGuessedIsSaid) {
   EXPECT_EQ(note("# x y z intensity\n1 2 3 4\n"), "");
 }
 
-template <class T>
-std::string bytes_of(const std::vector<T>& values) {
-  std::string bytes(values.size() * sizeof(T), '\0');
-  std::memcpy(bytes.data(), values.data(), bytes.size());
-  return bytes;
-}
-
 TEST(KittiBin, FourNumbersOrFive) {
   const TemporaryFolder folder;
   write_file(folder / "a.bin",
@@ -178,15 +172,6 @@ TEST(KittiBin, FourNumbersOrFive) {
   expect_contains(error_of([&] { read_all(folder / "c.bin"); }), "does not look like KITTI's");
   write_file(folder / "d.bin", std::string(16 * 100, '\0'));
   expect_contains(error_of([&] { read_all(folder / "d.bin"); }), "does not look like KITTI's");
-}
-
-std::string npy(std::string header, const std::string& data) {
-  header.resize((header.size() + 10 + 63) / 64 * 64 - 10, ' ');
-  std::string bytes = "\x93NUMPY\x01";
-  bytes += '\0';
-  bytes += static_cast<char>(header.size() & 0xffu);
-  bytes += static_cast<char>(header.size() >> 8);
-  return bytes + header + data;
 }
 
 TEST(Npy, ArraysOfAllOrders) {
@@ -246,18 +231,6 @@ TEST(Npy, BadFilesSayWhat) {
                   "no fields x, y and z; it has: a");
   write_file(folder / "b.npy", "PK and so on");
   expect_contains(error_of([&] { read_all(folder / "b.npy"); }), "does not begin as NumPy's");
-}
-
-/// Arrays by their names.
-void write_npz(const std::string& path, const std::map<std::string, std::string>& arrays) {
-  int error = 0;
-  zip_t* archive = zip_open(path.c_str(), ZIP_CREATE | ZIP_TRUNCATE, &error);
-  ASSERT_NE(archive, nullptr);
-  for (const auto& [name, bytes] : arrays) {
-    zip_source_t* source = zip_source_buffer(archive, bytes.data(), bytes.size(), 0);
-    ASSERT_GE(zip_file_add(archive, name.c_str(), source, 0), 0);
-  }
-  ASSERT_EQ(zip_close(archive), 0);
 }
 
 TEST(Npz, TheArrayOfPointsIsTaken) {

@@ -53,10 +53,11 @@ def beams_of(lidar: Optional[Lidar]) -> Tuple[NDArray[np.float32], NDArray[np.fl
     down, across = lidar.pool
     if down < 1 or across < 1:
         raise ValueError(f"lidar: pool of 1 beam or more, not {down} x {across}")
-    fine = (lidar.rows * down, lidar.columns * across)
+    rows, columns = lidar.rows, lidar.columns
+    fine = (rows * down, columns * across)
 
     def by_cell(values: NDArray[Any]) -> NDArray[np.float32]:
-        parts = values.reshape(lidar.rows, down, lidar.columns, across, -1).transpose(0, 2, 1, 3, 4)
+        parts = values.reshape(rows, down, columns, across, -1).transpose(0, 2, 1, 3, 4)
         return parts.reshape(fine[0] * fine[1], -1).astype(np.float32)
 
     directions = by_cell(_pointflight._grid(*fine, *lidar.elevation, *lidar.azimuth))

@@ -87,4 +87,5 @@ def deskewed(points: Floats, ages: Floats, body: Any) -> Floats:
     sine, cosine = np.sin(angle)[:, None], np.cos(angle)[:, None]
     along = (axis * points).sum(1, keepdims=True)
     turned = points * cosine + np.cross(axis, points) * sine + axis * along * (1.0 - cosine)  # Rodrigues
-    return turned - ages[:, None] * (back @ np.asarray(body.velocity, dtype=np.float64))
+    now: Floats = turned - ages[:, None] * (back @ np.asarray(body.velocity, dtype=np.float64))
+    return now

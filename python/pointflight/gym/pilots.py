@@ -82,15 +82,15 @@ def _free_ways(env: VectorEnv) -> Callable[[Observation], NDArray[np.float32]]:
     lidar = env.lidar
     if lidar is None:
         raise ValueError("this pilot flies by ranges: lidar")
-    azimuth = _azimuths(lidar)
+    azimuth, range_max = _azimuths(lidar), lidar.range_max
 
     def free_ways(seen: Observation) -> NDArray[np.float32]:
-        ranges = seen["range"].reshape(len(seen["range"]), -1) * lidar.range_max
+        ranges = seen["range"].reshape(len(seen["range"]), -1) * range_max
         half = np.arcsin(np.minimum(1.0, 0.6 / np.maximum(ranges, 1e-3)))
         free = np.full((len(ranges), 72), 20.0, np.float32)
         for k, way in enumerate(_WAYS):
             off = np.abs((azimuth[None, :] - way + np.pi) % (2 * np.pi) - np.pi)
-            in_way = (off <= half) & (ranges < 0.999 * lidar.range_max)
+            in_way = (off <= half) & (ranges < 0.999 * range_max)
             free[:, k] = np.where(in_way, ranges, 20.0).min(1)
         return free
 

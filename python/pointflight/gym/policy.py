@@ -40,13 +40,14 @@ class Policy:
     def load(path: Path) -> Policy:
         """Of a file that `save` wrote."""
         with np.load(path, allow_pickle=False) as file:
-            about = json.loads(str(file["about"]))
+            about = json.loads(file["about"].tobytes())
             layers = [(file[f"weight{i}"], file[f"bias{i}"]) for i in range(int(about["layers"]))]
         return Policy(layers, about)
 
     def save(self, path: Path) -> None:
-        """As .npz."""
-        arrays: Dict[str, Any] = {"about": np.array(json.dumps({**self.about, "layers": len(self.layers)}))}
+        """As .npz, which `pointflight fly --policy` flies, too."""
+        about = json.dumps({**self.about, "layers": len(self.layers)}).encode()
+        arrays: Dict[str, Any] = {"about": np.frombuffer(about, np.uint8)}
         for i, (weight, bias) in enumerate(self.layers):
             arrays[f"weight{i}"], arrays[f"bias{i}"] = weight, bias
         np.savez(path, **arrays)
