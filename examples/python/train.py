@@ -16,13 +16,18 @@ parser.add_argument("-o", dest="output", default="policy.npz")
 parser.add_argument("--task", default="goal", choices=TASKS)
 parser.add_argument("--seconds", type=float, default=400.0, help="of CPU")
 parser.add_argument("--seed", type=int, default=0)
+parser.add_argument("--obstacles", type=int, default=0, help="balls that fly to and fro below 5 m, in each map")
 args = parser.parse_args()
 torch.manual_seed(args.seed)
 torch.set_num_threads(1)
 pf.set_threads(1)
-N, T, GAMMA, BASE = 256, 32, 0.98, 0.8 if args.task in ("goal", "race") else 0.0
+N, T, GAMMA, BASE = 256, 32, 0.98, 0.0 if args.task in ("hover", "explore") else 0.8
 lidar = None if args.task == "hover" else Lidar(3, 60, (-0.26, 0.26), pool=(2, 2))
-env = VectorEnv(args.maps, N, task=args.task, lidar=lidar, autoreset="same_step", copy=False)
+low, high = pf.Map.open(args.maps[0]).bounds
+box = {"bounds_min": [*low[:2], low[2] + 0.5], "bounds_max": [*high[:2], low[2] + 5.0]}
+balls = {"count": args.obstacles, "speed": 0.5, "speed_max": 2.0, "directions": "horizontal", "at_border": "bounce", **box}
+place = {"task": args.task, "lidar": lidar, "scenario": {"obstacles": [balls] if args.obstacles else []}}
+env = VectorEnv(args.maps, N, **place, autoreset="same_step", copy=False)
 seen, _ = env.reset(seed=1_000_000 * args.seed)
 see = lambda: torch.from_numpy(features(seen, 10.0))  # noqa: E731
 x = see()
@@ -67,6 +72,6 @@ while (spent := time.process_time() - began - looking) < args.seconds:
         layers = [(m.weight.detach().numpy(), m.bias.detach().numpy()) for m in actor if isinstance(m, nn.Linear)]
         policy = Policy(layers, {**env.about(), "base": BASE, "seed": args.seed, "cpu_seconds": spent})
         policy.save(args.output)
-        test = VectorEnv(args.maps, 100, task=args.task, lidar=lidar, autoreset="disabled")
+        test = VectorEnv(args.maps, 100 * env.team, **place, autoreset="disabled")
         print(f"{spent:.0f} s: {evaluate(test, policy, range(20_000_000, 20_000_100))}", flush=True)
         looking += time.process_time() - looked

@@ -58,6 +58,8 @@ class PolynomialTrajectory : public Trajectory {
 
   [[nodiscard]] PositionCommand at(double t) const override;
   [[nodiscard]] double duration() const override { return duration_; }
+  /// As given.
+  [[nodiscard]] const std::vector<Piece>& pieces() const { return pieces_; }
 
  private:
   std::vector<Piece> pieces_;
@@ -83,6 +85,14 @@ class BSplineTrajectory : public Trajectory {
 
   [[nodiscard]] PositionCommand at(double t) const override;
   [[nodiscard]] double duration() const override { return end_ - begin_; }
+  /// Control points, as given.
+  [[nodiscard]] const std::vector<Eigen::Vector4d>& points() const {
+    return derivatives_[0].points;
+  }
+  /// As given.
+  [[nodiscard]] int degree() const { return derivatives_[0].degree; }
+  /// As given, or at equal intervals.
+  [[nodiscard]] const std::vector<double>& knots() const { return derivatives_[0].knots; }
 
  private:
   /// A spline's points and knots; derivatives are splines of one degree less.

@@ -46,6 +46,18 @@ std::vector<Pose> poses_from(const Array<double>& matrices, const char* name);
 /// One of (4, 4).
 Pose pose_from(const Array<double>& matrix, const char* name);
 
+/// A range in m as float. Throws ValueError unless it is above 0 and finite.
+float range_limit(double range_max);
+
+/// A unit vector of three numbers of any length. Throws ValueError.
+Vector3f direction_from(const double* at, const char* name);
+
+/// Rays (n, 3) each, of any length of their directions; one of either counts for all of the other.
+/// Throws ValueError.
+std::vector<Ray> rays_from(const Array<double>& origins,
+                           const Array<double>& directions,
+                           float range_max);
+
 /// An array that owns the vector's memory: nothing is copied.
 template <class T>
 py::array_t<T> array_of(std::vector<T> values, std::vector<py::ssize_t> shape) {

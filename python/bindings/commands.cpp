@@ -1,6 +1,7 @@
 // What vehicles are told: each command of vehicle/command.hpp as a class of its own.
 #include <pybind11/stl.h>
 
+#include <algorithm>
 #include <memory>
 #include <optional>
 #include <string>
@@ -14,9 +15,22 @@
 namespace pointflight::python {
 namespace {
 
+/// Its class, to be called with what its properties of these names say.
 template <class C>
-py::class_<C> command_class(py::module_& module, const char* name, const char* doc) {
+py::tuple again(const py::object& self, const std::vector<const char*>& names) {
+  py::list arguments;
+  for (const char* name : names) arguments.append(self.attr(name));
+  return py::make_tuple(py::type::of<C>(), py::tuple(arguments));
+}
+
+/// `names`: properties that are its constructor's arguments, in their order, for pickles.
+template <class C>
+py::class_<C> command_class(py::module_& module,
+                            const char* name,
+                            const char* doc,
+                            const std::vector<const char*>& names) {
   py::class_<C> bound(module, name, doc);
+  bound.def("__reduce__", [names](const py::object& self) { return again<C>(self, names); });
   bound.def("__repr__",
             [name](const C& /*command*/) { return "<" + std::string(name) + " command>"; });
   return bound;
@@ -36,7 +50,8 @@ void add_setpoints(py::module_& module) {
   command_class<RotorSpeedCommand>(module,
                                    "RotorSpeeds",
                                    "Speeds of all rotors, rad/s, in the order of the vehicle file. "
-                                   "Must be repeated, as all up to Position.")
+                                   "Must be repeated, as all up to Position.",
+                                   {"speeds"})
       .def(py::init([](const Array<double>& speeds) {
              require_shape(speeds, "speeds", {-1});
              return RotorSpeedCommand{{speeds.data(), speeds.data() + speeds.size()}};
@@ -49,7 +64,10 @@ void add_setpoints(py::module_& module) {
           },
           "(n,): rad/s.");
   command_class<BodyRateCommand>(
-      module, "BodyRates", "Rates about the body's axes (rad/s) and total thrust along body z (N).")
+      module,
+      "BodyRates",
+      "Rates about the body's axes (rad/s) and total thrust along body z (N).",
+      {"rates", "thrust"})
       .def(py::init([](const Array<double>& rates, double thrust) {
              return BodyRateCommand{vector_from(rates, "rates"), thrust};
            }),
@@ -64,7 +82,8 @@ void add_setpoints(py::module_& module) {
   command_class<AttitudeCommand>(
       module,
       "Attitude",
-      "Attitude (x, y, z, w) and total thrust along body z (N); rates (rad/s) are feed-forward.")
+      "Attitude (x, y, z, w) and total thrust along body z (N); rates (rad/s) are feed-forward.",
+      {"orientation", "thrust", "rates"})
       .def(
           py::init([](const Array<double>& orientation, double thrust, const Array<double>& rates) {
             require_shape(orientation, "orientation", {4});
@@ -89,7 +108,8 @@ void add_setpoints(py::module_& module) {
   command_class<AccelerationCommand>(module,
                                      "Acceleration",
                                      "Acceleration without gravity (zero hovers), m/s^2, world, "
-                                     "and heading, rad from world x towards y.")
+                                     "and heading, rad from world x towards y.",
+                                     {"acceleration", "yaw", "yaw_rate"})
       .def(py::init([](const Array<double>& acceleration, double yaw, double yaw_rate) {
              return AccelerationCommand{vector_from(acceleration, "acceleration"), yaw, yaw_rate};
            }),
@@ -108,7 +128,8 @@ void add_setpoints(py::module_& module) {
       module,
       "Velocity",
       "Velocity, m/s, world, or along the level body axes (ahead, left, up) with `in_body`. "
-      "Without `yaw` it turns at `yaw_rate` (rad/s) from its present heading on.")
+      "Without `yaw` it turns at `yaw_rate` (rad/s) from its present heading on.",
+      {"velocity", "yaw", "yaw_rate", "in_body"})
       .def(py::init([](const Array<double>& velocity,
                        const std::optional<double>& yaw,
                        double yaw_rate,
@@ -135,7 +156,8 @@ void add_setpoints(py::module_& module) {
   command_class<PositionCommand>(
       module,
       "Position",
-      "Where to be (m, world), and how to move there; derivatives are feed-forward.")
+      "Where to be (m, world), and how to move there; derivatives are feed-forward.",
+      {"position", "velocity", "acceleration", "yaw", "yaw_rate"})
       .def(py::init([](const Array<double>& position,
                        const Array<double>& velocity,
                        const Array<double>& acceleration,
@@ -180,6 +202,51 @@ TrajectoryCommand b_spline(const Array<double>& points, double interval, int deg
   return {BSplineTrajectory::uniform(std::move(rows), degree, interval)};
 }
 
+/// The same with knots of their own.
+TrajectoryCommand spline_with_knots(const Array<double>& points,
+                                    int degree,
+                                    const std::vector<double>& knots) {
+  require_shape(points, "points", {-1, 4});
+  std::vector<Eigen::Vector4d> rows;
+  for (py::ssize_t i = 0; i < points.shape(0); ++i) {
+    rows.emplace_back(points.at(i, 0), points.at(i, 1), points.at(i, 2), points.at(i, 3));
+  }
+  return {std::make_shared<BSplineTrajectory>(std::move(rows), degree, knots)};
+}
+
+/// What makes the same again, for pickles: a function of the class, and its arguments.
+py::tuple parts_of(const TrajectoryCommand& command) {
+  if (const auto* spline = dynamic_cast<const BSplineTrajectory*>(command.trajectory.get())) {
+    std::vector<double> rows;
+    for (const Eigen::Vector4d& p : spline->points()) rows.insert(rows.end(), p.begin(), p.end());
+    const auto count = static_cast<py::ssize_t>(spline->points().size());
+    return py::make_tuple(
+        "_spline",
+        py::make_tuple(
+            array_of(std::move(rows), {count, py::ssize_t{4}}), spline->degree(), spline->knots()));
+  }
+  const auto& pieces = dynamic_cast<const PolynomialTrajectory&>(*command.trajectory).pieces();
+  std::size_t powers = 0;
+  for (const auto& piece : pieces) {
+    for (const auto& axis : piece.coefficients) powers = std::max(powers, axis.size());
+  }
+  std::vector<double> durations;
+  std::vector<double> coefficients;
+  for (const auto& piece : pieces) {
+    durations.push_back(piece.duration);
+    for (const auto& axis : piece.coefficients) {
+      coefficients.insert(coefficients.end(), axis.begin(), axis.end());
+      coefficients.resize(coefficients.size() + powers - axis.size(), 0.0);
+    }
+  }
+  const auto count = static_cast<py::ssize_t>(pieces.size());
+  const auto width = static_cast<py::ssize_t>(powers);
+  return py::make_tuple(
+      "polynomials",
+      py::make_tuple(array_of(std::move(durations), {count}),
+                     array_of(std::move(coefficients), {count, py::ssize_t{4}, width})));
+}
+
 /// durations (n,), coefficients (n, 4, k): x, y, z, yaw by rising powers.
 TrajectoryCommand polynomials(const Array<double>& durations, const Array<double>& coefficients) {
   require_shape(durations, "durations", {-1});
@@ -201,7 +268,8 @@ TrajectoryCommand polynomials(const Array<double>& durations, const Array<double
 
 void add_commands(py::module_& module) {
   add_setpoints(module);
-  command_class<TrajectoryCommand>(module, "Trajectory", "A path in time, followed from now on.")
+  command_class<TrajectoryCommand>(
+      module, "Trajectory", "A path in time, followed from now on.", {})
       .def_static(
           "b_spline",
           &b_spline,
@@ -215,10 +283,16 @@ void add_commands(py::module_& module) {
                   py::arg("coefficients"),
                   "Pieces of durations (n,) in s, and coefficients (n, 4, k) of x, y, z, yaw by "
                   "rising powers of the time.")
+      .def_static(
+          "_spline", &spline_with_knots, py::arg("points"), py::arg("degree"), py::arg("knots"))
+      .def_property_readonly("_parts", &parts_of)
       .def_property_readonly(
           "duration", [](const TrajectoryCommand& c) { return c.trajectory->duration(); }, "s");
   command_class<WaypointCommand>(
-      module, "Waypoints", "Fly through points (n, 3), m, world, straight and at rest at each.")
+      module,
+      "Waypoints",
+      "Fly through points (n, 3), m, world, straight and at rest at each.",
+      {"points", "speed"})
       .def(py::init([](const Array<double>& points, double speed) {
              WaypointCommand command;
              command.mission.waypoints = rows_from(points, "points");
@@ -226,22 +300,45 @@ void add_commands(py::module_& module) {
              return command;
            }),
            py::arg("points"),
-           py::arg("speed") = MotionLimits{}.speed);
-  command_class<TakeOffCommand>(
-      module, "TakeOff", "Rise by `height` (m) from the present position; arms.")
+           py::arg("speed") = MotionLimits{}.speed)
+      .def_property_readonly(
+          "points",
+          [](const WaypointCommand& c) {
+            std::vector<double> rows;
+            for (const Vector3d& p : c.mission.waypoints)
+              rows.insert(rows.end(), p.begin(), p.end());
+            const auto count = static_cast<py::ssize_t>(c.mission.waypoints.size());
+            return array_of(std::move(rows), {count, py::ssize_t{3}});
+          },
+          "(n, 3): m, world.")
+      .def_property_readonly(
+          "speed", [](const WaypointCommand& c) { return c.mission.motion.speed; }, "m/s");
+  command_class<TakeOffCommand>(module,
+                                "TakeOff",
+                                "Rise by `height` (m) from the present position; arms.",
+                                {"height", "speed"})
       .def(py::init([](double height, double speed) {
              return TakeOffCommand{height, speed};
            }),
            py::arg("height") = TakeOffCommand{}.height,
-           py::arg("speed") = TakeOffCommand{}.speed);
-  command_class<LandCommand>(
-      module, "Land", "Come down until something carries the vehicle, then stop the rotors.")
+           py::arg("speed") = TakeOffCommand{}.speed)
+      .def_property_readonly(
+          "height", [](const TakeOffCommand& c) { return c.height; }, "m")
+      .def_property_readonly(
+          "speed", [](const TakeOffCommand& c) { return c.speed; }, "m/s");
+  command_class<LandCommand>(module,
+                             "Land",
+                             "Come down until something carries the vehicle, then stop the rotors.",
+                             {"speed"})
       .def(py::init([](double speed) { return LandCommand{speed}; }),
-           py::arg("speed") = LandCommand{}.speed);
-  command_class<HoverCommand>(module, "Hover", "Brake and stay.").def(py::init<>());
-  command_class<ArmCommand>(module, "Arm", "Rotors idle on the ground; in the air: hover.")
+           py::arg("speed") = LandCommand{}.speed)
+      .def_property_readonly(
+          "speed", [](const LandCommand& c) { return c.speed; }, "m/s");
+  command_class<HoverCommand>(module, "Hover", "Brake and stay.", {}).def(py::init<>());
+  command_class<ArmCommand>(module, "Arm", "Rotors idle on the ground; in the air: hover.", {})
       .def(py::init<>());
-  command_class<DisarmCommand>(module, "Disarm", "Rotors off, wherever it is.").def(py::init<>());
+  command_class<DisarmCommand>(module, "Disarm", "Rotors off, wherever it is.", {})
+      .def(py::init<>());
 }
 
 }  // namespace pointflight::python

@@ -35,6 +35,7 @@ void add_all(py::module_& module) {
   add_simulation(module);
   add_parts(module);
   add_flights(module);
+  add_fidelity(module);
 }
 
 }  // namespace

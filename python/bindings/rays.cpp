@@ -19,45 +19,6 @@ namespace {
 
 constexpr double kNoHit = std::numeric_limits<double>::infinity();
 
-float range_limit(double range_max) {
-  if (!(range_max > 0.0)) throw py::value_error("range_max: above 0 m is wanted");
-  return static_cast<float>(std::min(range_max, 1e9));
-}
-
-/// A unit vector of a direction of any length. Throws ValueError.
-Vector3f direction_from(const double* at, const char* name) {
-  const Vector3d direction(at[0], at[1], at[2]);
-  const double length = direction.norm();
-  if (!(length > 0.0) || !std::isfinite(length)) {
-    throw py::value_error(std::string(name) + ": a direction is zero or not finite");
-  }
-  return (direction / length).cast<float>();
-}
-
-/// Rays from origins along directions, which are as many, or one for all.
-std::vector<Ray> rays_from(const Array<double>& origins,
-                           const Array<double>& directions,
-                           float range_max) {
-  const auto starts = static_cast<std::size_t>(origins.shape(0));
-  const auto ways = static_cast<std::size_t>(directions.shape(0));
-  if (starts != ways && starts != 1 && ways != 1) {
-    throw py::value_error(
-        "origins, directions: as many of one as of the other are wanted, or one: not " +
-        std::to_string(starts) + " and " + std::to_string(ways));
-  }
-  const std::size_t count = starts == 0 || ways == 0 ? 0 : std::max(starts, ways);
-  std::vector<Ray> rays(count);
-  for (std::size_t i = 0; i < count; ++i) {
-    const double* from = origins.data() + (starts == 1 ? 0 : 3 * i);
-    rays[i].origin_world = {from[0], from[1], from[2]};
-    if (!rays[i].origin_world.allFinite()) throw py::value_error("origins: one is not finite");
-    rays[i].direction_world =
-        direction_from(directions.data() + (ways == 1 ? 0 : 3 * i), "directions");
-    rays[i].range_max = range_max;
-  }
-  return rays;
-}
-
 /// Normals towards the rays' origins, world frame.
 void write_normals(const SurfelMap& map,
                    std::span<const Ray> rays,

@@ -23,5 +23,6 @@ void add_samples(pybind11::module_& module);
 void add_simulation(pybind11::module_& module);
 void add_parts(pybind11::module_& module);
 void add_flights(pybind11::module_& module);
+void add_fidelity(pybind11::module_& module);
 
 }  // namespace pointflight::python

@@ -7,12 +7,15 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
+#include "pointflight/run/run_loop.hpp"
 #include "pointflight/sim/flight_recorder.hpp"
 #include "pointflight/sim/run_summary.hpp"
 #include "python/bindings/arrays.hpp"
+#include "python/bindings/link.hpp"
 #include "python/bindings/map_object.hpp"
 #include "python/bindings/run_objects.hpp"
 #include "python/bindings/work.hpp"
@@ -50,6 +53,16 @@ class Collector : public SampleSink {
   std::vector<Sample> samples_;
 };
 
+/// The files of a run beside its other links.
+class RecorderLink : public Link {
+ public:
+  explicit RecorderLink(FlightRecorder& recorder) : recorder_(recorder) {}
+  void on_sample(const Sample& sample) override { recorder_.on_sample(sample); }
+
+ private:
+  FlightRecorder& recorder_;
+};
+
 /// A run as Python holds it. Calls from two threads at once are refused, since a step lets go of
 /// the interpreter's lock.
 class SimulationObject {
@@ -81,6 +94,32 @@ class SimulationObject {
       } while (simulation_.time() < SimTime(Duration(until)));
     }
     return collector.take();
+  }
+
+  /// To its end, with links that are given as (object, kinds, kinds that ask).
+  void run(const std::vector<std::tuple<py::object, std::uint32_t, std::uint32_t>>& links,
+           double rate,
+           double lockstep) {
+    const InUse guard(*this);
+    require_sound();
+    std::vector<std::unique_ptr<Link>> parties;
+    for (const auto& [link, kinds, asked] : links) {
+      parties.push_back(std::make_unique<PythonLink>(link, kinds, asked));
+    }
+    if (recorder_) parties.push_back(std::make_unique<RecorderLink>(*recorder_));
+    RunOptions options;
+    options.rate = rate;
+    options.lockstep = lockstep;
+    options.interrupted = [] {
+      check_signals();
+      return false;
+    };
+    const py::gil_scoped_release unlocked;
+    RunLoop loop(simulation_, options);
+    for (const auto& party : parties) loop.add(*party);
+    failed_ = true;  // unless it comes to its end
+    loop.run();
+    failed_ = false;
   }
 
   std::optional<std::string> command(std::size_t vehicle, const Command& command) {
@@ -197,18 +236,11 @@ py::list sensors_of(SimulationObject& object, std::size_t vehicle) {
 
 void add_simulation(py::module_& module) {
   using Object = SimulationObject;
-  py::class_<StateObject>(
-      module, "SimulationState", "All that changes of a run, as `Simulation.state` gives it.")
-      .def_property_readonly(
-          "time",
-          [](const StateObject& s) { return to_seconds(s.state.time); },
-          "Start of the next step, s.")
-      .def("__repr__", [](const StateObject& s) {
-        return "<SimulationState at " + std::to_string(to_seconds(s.state.time)) + " s>";
-      });
+  py::class_<StateObject>(module, "_State");
   py::class_<Object, std::shared_ptr<Object>>(module, "_Simulation")
       .def(py::init(&make_simulation), py::arg("scenario"), py::arg("map"))
       .def("advance", &Object::advance, py::arg("until"), py::arg("kinds"))
+      .def("run", &Object::run, py::arg("links"), py::arg("rate"), py::arg("lockstep"))
       .def("command", &Object::command, py::arg("vehicle"), py::arg("command"))
       .def("state", &Object::state)
       .def("restore", &Object::restore, py::arg("state"))

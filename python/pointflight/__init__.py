@@ -28,7 +28,6 @@ from ._pointflight import (
     RotorSpeeds,
     ScanSample,
     SensorInput,
-    SimulationState,
     StateSample,
     StatusSample,
     TakeOff,
@@ -40,6 +39,7 @@ from ._pointflight import (
     threads,
     __version__,
 )
+from .fidelity import Comparison, Scene, compare, fidelity
 from .lidar import Beams, Lidar, Scan
 from .map import Map, MapInfo
 from .parts import Controller, add_controller, add_renderer, add_sensor
@@ -47,7 +47,7 @@ from .poses import grid, pose
 from .rays import Hits, ranges, raycast
 from .runs import DataSet, Flight, Run, RunScan, Scans, columns, poses_of, read_pcd, read_table
 from .settings import Scenario, Vehicle
-from .simulation import Command, CommandRejected, Recording, Sample, Simulation
+from .simulation import Command, CommandRejected, Link, Recording, Sample, Simulation, SimulationState
 
 _data = _os.path.join(_os.path.dirname(_os.path.abspath(__file__)), "data")
 if _os.path.isdir(_data):  # a wheel has it
@@ -63,6 +63,7 @@ __all__ = [
     "CollisionEvent",
     "Command",
     "CommandRejected",
+    "Comparison",
     "Controller",
     "ControllerMemory",
     "DataSet",
@@ -74,6 +75,7 @@ __all__ = [
     "InputError",
     "Land",
     "Lidar",
+    "Link",
     "Map",
     "MapInfo",
     "Measurement",
@@ -89,6 +91,7 @@ __all__ = [
     "ScanSample",
     "Scans",
     "Scenario",
+    "Scene",
     "SensorInput",
     "Simulation",
     "SimulationState",
@@ -105,6 +108,8 @@ __all__ = [
     "add_renderer",
     "add_sensor",
     "columns",
+    "compare",
+    "fidelity",
     "grid",
     "pose",
     "poses_of",

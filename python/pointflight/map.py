@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import os
+import pickle
 import tempfile
 from typing import Any, Callable, Iterable, Optional, Sequence, Tuple, Union
 
@@ -115,6 +116,11 @@ class Map:
     def words(self) -> NDArray[np.uint64]:
         """(m,): the packed surfels with the headers of their leaves, as the file has them: a read-only view."""
         return self._handle.words
+
+    def __reduce__(self) -> Any:
+        if not os.path.isfile(self._handle.name):
+            raise pickle.PicklingError(f"{self!r}: only maps in files can be pickled")
+        return Map.open, (os.path.abspath(self._handle.name),)
 
     def __len__(self) -> int:
         """How many surfels it has."""

@@ -105,6 +105,9 @@ class Scenario:
             _set(values, key, value)
         return Scenario.parse(json.dumps(values, default=_plain), self.path)
 
+    def __reduce__(self) -> Any:
+        return Scenario.parse, (self.text, self.path)
+
     def __getitem__(self, key: str) -> Any:
         """A copy of one key's value: "seed", "vehicles"."""
         return self.values[key]

@@ -1,6 +1,5 @@
 """Flights: the files of the program, states, forks, commands, samples, misuse."""
 
-import copy
 import gc
 import itertools
 import os
@@ -262,7 +261,6 @@ class SimulationTest(unittest.TestCase):
             lambda: sim.restore(None),
             lambda: sim.restore(5),
             lambda: pf.SimulationState(),
-            lambda: copy.copy(sim.state()),
             lambda: pf.Simulation(None),
             lambda: pf.Simulation({}, 5),
         ):
