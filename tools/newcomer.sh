@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# A bare Debian in which a new user follows the docs and nothing else: the demo, an own cloud to a flight, an own
+# A bare Debian in which a new user follows the docs and nothing else: the demo, an own cloud to a flight, Python, an own
 # sensor, an own vehicle, an own planner from an installed prefix.
 # usage: newcomer.sh [12|13 [FOLDER [test]]]   (root; the tree is kept in FOLDER for a next time, else made anew; with
 # `test` also ./dev test there)
@@ -71,6 +71,11 @@ pointflight map info hall.pfmap --png hall.png
 pointflight fly hall.pfmap -o run
 pointflight fly run/scenario.yaml -o again
 diff -r -x timing.json run again
+# from Python, with numpy alone: docs/python.md
+PYTHONPATH=pointflight/build/release/python /usr/bin/python3 -c 'import re, sys
+page = open("pointflight/docs/python.md").read()
+exec(re.search(r"```python\n(.*?)```", page, re.S)[1].replace("forest.pfmap", "hall.pfmap").replace("28, 14", "10, 7"))'
+PYTHONPATH=pointflight/build/release/python /usr/bin/python3 pointflight/examples/python/own_map.py hall.xyz hall2.pfmap
 # an own sensor and vehicle, a planner outside of the tree: their pages, block by block
 cd pointflight
 apt-get -qq install -y --no-install-recommends python3 >/dev/null  # runs the blocks

@@ -1,4 +1,4 @@
-"""Flies a policy of train.py in the full simulation: 1 ms steps, the cascade, scans of a VLP-16 with its noise, rolling.
+"""Flies a policy of train.py in the full simulation: 1 ms steps, the cascade, rolling scans of a VLP-16 with noise.
 
     python3 fly_policy.py policy.npz MAP...     one flight in each, from and to where an environment's would go
 """

@@ -161,8 +161,8 @@ class Map:
         start: Optional[Sequence[float]] = None,
     ) -> NDArray[np.float64]:
         """Corners (k, 3), world, m, of a way of straight legs through free space, of at least this length if the map
-        allows, along which a ball of `radius` has `margin` left: what `pointflight fly MAP` flies. start: (3,), where it
-        begins. Raises ValueError if no position is free."""
+        allows, along which a ball of `radius` has `margin` left: what `pointflight fly MAP` flies. start: (3,), where
+        it begins. Raises ValueError if no position is free."""
         found = self._handle._tour(length, radius, margin, None if start is None else [float(v) for v in start])
         if len(found) == 0:
             raise ValueError(f"{self!r}: no position is free by {radius + margin} m")

@@ -113,7 +113,9 @@ class SimulationState:
     """All that changes of a run, as `Simulation.state` gives it. A pickled one is the commands that led to it: to
     restore it the run is flown again up to there."""
 
-    def __init__(self, scenario: Scenario, log: Optional[_Log], time_ns: int, handle: Optional[_pointflight._State]) -> None:
+    def __init__(
+        self, scenario: Scenario, log: Optional[_Log], time_ns: int, handle: Optional[_pointflight._State]
+    ) -> None:
         """Of `Simulation.state`."""
         self._scenario, self._log, self._time_ns, self._handle = scenario, log, time_ns, handle
 

@@ -9,7 +9,7 @@ import unittest
 from support import folder, path_of, run
 
 SOURCE = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..")
-PAGES = [os.path.join(SOURCE, "README.md"), os.path.join(SOURCE, "docs", "python.md")]
+PAGES = [os.path.join(SOURCE, *page) for page in (("README.md",), ("docs", "python.md"), ("docs", "learning.md"))]
 
 
 class DocsTest(unittest.TestCase):

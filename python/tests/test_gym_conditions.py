@@ -7,7 +7,7 @@ import numpy as np
 import pointflight as pf
 from gym_check import check_env, check_vector, same
 from pointflight.gym import (
-    Corridor, Env, Explore, Formation, Goal, Hover, Lidar, VectorEnv, evaluate, hold, in_formation, straight, wander,
+    Corridor, Env, Explore, Formation, Goal, Hover, Lidar, ParallelEnv, VectorEnv, evaluate, hold, in_formation, straight, wander,
 )  # fmt: skip
 from support import room
 
@@ -203,6 +203,33 @@ class ConditionsTest(unittest.TestCase):
         self.assertTrue(same(tour, room().tour(length=6.0, margin=0.3)))
         with self.assertRaisesRegex(ValueError, "no position is free"):
             room().tour(margin=3.0)
+
+    def test_agents_of_a_team(self) -> None:
+        env = ParallelEnv(room(), task=formation(), lidar=SMALL)
+        self.assertEqual(env.possible_agents, ["drone0", "drone1", "drone2", "drone3"])
+        with self.assertRaisesRegex(RuntimeError, "reset"):
+            env.step({})
+        seen, infos = env.reset(seed=3)
+        twin = some(formation, count=4)
+        expected, _ = twin.reset(seed=3)
+        self.assertEqual(set(seen), set(env.agents), set(infos))
+        random = np.random.default_rng(0)
+        while env.agents:
+            actions = {agent: random.uniform(-0.3, 0.3, 4) for agent in env.agents}
+            for agent, observation in seen.items():
+                self.assertTrue(env.observation_space(agent).contains(observation))
+            seen, rewards, ends, cuts, infos = env.step(actions)
+            expected, reward, terminated, truncated, _ = twin.step(np.stack(list(actions.values())))
+            for i, agent in enumerate(env.possible_agents):
+                self.assertTrue(same(seen[agent]["range"], np.ascontiguousarray(expected["range"][i])))
+                self.assertEqual((rewards[agent], ends[agent], cuts[agent]), (reward[i], terminated[i], truncated[i]))
+                self.assertIn("collided", infos[agent])
+        self.assertTrue(all(ends.values()) or all(cuts.values()))
+        env.reset()
+        with self.assertRaisesRegex(ValueError, "drone3"):
+            env.step({"drone0": np.zeros(4)})
+        two = ParallelEnv(room(), task=goal(), lidar=None, team=2)
+        self.assertEqual(len(two.reset(seed=0)[0]), 2)
 
     def test_pilots(self) -> None:
         still = VectorEnv(room(), 8, task=Hover(displacement=0.3, height=(1, 2), clearance=0.8), lidar=None, autoreset="disabled")

@@ -1,6 +1,7 @@
-"""Learning to fly by what a LiDAR sees, in maps of real places: gymnasium's interfaces, `VectorEnv` and `Env`.
+"""Learning to fly by what a LiDAR sees, in maps of real places: gymnasium's interfaces, `VectorEnv` and `Env`, and
+PettingZoo's, `ParallelEnv`.
 
-gymnasium is not needed; where it is installed, spaces and base classes are its own.
+Neither is needed; where they are installed, spaces and base classes are theirs.
 """
 
 from .conditions import Conditions
@@ -9,6 +10,7 @@ from .env import Env
 from .evaluation import Score, advantages, evaluate, wilson
 from .images import Lidar
 from .observer import Observer
+from .parallel import ParallelEnv
 from .pilots import hold, in_formation, reactive, straight, wander
 from .policy import Policy, features
 from .tasks import Explore, Goal, Hover, Outcome, Race, States, Task
@@ -26,6 +28,7 @@ __all__ = [
     "Lidar",
     "Observer",
     "Outcome",
+    "ParallelEnv",
     "Policy",
     "Race",
     "Score",

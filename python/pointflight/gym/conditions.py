@@ -30,8 +30,8 @@ class Conditions:
         num_envs: int,
         team: int,
     ) -> None:
-        """scenario: "obstacles", "air" and "faults" (rotor, lidar, scan_drop) as a scenario file has them, and the "seed"
-        of the obstacles. vary: least and greatest by key: "air.wind.mean" (3 each), "faults[0].from", ".until" or
+        """scenario: "obstacles", "air" and "faults" (rotor, lidar, scan_drop) as a scenario file has them, and the
+        "seed" of the obstacles. vary: least and greatest by key: "air.wind.mean" (3 each), "faults[0].from", ".until" or
         ".value", and "mass", a share of the vehicle file's, which its controller knows nothing of."""
         for key in scenario:
             if key not in _KEYS:
@@ -41,7 +41,8 @@ class Conditions:
         self.faults: List[Dict[str, Any]] = values.get("faults", [])
         for i, fault in enumerate(self.faults):
             if fault["kind"] not in _FAULTS:
-                raise ValueError(f"faults[{i}].kind: {', '.join(_FAULTS)} have an effect here, {fault['kind']!r} has none")
+                kind = fault["kind"]
+                raise ValueError(f"faults[{i}].kind: {', '.join(_FAULTS)} have an effect here, {kind!r} has none")
         self.has_obstacles = bool(values.get("obstacles"))
         self._team = team
         wind = values["air"]["wind"]["mean"]
@@ -59,7 +60,7 @@ class Conditions:
             ends = [np.atleast_1d(np.asarray(end, np.float64)) for end in vary.get(key, (value, value))]
             size = np.atleast_1d(np.asarray(value)).shape
             if len(ends) != 2 or any(end.shape != size or not np.isfinite(end).all() for end in ends):
-                raise ValueError(f"vary: {key!r}: its least and its greatest value, of {size[0]} numbers each, are wanted")
+                raise ValueError(f"vary: {key!r}: its least and its greatest value are wanted, {size[0]} numbers each")
             self._columns[key] = slice(len(low), len(low) + size[0])
             low += list(ends[0])
             high += list(ends[1])

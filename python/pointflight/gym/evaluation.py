@@ -35,8 +35,8 @@ class Score(NamedTuple):
     def __str__(self) -> str:
         low, high = self.interval
         return (
-            f"{self.arrived} of {self.flights} arrive ({100 * low:.0f} to {100 * high:.0f} %), {self.collided} collide, "
-            f"{self.seconds:.1f} s, reward {self.reward:.2f}"
+            f"{self.arrived} of {self.flights} arrive ({100 * low:.0f} to {100 * high:.0f} %), "
+            f"{self.collided} collide, {self.seconds:.1f} s, reward {self.reward:.2f}"
         )
 
 
@@ -49,7 +49,7 @@ def wilson(hits: int, count: int, z: float = 1.96) -> Tuple[float, float]:
 
 
 def evaluate(env: VectorEnv, pilot: Pilot, seeds: Sequence[int]) -> Score:
-    """One flight on each seed; the environment has as many vehicles, or teams, as there are seeds. A team counts once."""
+    """One flight on each seed; the environment has as many vehicles or teams as there are seeds. A team counts once."""
     count, teams = env.num_envs, env.num_envs // env.team
     if len(seeds) != teams:
         raise ValueError(f"seeds: {teams} are wanted, one for each environment")
