@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "pointflight/core/settings.hpp"
+#include "pointflight/core/settings_json.hpp"
 #include "pointflight/lidar/scan.hpp"
 #include "python/bindings/arrays.hpp"
 #include "python/bindings/map_object.hpp"
@@ -85,6 +86,14 @@ class LidarObject {
     return writer.text();
   }
 
+  /// The same as JSON.
+  [[nodiscard]] std::string json() const {
+    LidarSettings written = settings_;
+    SettingsJson visitor;
+    describe(visitor, written);
+    return visitor.text();
+  }
+
  private:
   LidarSettings settings_;
   std::shared_ptr<const ScanBeams> beams_;
@@ -110,6 +119,7 @@ void add_lidar(py::module_& module) {
       .def_property_readonly("title", [](const LidarObject& l) { return l.settings().title; })
       .def_property_readonly("rate", [](const LidarObject& l) { return l.settings().rate; })
       .def_property_readonly("text", &LidarObject::text)
+      .def_property_readonly("json", &LidarObject::json)
       .def("scan",
            &LidarObject::scan,
            py::arg("map"),

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import os
-from typing import Any, List, NamedTuple, Tuple, Union
+from typing import Any, Dict, List, NamedTuple, Tuple, Union
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -62,7 +63,8 @@ class Lidar:
     def __init__(self, name: Union[str, "os.PathLike[str]"]) -> None:
         """name: "mid360", or the path of a sensor file (.yaml), of Ouster's metadata (.json) or of a table of
         directions (.csv). Raises InputError that lists the names."""
-        self._handle = _pointflight._Lidar(os.fspath(name))
+        self._name = os.fspath(name)
+        self._handle = _pointflight._Lidar(self._name)
 
     @property
     def title(self) -> str:
@@ -78,6 +80,14 @@ class Lidar:
     def text(self) -> str:
         """The sensor file with all its keys, YAML."""
         return self._handle.text
+
+    @property
+    def values(self) -> Dict[str, Any]:
+        """A copy of all its keys (docs/sensors.md), as nested dicts and lists."""
+        return dict(json.loads(self._handle.json))
+
+    def __reduce__(self) -> Any:
+        return Lidar, (self._name,)
 
     def __repr__(self) -> str:
         return f"<Lidar {self.title}>"

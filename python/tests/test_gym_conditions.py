@@ -7,7 +7,8 @@ import numpy as np
 import pointflight as pf
 from gym_check import check_env, check_vector, same
 from pointflight.gym import (
-    Corridor, Env, Explore, Formation, Goal, Hover, Lidar, ParallelEnv, VectorEnv, evaluate, hold, in_formation, straight, wander,
+    Corridor, Env, Explore, Formation, Goal, Hover, Lidar, ParallelEnv, VectorEnv, evaluate, hold, in_formation, lidar_of,
+    straight, wander,
 )  # fmt: skip
 from support import room
 
@@ -203,6 +204,18 @@ class ConditionsTest(unittest.TestCase):
         self.assertTrue(same(tour, room().tour(length=6.0, margin=0.3)))
         with self.assertRaisesRegex(ValueError, "no position is free"):
             room().tour(margin=3.0)
+
+    def test_a_sensor_s_field_of_view_and_noise(self) -> None:
+        lidar = lidar_of("mid360", 4, 24, noise=0.05)
+        self.assertEqual((lidar.rows, lidar.columns, lidar.noise, lidar.range_max), (4, 24, 0.05, 10.0))
+        self.assertEqual(lidar.azimuth, (-np.pi, np.pi))
+        self.assertAlmostEqual(np.degrees(lidar.elevation[0]), -7.2, delta=1.0)
+        self.assertAlmostEqual(np.degrees(lidar.elevation[1]), 52.2, delta=1.0)
+        avia = lidar_of(pf.Lidar("avia"))
+        self.assertEqual(avia.noise, pf.Lidar("avia").values["noise"]["range_sigma"])
+        self.assertLess(avia.azimuth[1], np.radians(40))
+        seen = VectorEnv(room(), 2, task=goal(), lidar=avia).reset(seed=0)[0]["range"]
+        self.assertEqual(seen.shape, (2, 16, 64))
 
     def test_agents_of_a_team(self) -> None:
         env = ParallelEnv(room(), task=formation(), lidar=SMALL)

@@ -8,7 +8,7 @@ from .conditions import Conditions
 from .courses import TASKS, Corridor, Formation
 from .env import Env
 from .evaluation import Score, advantages, evaluate, wilson
-from .images import Lidar
+from .images import Lidar, lidar_of
 from .observer import Observer
 from .parallel import ParallelEnv
 from .pilots import hold, in_formation, reactive, straight, wander
@@ -41,6 +41,7 @@ __all__ = [
     "features",
     "hold",
     "in_formation",
+    "lidar_of",
     "reactive",
     "straight",
     "wander",

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Dict, NamedTuple, Optional, Tuple
+from typing import Any, Dict, NamedTuple, Optional, Tuple, Union
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .. import _pointflight
+from ..lidar import Lidar as Sensor
 from .draws import NOISE, draws
 
 Observation = Dict[str, NDArray[np.float32]]
@@ -35,6 +36,25 @@ class Lidar(NamedTuple):
     """Standard deviation of ranges, m; bell-shaped, at most 3.46 of it."""
     dropout: float = 0.0
     """Share of cells that see nothing."""
+
+
+def lidar_of(sensor: Union[str, Sensor], rows: int = 16, columns: int = 64, **others: Any) -> Lidar:
+    """The field of view and the noise of a sensor file (a name, a path or a `pointflight.Lidar`), seen as an image of
+    so many cells. others: of `Lidar`; range_max is 10 m at most unless it is given."""
+    sensor = sensor if isinstance(sensor, Sensor) else Sensor(sensor)
+    directions = sensor.beams().direction.astype(np.float64)
+    up = np.arcsin(np.clip(directions[:, 2], -1.0, 1.0))
+    around = np.arctan2(directions[:, 1], directions[:, 0])
+    whole = bool((np.diff(np.sort(around)) < math.radians(10)).all() and np.ptp(around) > math.radians(350))
+    values = sensor.values
+    given: Dict[str, Any] = {
+        "elevation": (float(up.min()), float(up.max())),
+        "azimuth": (-math.pi, math.pi) if whole else (float(around.min()), float(around.max())),
+        "range_max": min(10.0, values["range_max"]),
+        "noise": values["noise"]["range_sigma"],
+        "rolling": True,
+    }
+    return Lidar(rows, columns, **{**given, **others})
 
 
 def grid_of(lidar: Lidar) -> NDArray[np.float64]:
