@@ -105,6 +105,13 @@ void describe_airframe(SettingsVisitor& v, VehicleSetup& s) {
            s.on_collision,
            kReactions);
   v.choice({"controller", "", "vehicle: the one of its file"}, s.controller, "vehicle");
+  v.value(
+      {"control_period",
+       "s",
+       "of its controllers, whole physics steps, over which rotor commands are held; 0: each step",
+       0,
+       0.1},
+      s.control_period);
   v.value({"command_timeout", "s", "hover without a command for so long; 0: never", 0, 3600},
           s.command_timeout);
   v.value({"battery", "", "fly on the vehicle's battery"}, s.battery);

@@ -88,8 +88,10 @@ struct VehicleSetup {
   Vector3d copy_offset =
       Vector3d(0.0, 2.0, 0.0);  ///< Of start and waypoints, from copy to copy, m.
   std::int64_t seed = -1;       ///< Of its sensors and gusts; -1: the run's.
-  CollisionReaction on_collision = CollisionReaction::kReport;    ///< What it does then.
-  std::optional<Choice<ControllerKind>> controller;               ///< Instead of its file's.
+  CollisionReaction on_collision = CollisionReaction::kReport;  ///< What it does then.
+  std::optional<Choice<ControllerKind>> controller;             ///< Instead of its file's.
+  /// Of its controllers, s, whole physics steps, over which rotor commands are held; 0: each step.
+  double control_period = 0.0;
   double command_timeout = 0.5;                                   ///< s; 0: commands hold for ever.
   bool battery = false;                                           ///< Fly on the vehicle's battery.
   LowBatteryReaction on_low_battery = LowBatteryReaction::kLand;  ///< At its reserve.

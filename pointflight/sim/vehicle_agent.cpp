@@ -79,8 +79,11 @@ void VehicleAgent::control(VehicleStatus& status,
     shares.push_back(faults_.rotor_share(i, now));
   }
   if (settings().controller.reallocate) status.autopilot.memory.rotor_shares = shares;
-  status.rotor_commands =
-      autopilot_.rotor_speeds(status.autopilot, believed(status), status.landed, now, dt);
+  if (step_number % control_steps_ == 0) {
+    const double period = static_cast<double>(control_steps_) * dt;
+    status.rotor_commands =
+        autopilot_.rotor_speeds(status.autopilot, believed(status), status.landed, now, period);
+  }
   if (status.autopilot.memory.spins) come_down_spinning(status, now);
 
   const double error = (body.p_world - status.autopilot.reference.p_world).norm();

@@ -209,6 +209,7 @@ class VehicleAgent {
   std::uint64_t seed_;
   Multirotor dynamics_;
   Autopilot autopilot_;
+  std::uint64_t control_steps_;  ///< Physics steps in a control period.
   Battery battery_;
   Wind wind_;
   Faults faults_;

@@ -1,6 +1,7 @@
 // A vehicle as its scenario has it: model, sensors, faults, commands.
 #include <fmt/format.h>
 
+#include <cmath>
 #include <filesystem>
 #include <stdexcept>
 #include <utility>
@@ -56,6 +57,21 @@ VehicleSettings settings_of(const Scenario& scenario,
   return s;
 }
 
+/// Physics steps in a control period.
+std::uint64_t control_steps(const Scenario& scenario,
+                            std::size_t number,
+                            const VehicleSetup& setup) {
+  if (setup.control_period == 0.0) return 1;
+  const double count = std::round(setup.control_period / scenario.physics_step);
+  if (count < 1.0 || std::abs(count * scenario.physics_step - setup.control_period) > 1e-9) {
+    throw InputError(fmt::format("{}: {} s are no whole number of physics steps of {} s",
+                                 scenario.location(scenario.vehicle_key(number, "control_period")),
+                                 setup.control_period,
+                                 scenario.physics_step));
+  }
+  return static_cast<std::uint64_t>(count);
+}
+
 }  // namespace
 
 VehicleAgent::VehicleAgent(const Scenario& scenario,
@@ -67,6 +83,7 @@ VehicleAgent::VehicleAgent(const Scenario& scenario,
       seed_(static_cast<std::uint64_t>(setup.seed >= 0 ? setup.seed : scenario.seed)),
       dynamics_(settings_of(scenario, number, setup)),
       autopilot_(dynamics_.settings(), from_seconds(setup.command_timeout)),
+      control_steps_(control_steps(scenario, number, setup)),
       battery_(dynamics_.settings()),
       wind_(scenario.air.wind, seed_),
       faults_(setup.faults),

@@ -252,6 +252,29 @@ class SimulationTest(unittest.TestCase):
         thread.join()
         self.assertGreater(count[0], 20)
 
+    def test_control_period(self) -> None:
+        def flown(period: float) -> np.ndarray:
+            keys = {"control_period": period} if period else {}
+            sim = pf.Simulation(
+                {"map": path_of("room.pfmap"), "lidars": [], "duration": 3.0, "unfinished": "time_up",
+                 "vehicle": {"start": [-1, -1, 1.5], **keys}}
+            )  # fmt: skip
+            sim.command(0, pf.Velocity((0.8, 0.4, 0.1), yaw_rate=0.5))
+            positions = []
+            while sim.is_running:
+                sim.step(pf.CollisionEvent)
+                positions.append(sim.status().position)
+            return np.array(positions)
+
+        room()
+        each, step, coarse = flown(0.0), flown(0.001), flown(0.005)
+        np.testing.assert_array_equal(each, step)
+        apart = np.abs(coarse - each).max()
+        self.assertTrue(1e-6 < apart < 0.05, apart)
+        for wrong in (0.0015, 0.0001):
+            with self.assertRaisesRegex(pf.InputError, "control_period|whole number of physics steps"):
+                flown(wrong)
+
     def test_misuse(self) -> None:
         sim = pf.Simulation(scenario())
         for wrong in (
