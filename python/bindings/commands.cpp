@@ -192,26 +192,25 @@ void add_setpoints(py::module_& module) {
           "yaw_rate", [](const PositionCommand& c) { return c.yaw_rate; }, "rad/s");
 }
 
-/// (n, 4): x, y, z, yaw of control points.
-TrajectoryCommand b_spline(const Array<double>& points, double interval, int degree) {
+/// Control points (n, 4): x, y, z, yaw.
+std::vector<Eigen::Vector4d> control_points(const Array<double>& points) {
   require_shape(points, "points", {-1, 4});
   std::vector<Eigen::Vector4d> rows;
   for (py::ssize_t i = 0; i < points.shape(0); ++i) {
     rows.emplace_back(points.at(i, 0), points.at(i, 1), points.at(i, 2), points.at(i, 3));
   }
-  return {BSplineTrajectory::uniform(std::move(rows), degree, interval)};
+  return rows;
+}
+
+TrajectoryCommand b_spline(const Array<double>& points, double interval, int degree) {
+  return {BSplineTrajectory::uniform(control_points(points), degree, interval)};
 }
 
 /// The same with knots of their own.
 TrajectoryCommand spline_with_knots(const Array<double>& points,
                                     int degree,
                                     const std::vector<double>& knots) {
-  require_shape(points, "points", {-1, 4});
-  std::vector<Eigen::Vector4d> rows;
-  for (py::ssize_t i = 0; i < points.shape(0); ++i) {
-    rows.emplace_back(points.at(i, 0), points.at(i, 1), points.at(i, 2), points.at(i, 3));
-  }
-  return {std::make_shared<BSplineTrajectory>(std::move(rows), degree, knots)};
+  return {std::make_shared<BSplineTrajectory>(control_points(points), degree, knots)};
 }
 
 /// What makes the same again, for pickles: a function of the class, and its arguments.

@@ -128,11 +128,7 @@ class Formation(Goal):
         self._corner = np.zeros((env.num_envs, 3))
 
     def reset(self, env: "VectorEnv", which: NDArray[np.uint32]) -> None:
-        u = env.draws(which, 1 + self._tries)
-        for _, places in env.places(which, self.height, self.clearance):
-            self._check(places)
-        start = env.positions(which, u[:, 0], self.height, self.clearance)
-        goal = self._goals(env, which, start, u[:, 1:])
+        start, goal = self._ends(env, which)
         way = goal - start
         ahead = way[:, :2] / np.maximum(lengths(way[:, :2]), 1e-6)[:, None]
         member = which % self.team

@@ -127,14 +127,18 @@ class Goal(Task):
         self._checked: Set[int] = set()
 
     def reset(self, env: "VectorEnv", which: NDArray[np.uint32]) -> None:
+        start, goal = self._ends(env, which)
+        env.place(which, start, goal)
+        self.goal[which] = goal
+        self.away[which] = lengths(goal - start)
+
+    def _ends(self, env: "VectorEnv", which: NDArray[np.uint32]) -> Tuple[Floats, Floats]:
+        """Starts and goals (m, 3) that these environments draw."""
         u = env.draws(which, 1 + self._tries)
         for _, places in env.places(which, self.height, self.clearance):
             self._check(places)
         start = env.positions(which, u[:, 0], self.height, self.clearance)
-        goal = self._goals(env, which, start, u[:, 1:])
-        env.place(which, start, goal)
-        self.goal[which] = goal
-        self.away[which] = lengths(goal - start)
+        return start, self._goals(env, which, start, u[:, 1:])
 
     _tries = 64
 
