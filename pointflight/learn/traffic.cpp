@@ -19,7 +19,7 @@ double Traffic::clearance(std::span<const Pose> team,
                           SimTime time,
                           double reach) const {
   double least = reach;
-  const auto meet = [&](const BodyShape& shape, const Pose& at, Label label) {
+  const auto take = [&](const BodyShape& shape, const Pose& at, Label label) {
     const auto contact = contact_with_body(shape, at, label, hull_, team[own], reach);
     if (contact) least = std::min(least, contact->distance);
   };
@@ -27,12 +27,12 @@ double Traffic::clearance(std::span<const Pose> team,
     const double radius = hull_radius_ + reach;
     for (const Body& body : obstacles_->near(team[own].translation, radius, time, time)) {
       if (body.from <= time && time < body.until) {
-        meet(body.shape, body.T_world_body(time), body.label);
+        take(body.shape, body.T_world_body(time), body.label);
       }
     }
   }
   for (std::size_t i = 0; i < team.size(); ++i) {
-    if (i != own) meet(hull_, team[i], kFirstVehicle + static_cast<Label>(i));
+    if (i != own) take(hull_, team[i], kFirstVehicle + static_cast<Label>(i));
   }
   return least;
 }

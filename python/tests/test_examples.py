@@ -16,7 +16,8 @@ FOLDER = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "e
 class ExamplesTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls) -> None:
-        run("map", "forest", "--size-x", "40", "--size-y", "40", "--trees", "200", "--density", "300", "-o", path_of("ex.pcd"))
+        size = ("--size-x", "40", "--size-y", "40")
+        run("map", "forest", *size, "--trees", "200", "--density", "300", "-o", path_of("ex.pcd"))
         pf.Map.import_clouds(path_of("ex.pcd"), path_of("ex.pfmap"), resolution=0.12)
 
     def example(self, name: str, *arguments: str) -> str:

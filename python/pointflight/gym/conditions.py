@@ -31,8 +31,8 @@ class Conditions:
         team: int,
     ) -> None:
         """scenario: "obstacles", "air" and "faults" (rotor, lidar, scan_drop) as a scenario file has them, and the
-        "seed" of the obstacles. vary: least and greatest by key: "air.wind.mean" (3 each), "faults[0].from", ".until" or
-        ".value", and "mass", a share of the vehicle file's, which its controller knows nothing of."""
+        "seed" of the obstacles. vary: least and greatest by key: "air.wind.mean" (3 each), "faults[0].from", ".until"
+        or ".value", and "mass", a share of the vehicle file's, which its controller knows nothing of."""
         for key in scenario:
             if key not in _KEYS:
                 raise ValueError(f"scenario: {', '.join(_KEYS)} have an effect here, {key!r} has none")

@@ -49,7 +49,7 @@ class Corridor(Goal):
             if course is None:
                 course = place.tour(length=self.length, margin=self.clearance - 0.3)
             if len(course) <= self.corners:
-                raise ValueError(f"{place!r}: {self.corners} corners after a start are wanted, and there are {len(course)}")
+                raise ValueError(f"{place!r}: {self.corners} corners after a start are wanted, not {len(course)}")
             self._courses.append(course)
         self._next = np.zeros(env.num_envs, np.int64)
         self._last = np.zeros(env.num_envs, np.int64)

@@ -33,7 +33,8 @@ class Policy:
         way that its actions add to, 0 unless the task is `Goal` or `Race`."""
         self.layers, self.about = layers, dict(about)
         seen = self.about.get("lidar")
-        self.lidar = None if seen is None else Lidar(**{k: tuple(v) if isinstance(v, list) else v for k, v in seen.items()})
+        as_tuples = {name: tuple(v) if isinstance(v, list) else v for name, v in (seen or {}).items()}
+        self.lidar = None if seen is None else Lidar(**as_tuples)
         """What it sees by."""
 
     @staticmethod

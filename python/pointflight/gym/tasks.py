@@ -1,5 +1,5 @@
-"""What is to be learned: `Goal`, `Race`, `Explore`, `Hover` (courses.py: `Corridor`, `Formation`). Derive `Task` for one's
-own.
+"""What is to be learned: `Goal`, `Race`, `Explore`, `Hover` (courses.py: `Corridor`, `Formation`). Derive `Task` for
+your own.
 
 All arrays have a row for each environment.
 """

@@ -49,8 +49,8 @@ class VectorEnv(_Base):  # type: ignore[misc]
 
     Observations: "range" (n, rows, columns), ranges / range_max, 1 where nothing is hit (without a LiDAR it is
     missing), and "state" (n, k), as the task says. Actions (n, a) from -1 to 1: velocity (ahead, left, up in the
-    heading's frame, times `speed`) and yaw rate (times `yaw_rate`); the same of acceleration (times `acceleration`); body
-    rates (times the vehicle's greatest) and thrust (-1: none, 0: its weight, 1: twice that); or a speed of each rotor
+    heading's frame, times `speed`) and yaw rate (times `yaw_rate`); the same of acceleration (times `acceleration`);
+    body rates (times the vehicle's greatest) and thrust (-1: none, 0: its weight, 1: twice that); or a speed of each rotor
     (-1: the least, 0: hover, 1: the greatest).
 
     What an environment does follows from its own seed and its actions: not from how many there are, nor from threads
@@ -79,11 +79,12 @@ class VectorEnv(_Base):  # type: ignore[misc]
         copy: bool = True,
         render_mode: Optional[str] = None,
     ) -> None:
-        """map: one, or several: environments are dealt out to them in blocks. task: a name of `TASKS`, or one of one's own.
-        scenario, vary: what happens around, as `Conditions` takes it. team: vehicles 0 to team - 1 are in one place, see
-        and hit each other and end together, and so are the next ones (1, 2, 4 or 8; without: the task's). action_period: s between actions; physics_step, s, of which `steps_per_control` are flown with the
-        same rotor commands (docs/python.md: what coarser ones cost). autoreset: "next_step", "same_step" or
-        "disabled". copy: False: observations are read-only views that the next step changes.
+        """map: one, or several: environments are dealt out to them in blocks. task: a name of `TASKS`, or one of your
+        own. scenario, vary: what happens around, as `Conditions` takes it. team: vehicles 0 to team - 1 are in one
+        place, see and hit each other and end together, and so are the next ones (1, 2, 4 or 8; without it, the
+        task's). action_period: s between actions. physics_step: s; `steps_per_control` of them are flown with the same
+        rotor commands (docs/learning.md: what coarser ones cost). autoreset: "next_step", "same_step" or "disabled".
+        copy: False: observations are read-only views that the next step changes.
         """
         if num_envs < 1:
             raise ValueError(f"num_envs: 1 or more, not {num_envs}")
@@ -265,8 +266,8 @@ class VectorEnv(_Base):  # type: ignore[misc]
     def reset(
         self, *, seed: Union[None, int, Sequence[Optional[int]]] = None, options: Optional[Mapping[str, Any]] = None
     ) -> Tuple[Observation, Dict[str, Any]]:
-        """Begins anew. seed: environment i gets seed + i (those of team i), or the i-th of a list; without one, each goes
-        on to its next episode. options: {"reset_mask": (n,) bool}: only these, whole teams."""
+        """Begins anew. seed: environment i gets seed + i (those of team i), or the i-th of a list; without one, each
+        goes on to its next episode. options: {"reset_mask": (n,) bool}: only these, whole teams."""
         mask = np.ones(self.num_envs, np.bool_)
         if options is not None and "reset_mask" in options:
             mask = np.asarray(options["reset_mask"])
