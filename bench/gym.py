@@ -22,7 +22,19 @@ CASES = (
     ("64 x 16, 20 m", Lidar(16, 64, range_max=20.0), {}),
     ("32 x 8, 10 m", Lidar(8, 32), {}),
     ("180 beams, 10 m", Lidar(1, 180, elevation=LEVEL), {}),
+    ("no LiDAR, 60 balls", None, {"scenario": "balls"}),
+    ("64 x 16, 10 m, 60 balls", Lidar(16, 64), {"scenario": "balls"}),
+    ("no LiDAR, gusts", None, {"scenario": {"air": {"wind": {"turbulence": "light"}}}}),
+    ("no LiDAR, four together", None, {"task": "formation"}),
 )
+
+
+def balls(place: pf.Map) -> dict:
+    """60 that fly to and fro in the lowest 5 m."""
+    low, high = place.bounds
+    box = {"bounds_min": [*low[:2], low[2] + 0.5], "bounds_max": [*high[:2], low[2] + 5.0]}
+    motion = {"speed": 0.5, "speed_max": 2.0, "directions": "horizontal", "at_border": "bounce"}
+    return {"obstacles": [{"count": 60, **motion, **box}]}
 
 
 def cpu(action) -> float:
@@ -40,6 +52,8 @@ def main() -> None:
     for path in sys.argv[1:]:
         place = pf.Map.open(path)
         for name, lidar, arguments in CASES:
+            if arguments.get("scenario") == "balls":
+                arguments = {**arguments, "scenario": balls(place)}
             env = VectorEnv(place, COUNT, lidar=lidar, copy=False, **arguments)
             env.reset(seed=1)
             random = np.random.default_rng(0)
