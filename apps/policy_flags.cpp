@@ -3,11 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "apps/terminal.hpp"
 #include "pointflight/core/input_error.hpp"
 
 namespace pointflight::apps {
+
 void add_policy_flag(CLI::App& app, std::string& policy) {
   app.add_option(
       "--policy",

@@ -26,7 +26,8 @@ print(f"{len(scan)} points of {scan.beams} beams, {scan['range'].mean():.1f} m o
 
 points = scan.xyz @ at[:3, :3].T + at[:3, 3]
 figure, (above, image) = plt.subplots(1, 2, figsize=(13, 5.5), width_ratios=(1, 1.3))
-above.scatter(points[:, 0], points[:, 1], s=1.5, c=points[:, 2], cmap="turbo", linewidths=0)
+x, y, z = points.T
+above.scatter(x, y, s=1.5, c=z, cmap="turbo", linewidths=0, vmax=np.percentile(z, 99))
 above.plot(*tour[:2, :2].T, "r.-", linewidth=1, label="ahead")
 above.set(xlabel="x, m", ylabel="y, m", title=f"one scan of {name} from above, by height", aspect="equal")
 above.set(xlim=tour[0, 0] + np.array([-20, 20]), ylim=tour[0, 1] + np.array([-20, 20]))

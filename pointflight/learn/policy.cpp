@@ -24,7 +24,7 @@ using nlohmann::json;
 constexpr double kWay = 30.0;            // m: unit of distances
 constexpr double kHeight = 3.0;          // m: of heights
 constexpr double kSpeed = 3.0;           // m/s: of velocities
-constexpr std::size_t kMostLayers = 64;  // and cells below a million, by the arrays' limit
+constexpr std::size_t kMostLayers = 64;
 
 [[noreturn]] void fail(const std::string& path, const std::string& what) {
   throw InputError(
@@ -104,7 +104,10 @@ json document_in(const std::map<std::string, NumberArray>& arrays, const std::st
   const auto about = arrays.find("about");
   if (about == arrays.end()) fail(path, "it has no array 'about'");
   std::string text;
-  for (const float byte : about->second.values) text += static_cast<char>(byte);
+  for (const float byte : about->second.values) {
+    if (!(byte >= 0.0f && byte <= 255.0f)) fail(path, "'about' is no text");
+    text += static_cast<char>(static_cast<unsigned char>(byte));
+  }
   json document = json::parse(text, nullptr, false);
   if (!document.is_object()) fail(path, "'about' is no JSON object");
   return document;

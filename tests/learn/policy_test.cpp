@@ -180,6 +180,7 @@ TEST(Policy, BadFilesSayWhat) {
   EXPECT_NO_THROW(load(folder, good));
   expect_contains(error("about.npy", ""), "no array 'about'");
   expect_contains(error("about.npy", document("hello")), "no JSON object");
+  expect_contains(error("about.npy", array("(1,)", {1e30f})), "'about' is no text");
   expect_contains(error("about.npy", document("{}")), "lacks what is needed");
   expect_contains(error("about.npy", document(about("explore", 1))), "task 'explore'");
   expect_contains(error("about.npy", document(about("goal", 2))), "a layer is missing");

@@ -63,7 +63,7 @@ def evaluate(env: VectorEnv, pilot: Pilot, seeds: Sequence[int]) -> Score:
         rewards[~over] += reward[~over]
         now = (terminated | truncated) & ~over
         arrived |= infos.get("reached", ~terminated) & now
-        collided |= infos["collided"] & now
+        collided |= infos.get("collided", np.zeros(count, bool)) & now
         over |= now
     arrived, collided = arrived[:: env.team], collided.reshape(teams, -1).any(1)
     there, hit = int(arrived.sum()), int(collided.sum())

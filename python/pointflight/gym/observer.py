@@ -70,9 +70,8 @@ class Observer:
             [body.position, body.velocity, body.orientation, body.angular_velocity,
              [math.cos(yaw), math.sin(yaw), 0.0, 0.0, 0.0]]
         )  # fmt: skip
-        state: Floats = self.task.state_of(
-            States(row[None]), self.goal[None], np.array([self.elapsed]), self.last_action[None]
-        )
+        elapsed = np.array([min(self.elapsed, self.task.time_limit)])
+        state: Floats = self.task.state_of(States(row[None]), self.goal[None], elapsed, self.last_action[None])
         return {"range": image[None].astype(np.float32), "state": state.astype(np.float32)}
 
 
