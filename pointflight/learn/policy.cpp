@@ -21,9 +21,9 @@ namespace {
 
 using nlohmann::json;
 
-constexpr double kWay = 30.0;            // m: unit of distances
-constexpr double kHeight = 3.0;          // m: of heights
-constexpr double kSpeed = 3.0;           // m/s: of velocities
+constexpr double kWay = 30.0;    // m: unit of distances
+constexpr double kHeight = 3.0;  // m: of heights
+constexpr double kSpeed = 3.0;   // m/s: of velocities
 constexpr std::size_t kMostLayers = 64;
 
 [[noreturn]] void fail(const std::string& path, const std::string& what) {
