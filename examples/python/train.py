@@ -6,9 +6,8 @@ import time
 import numpy as np
 import torch
 from torch import nn
-
 import pointflight as pf
-from pointflight.gym import TASKS, Lidar, Policy, VectorEnv, advantages, evaluate, features, straight
+from pointflight.gym import TASKS, FacingGoal, Lidar, Policy, VectorEnv, advantages, evaluate, features, straight
 
 parser = argparse.ArgumentParser(description=__doc__)
 parser.add_argument("maps", nargs="+", help="to learn in")
@@ -23,6 +22,7 @@ N, T, GAMMA, BASE = 256, 32, 0.98, 0.0 if args.task in ("hover", "explore") else
 acts, lidar = 3 if BASE else 4, None if args.task == "hover" else Lidar(3, 60, (-0.26, 0.26), pool=(2, 2))
 place = {"map": args.maps, "task": args.task, "lidar": lidar, "scenario": args.scenario}
 env = VectorEnv(num_envs=N, autoreset="same_step", copy=False, **place)
+env = FacingGoal(env) if args.task in ("goal", "race") else env
 seen, _ = env.reset(seed=1_000_000 * args.seed)
 x = torch.from_numpy(features(seen, 10.0))
 net = lambda n: nn.Sequential(nn.Linear(x.shape[1], 128), nn.Tanh(), nn.Linear(128, 128), nn.Tanh(), nn.Linear(128, n))

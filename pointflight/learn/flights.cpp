@@ -88,6 +88,7 @@ void Flights::place(std::size_t i, const FlightStart& start) {
   watch_[i] = Watch{};
   watch_[i].last = body.T_world_body();
   watch_[i].time = start.time;
+  watch_[i].draws.seed = start.seed;
   poses_[i] = {watch_[i].last, watch_[i].last, start.time, start.time};
   if (!gusts_.empty()) gusts_[i] = {start.wind_world, start.seed, {}, 0};
 }
@@ -192,6 +193,7 @@ void Flights::fly_group(std::size_t first,
     ask(i, actions.subspan(i * numbers, numbers));
     poses_[i].before = watch_[i].last;
     poses_[i].before_time = watch_[i].time;
+    ++watch_[i].draws.scan;
   });
   for (int k = 0; k < looks_; ++k) {
     const int periods = periods_ * (k + 1) / looks_ - periods_ * k / looks_;
@@ -245,7 +247,8 @@ void Flights::measure(std::span<const std::uint32_t> vehicles,
   }
   RangePattern::BodiesOf bodies;
   if (traffic_) bodies = [this](std::uint32_t vehicle) { return bodies_around(vehicle); };
-  pattern_.measure(*renderer_, poses_, vehicles, ranges, executor, bodies);
+  const auto draws = [this](std::uint32_t vehicle) { return watch_[vehicle].draws; };
+  pattern_.measure(*renderer_, poses_, vehicles, ranges, executor, bodies, draws);
 }
 
 std::vector<Vector3d> Flights::free_positions(const Aabb& box,

@@ -39,7 +39,7 @@ struct FlightStart {
   Vector3d p_world = Vector3d::Zero();     ///< m
   double yaw = 0.0;                        ///< rad
   SimTime time;                            ///< On the clock of the obstacles.
-  std::uint64_t seed = 0;                  ///< Of its gusts.
+  std::uint64_t seed = 0;                  ///< Of its gusts and of what its sensor reports.
   Vector3d wind_world = Vector3d::Zero();  ///< Mean, m/s.
   double load_share = 1.0;                 ///< `FlightConditions::load_share`
 };
@@ -123,6 +123,7 @@ class Flights {
     Pose last;               ///< When it was last moved on.
     SimTime time;            ///< Then, on the clock of the obstacles.
     double apart = kReach;   ///< From what moves, m.
+    ScanAddress draws;       ///< Of its ranges.
   };
   /// The air around a vehicle.
   struct Gusts {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <nlohmann/json.hpp>
 #include <utility>
 
@@ -66,6 +67,7 @@ PolicySettings settings_from(const json& about) {
   settings.action_period = about.at("action_period").get<double>();
   settings.time_limit = about.at("time_limit").get<double>();
   settings.base = about.at("base").get<double>();
+  settings.faces_goal = about.value("faces_goal", false);
   if (about.contains("lidar")) settings.image = image_from(about.at("lidar"));
   return settings;
 }
@@ -86,6 +88,10 @@ void check(const PolicySettings& s) {
       !is_within(s.action_period, 1e-3, 10.0) || !is_within(s.time_limit, 1e-3, 1e6) ||
       !is_within(s.base, -10.0, 10.0)) {
     fail(s.path, "its figures make no sense");
+  }
+  if (s.faces_goal && (!s.image || s.task == "hover" ||
+                       std::abs(s.image->azimuth[1] - s.image->azimuth[0] - 2.0 * kPi) > 1e-6)) {
+    fail(s.path, "to face its goal it needs one, and an image of the full circle");
   }
   if (!s.image) return;
   const PolicyImage& image = *s.image;
@@ -135,6 +141,28 @@ std::optional<std::size_t> part_with(double value, double from, double to, std::
   const double part = std::floor((value - from) / (to - from) * static_cast<double>(count));
   if (!(part >= 0.0 && part < static_cast<double>(count))) return std::nullopt;
   return static_cast<std::size_t>(part);
+}
+
+/// Turns the two numbers of a level vector.
+void turn_left(float* xy, const math::SinCos& by) {
+  const auto x = static_cast<double>(xy[0]);
+  const auto y = static_cast<double>(xy[1]);
+  xy[0] = static_cast<float>(by.cos * x - by.sin * y);
+  xy[1] = static_cast<float>(by.sin * x + by.cos * y);
+}
+
+/// Each column's numbers in the one that lies so many to the right.
+std::vector<float> with_columns_moved(std::span<const float> image,
+                                      std::size_t columns,
+                                      std::int64_t by) {
+  std::vector<float> moved(image.size());
+  const auto all = static_cast<std::int64_t>(columns);
+  for (std::size_t i = 0; i < image.size(); ++i) {
+    const auto column = static_cast<std::int64_t>(i % columns);
+    const auto to = static_cast<std::size_t>(((column + by) % all + all) % all);
+    moved[i - i % columns + to] = image[i];
+  }
+  return moved;
 }
 
 }  // namespace
@@ -255,10 +283,9 @@ std::vector<float> Policy::through(std::vector<float> numbers) const {
   return numbers;
 }
 
-std::array<float, 4> Policy::act(std::span<const float> image,
-                                 const RigidBodyState& body,
-                                 const PolicyTarget& target) const {
-  const std::vector<float> state = state_of(body, target);
+/// What the network says, and its share of the straight way.
+std::vector<float> Policy::outputs(std::span<const float> image,
+                                   std::span<const float> state) const {
   std::vector<float> features;
   for (const float share : image) {
     features.push_back(1.0f / (1.0f + static_cast<float>(settings_.image->range_max) * share));
@@ -275,9 +302,30 @@ std::array<float, 4> Policy::act(std::span<const float> image,
       outputs[k] += static_cast<float>(settings_.base * unit[static_cast<Eigen::Index>(k)]);
     }
   }
+  return outputs;
+}
+
+std::array<float, 4> Policy::act(std::span<const float> image,
+                                 const RigidBodyState& body,
+                                 const PolicyTarget& target) const {
+  std::vector<float> state = state_of(body, target);
+  std::vector<float> said;
+  if (settings_.faces_goal) {
+    const std::size_t columns = settings_.image->columns;
+    const double column = 2.0 * kPi / static_cast<double>(columns);
+    const double bearing =
+        math::atan2(static_cast<double>(state[1]), static_cast<double>(state[0]));
+    const std::int64_t by = floor_to_integer(bearing / column + 0.5);
+    const auto turn = math::sincos(static_cast<double>(by) * column);
+    for (const std::size_t x : {0, 4, 7, 11}) turn_left(state.data() + x, {-turn.sin, turn.cos});
+    said = outputs(with_columns_moved(image, columns, by), state);
+    turn_left(said.data(), turn);
+  } else {
+    said = outputs(image, state);
+  }
   std::array<float, 4> actions{};
   for (std::size_t k = 0; k < 4; ++k) {
-    actions[k] = std::isfinite(outputs[k]) ? std::clamp(outputs[k], -1.0f, 1.0f) : 0.0f;
+    actions[k] = std::isfinite(said[k]) ? std::clamp(said[k], -1.0f, 1.0f) : 0.0f;
   }
   return actions;
 }

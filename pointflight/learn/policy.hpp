@@ -35,6 +35,9 @@ struct PolicySettings {
   double time_limit = 20.0;          ///< Of an episode, s.
   double base = 0.0;                 ///< Share of the straight way that its outputs add to.
   std::optional<PolicyImage> image;  ///< Nothing: it sees no ranges.
+  /// It has learned for goals ahead: what it sees is turned so that the goal is, to the nearest
+  /// column of the image, and what it says is turned back.
+  bool faces_goal = false;
 };
 
 /// Where a vehicle of a policy is and goes to.
@@ -71,6 +74,8 @@ class Policy {
   };
   [[nodiscard]] std::vector<float> state_of(const RigidBodyState& body,
                                             const PolicyTarget& target) const;
+  [[nodiscard]] std::vector<float> outputs(std::span<const float> image,
+                                           std::span<const float> state) const;
   [[nodiscard]] std::vector<float> through(std::vector<float> numbers) const;
 
   PolicySettings settings_;

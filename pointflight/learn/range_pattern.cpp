@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "pointflight/core/argument.hpp"
@@ -69,14 +70,31 @@ std::vector<Duration> RangePattern::offsets(const PosePair& poses) const {
   return offsets;
 }
 
+/// Ranges become those that the sensor reports.
+void RangePattern::report(std::span<Hit> hits, const ScanAddress& address) const {
+  const std::size_t most = most_returns(returns_->mode());
+  std::vector<Return> made(hits.size() * most);
+  returns_->measure(
+      std::span<const Hit>(hits), ReturnChances(address, true).of(0, hits.size()), made);
+  for (std::size_t k = 0; k < hits.size(); ++k) {
+    float nearest = std::numeric_limits<float>::infinity();
+    for (const Return& one : std::span(made).subspan(k * most, most)) {
+      if (one.is_return()) nearest = std::min(nearest, one.range);
+    }
+    hits[k].range = nearest < range_max_ ? nearest : Hit{}.range;
+  }
+}
+
 void RangePattern::measure(const Renderer& renderer,
                            std::span<const PosePair> poses,
                            std::span<const std::uint32_t> vehicles,
                            std::span<float> ranges,
                            const Executor& executor,
-                           const BodiesOf& bodies_of) const {
+                           const BodiesOf& bodies_of,
+                           const DrawsOf& draws_of) const {
   const std::size_t beams = directions_.size();
   if (beams == 0) return;
+  require_argument(!returns_ || draws_of, "RangePattern: a sensor's reports need draws");
   const std::size_t at_once = std::max<std::size_t>(1, kRaysAtOnce / beams);
   std::vector<Ray> rays(std::min(at_once, vehicles.size()) * beams);
   std::vector<Hit> hits(rays.size());
@@ -106,6 +124,7 @@ void RangePattern::measure(const Renderer& renderer,
     executor.parallel_for(count, 1, [&](std::size_t i, std::size_t) {
       const std::span row = ranges.subspan(vehicles[first + i] * size(), size());
       std::fill(row.begin(), row.end(), 1.0f);
+      if (returns_) report(jobs[i].hits, draws_of(vehicles[first + i]));
       for (std::size_t k = 0; k < beams; ++k) {
         const Hit& hit = jobs[i].hits[k];
         float& least = row[k / pooled_];

@@ -3,12 +3,14 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <span>
 #include <vector>
 
 #include "pointflight/core/parallel.hpp"
 #include "pointflight/geometry/types.hpp"
 #include "pointflight/learn/traffic.hpp"
+#include "pointflight/lidar/return_chances.hpp"
 #include "pointflight/render/renderer.hpp"
 
 namespace pointflight {
@@ -18,6 +20,8 @@ class RangePattern {
  public:
   /// Of a vehicle by its number; callable from several threads.
   using BodiesOf = std::function<std::vector<Body>(std::uint32_t vehicle)>;
+  /// The same: where its draws are.
+  using DrawsOf = std::function<ScanAddress(std::uint32_t vehicle)>;
 
   /// `directions` (unit vectors, sensor frame) and, for each, when it is measured as a share of the
   /// period, 0 to 1; empty: all at the end, from one pose. Each `pooled` of them in succession make
@@ -27,6 +31,10 @@ class RangePattern {
                float range_max,
                std::size_t pooled = 1);
 
+  /// From now on a beam says what a sensor reports of what it hits, with noise, or nothing; its
+  /// nearest return counts. Null: the exact range.
+  void report_by(std::shared_ptr<const ReturnModel> returns) { returns_ = std::move(returns); }
+
   /// Numbers of one image.
   [[nodiscard]] std::size_t size() const { return directions_.size() / pooled_; }
   /// m
@@ -34,23 +42,27 @@ class RangePattern {
 
   /// Ranges as shares of `range_max`, 1 where nothing is hit, of the vehicles with these numbers:
   /// `poses` and rows of `ranges` (`size()` each) are by number. All are rendered together, each
-  /// with the map and what `bodies_of` says that moves around it; null: nothing.
+  /// with the map and what `bodies_of` says that moves around it; null: nothing. A sensor's reports
+  /// need `draws_of`.
   void measure(const Renderer& renderer,
                std::span<const PosePair> poses,
                std::span<const std::uint32_t> vehicles,
                std::span<float> ranges,
                const Executor& executor,
-               const BodiesOf& bodies_of = nullptr) const;
+               const BodiesOf& bodies_of = nullptr,
+               const DrawsOf& draws_of = nullptr) const;
 
  private:
   [[nodiscard]] std::vector<Duration> offsets(const PosePair& poses) const;
   void aim(const PosePair& poses, std::span<Ray> rays) const;
+  void report(std::span<Hit> hits, const ScanAddress& address) const;
 
   std::vector<Vector3f> directions_;
   std::vector<float> shares_;
   float range_max_;
   std::size_t pooled_;
-  std::vector<std::uint32_t> order_;  ///< In which they are traced.
+  std::vector<std::uint32_t> order_;            ///< In which they are traced.
+  std::shared_ptr<const ReturnModel> returns_;  ///< Or null.
 };
 
 }  // namespace pointflight

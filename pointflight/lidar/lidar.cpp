@@ -46,8 +46,7 @@ Lidar::Lidar(const LidarSettings& settings,
       sensor_(sensor),
       beams_(beams ? std::move(beams) : std::make_shared<const ScanBeams>(settings)),
       footprint_(settings.optics),
-      measures_depth_(settings.pattern == ScanPattern::kGrid &&
-                      settings.grid.projection == GridProjection::kPinhole) {
+      measures_depth_(settings.measures_depth()) {
   if (!settings.blocked.empty()) {
     blockage_ = std::make_shared<const Blockage>(read_blocked_sectors(settings));
   }

@@ -9,6 +9,7 @@
 #include "pointflight/lidar/internal/aimed.hpp"
 #include "pointflight/lidar/internal/range_offsets.hpp"
 #include "pointflight/lidar/residual_motion.hpp"
+#include "pointflight/lidar/return_chances.hpp"
 
 namespace pointflight {
 namespace {
@@ -108,59 +109,6 @@ void add_truth(std::span<const Return> returns,
   }
 }
 
-/// Draws for the returns of beams that follow each other, the first of which has an even number.
-class ReturnChances {
- public:
-  ReturnChances(const ScanRequest& request, std::uint32_t sensor)
-      : request_(request),
-        noise_(request.seed, StreamId::kLidarRangeNoise, sensor),
-        detection_(request.seed, StreamId::kLidarDetection, sensor),
-        weather_(request.seed, StreamId::kLidarWeather, sensor),
-        sensor_(sensor) {}
-
-  /// Valid until the next call.
-  BeamChances of(std::size_t first, std::size_t count) {
-    const std::uint64_t address = request_.index << 32 | first;
-    normals_.assign(count + count % 2, 0.0);
-    detections_.resize(count);
-    places_.resize(count);
-    detection_.uniform2(address, detections_, places_);
-    if (request_.noise) {  // two neighbours share a draw of two
-      const std::size_t pairs = normals_.size() / 2;
-      even_.resize(pairs);
-      odd_.resize(pairs);
-      noise_.normal2(request_.index << 32 | first / 2, even_, odd_);
-      for (std::size_t i = 0; i < pairs; ++i) {
-        normals_[2 * i] = even_[i];
-        normals_[2 * i + 1] = odd_[i];
-      }
-    }
-    return {normals_, detections_, places_, [this, address](std::size_t beam, std::size_t echo) {
-              return more(address + beam, echo);
-            }};
-  }
-
- private:
-  [[nodiscard]] EchoChance more(std::uint64_t address, std::size_t echo) const {
-    const RandomStream own(
-        request_.seed, StreamId::kLidarEcho, static_cast<std::uint32_t>(echo) << 28 | sensor_);
-    EchoChance chance;
-    chance.normal = request_.noise ? own.normal(2 * address) : 0.0;
-    chance.detection = own.uniform(2 * address + 1);
-    if (echo == Echoes::kMost) {
-      const auto [drop, drop_position] = weather_.uniform2(address);
-      chance.drop = drop;
-      chance.drop_position = drop_position;
-    }
-    return chance;
-  }
-
-  const ScanRequest& request_;
-  RandomStream noise_, detection_, weather_;
-  std::uint32_t sensor_;
-  std::vector<double> normals_, detections_, places_, even_, odd_;
-};
-
 /// What a sensor measures of a range: the range times `share`, plus `offset`.
 struct Measured {
   float share;
@@ -201,7 +149,8 @@ Lidar::Received Lidar::reported(const Aimed& aimed,
   received.returns.resize(beams.size() * most);
   const RangeOffsets offsets = offsets_of(aimed);
   executor.parallel_for(beams.size(), kReturnsPerChunk, [&](std::size_t begin, std::size_t end) {
-    ReturnChances chances(aimed.request, sensor_);
+    const ScanRequest& request = aimed.request;
+    ReturnChances chances({request.seed, sensor_, request.index}, request.noise);
     const std::size_t count = end - begin;
     const std::span<Return> made(received.returns.data() + begin * most, count * most);
     if (!measures_depth_ && offsets.empty()) {

@@ -196,6 +196,11 @@ struct LidarSettings {
   CsvSettings csv;                            ///< Where `pattern` says so.
   std::map<std::string, int> lines;           ///< Of each key in the file, for messages.
 
+  /// A depth camera: limits and noise are of the depth along its axis.
+  [[nodiscard]] bool measures_depth() const {
+    return pattern == ScanPattern::kGrid && grid.projection == GridProjection::kPinhole;
+  }
+
   /// "mid360.yaml:12" for a key, or the path where the key is not in the file.
   [[nodiscard]] std::string location(const std::string& key) const;
 

@@ -47,7 +47,9 @@ std::vector<std::uint32_t> order_of_rays(std::span<const Ray> rays, const Execut
 void cast_rays(const Renderer& renderer,
                std::span<const Ray> rays,
                std::span<Hit> hits,
-               const Executor& executor) {
+               const Executor& executor,
+               std::span<const Body> bodies,
+               SimTime time) {
   require_argument(!renderer.is_snapshot(), "cast_rays: a renderer of single rays is wanted");
   if (rays.empty()) return;
   const std::vector<std::uint32_t> order = order_of_rays(rays, executor);
@@ -56,6 +58,9 @@ void cast_rays(const Renderer& renderer,
   batch.order = order;
   batch.T_world_sensor.translation = rays.front().origin_world;
   batch.range_max = 0.0f;
+  batch.bodies = bodies;
+  batch.time = time;
+  batch.snapshot_time = time;
   for (const Ray& ray : rays) batch.range_max = std::max(batch.range_max, ray.range_max);
   renderer.render(batch, hits, executor);
 }

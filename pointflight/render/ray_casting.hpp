@@ -3,7 +3,9 @@
 #include <span>
 
 #include "pointflight/core/parallel.hpp"
+#include "pointflight/core/time.hpp"
 #include "pointflight/geometry/types.hpp"
+#include "pointflight/map/body.hpp"
 #include "pointflight/render/hit.hpp"
 #include "pointflight/render/renderer.hpp"
 
@@ -13,10 +15,12 @@ namespace pointflight {
 /// whose rays go the same way if they point the same way. These are sorted by where they start
 /// first and then by where they point, so that neighbours in the order go down the hierarchy
 /// together: 40 times as fast if each starts somewhere else. Not for renderers of images
-/// (`Renderer::is_snapshot`): std::invalid_argument.
+/// (`Renderer::is_snapshot`): std::invalid_argument. `bodies` are where they are at `time`.
 void cast_rays(const Renderer& renderer,
                std::span<const Ray> rays,
                std::span<Hit> hits,
-               const Executor& executor);
+               const Executor& executor,
+               std::span<const Body> bodies = {},
+               SimTime time = {});
 
 }  // namespace pointflight

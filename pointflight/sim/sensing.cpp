@@ -66,12 +66,7 @@ std::vector<Body> bodies_for(const DueInterval& due,
   for (std::size_t i = 0; i < fleet.size(); ++i) {
     const bool is_own = i == due.vehicle;
     if ((is_own && !due.sensor->sees_own_vehicle()) || !statuses[i].present) continue;
-    const VehicleAgent& vehicle = fleet.vehicle(i);
-    Body body;
-    body.label = vehicle.label();
-    body.shape = vehicle.shape();
-    body.look = vehicle.look();
-    body.intensity = static_cast<float>(vehicle.settings().intensity);
+    Body body = fleet.vehicle(i).body();
     body.speed_max = tracks[i].speed_max(due.start, due.end);
     body.motion = tracks[i];
     body.from = statuses[i].present_since;

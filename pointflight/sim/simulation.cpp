@@ -104,6 +104,16 @@ std::vector<Body> Simulation::obstacles(SimTime from, SimTime until) const {
   return setup_->obstacles.bodies(from, until);
 }
 
+std::vector<Body> Simulation::bodies() const {
+  std::vector<Body> bodies = obstacles(state_.time, state_.time);
+  for (std::size_t i = 0; i < vehicle_count(); ++i) {
+    if (!status(i).present) continue;
+    bodies.push_back(vehicle(i).body());
+    bodies.back().motion = PoseTrack(status(i).state.body.T_world_body());
+  }
+  return bodies;
+}
+
 void Simulation::check_start(std::size_t number) const {
   const auto placed = [&](std::size_t i) {
     return StartingVehicle{&vehicle(i), status(i).state.body.T_world_body()};

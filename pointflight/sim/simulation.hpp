@@ -143,6 +143,8 @@ class Simulation {
   [[nodiscard]] std::size_t obstacle_count() const;
   /// Obstacles between two instants, at most `kLongestRun` ahead.
   [[nodiscard]] std::vector<Body> obstacles(SimTime from, SimTime until) const;
+  /// All that moves, obstacles and vehicles, where it is at `time`.
+  [[nodiscard]] std::vector<Body> bodies() const;
 
  private:
   struct Setup;

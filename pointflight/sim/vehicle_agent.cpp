@@ -39,6 +39,15 @@ VehicleStatus VehicleAgent::start() const {
   return status;
 }
 
+Body VehicleAgent::body() const {
+  Body body;
+  body.label = label();
+  body.shape = shape();
+  body.look = look();
+  body.intensity = static_cast<float>(settings().intensity);
+  return body;
+}
+
 double VehicleAgent::ground_below(const VehicleStatus& status) const {
   const double reach = kGroundEffectReach * settings().rotor.radius;
   const auto& nearest = status.proximity.nearest;

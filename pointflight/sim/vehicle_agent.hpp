@@ -147,6 +147,8 @@ class VehicleAgent {
 
   /// What scans and collisions call it.
   [[nodiscard]] Label label() const { return kFirstVehicle + number_; }
+  /// As others see and hit it, standing at the world's origin.
+  [[nodiscard]] Body body() const;
   /// Its index in the fleet, from 0.
   [[nodiscard]] std::uint32_t number() const { return number_; }
   /// As the scenario has it, with a name.

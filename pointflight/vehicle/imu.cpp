@@ -69,6 +69,12 @@ Vector3d read_out(const Vector3d& value, double range, std::int64_t bits) {
 
 }  // namespace
 
+void AxisNormals::draw(const RandomStream& stream, std::uint64_t first) {
+  std::array<double, 3 * kAhead> unused{};
+  stream.normal2(3 * first, draws_, unused);
+  first_ = first;
+}
+
 FlickerNoise::FlickerNoise(double instability, double dt)
     : deviation_(std::sqrt(2.0 * math::log(2.0) / kPi) * instability) {
   double constant = kShortestFlicker;
@@ -93,8 +99,9 @@ Imu::Imu(const VehicleSettings& vehicle, std::uint64_t seed, std::uint32_t numbe
                       .conjugate()),
       gyro_flicker_(errors_.gyro.bias_instability, 1.0 / settings_.rate),
       accel_flicker_(errors_.accel.bias_instability, 1.0 / settings_.rate) {
+  AxisNormals draws;
   const auto once = [&](Once what) {
-    return normals(StreamId::kImuTurnOn, static_cast<std::uint64_t>(what));
+    return normals(StreamId::kImuTurnOn, static_cast<std::uint64_t>(what), draws);
   };
   gyro_turn_on_ = errors_.gyro.turn_on_bias * once(Once::kGyroTurnOn);
   accel_turn_on_ = errors_.accel.turn_on_bias * once(Once::kAccelTurnOn);
@@ -107,11 +114,8 @@ Imu::Imu(const VehicleSettings& vehicle, std::uint64_t seed, std::uint32_t numbe
 }
 
 /// Three draws, number `which`.
-Vector3d Imu::normals(StreamId stream, std::uint64_t which) const {
-  std::array<double, 3> draws{};
-  std::array<double, 3> unused{};
-  RandomStream(seed_, stream, vehicle_).normal2(which * 3, draws, unused);
-  return {draws[0], draws[1], draws[2]};
+Vector3d Imu::normals(StreamId stream, std::uint64_t which, AxisNormals& draws) const {
+  return Vector3d::Map(draws.of(RandomStream(seed_, stream, vehicle_), which));
 }
 
 /// Rotors out of balance shake the body across their axes, once per turn; blades along them, once
@@ -155,10 +159,10 @@ ImuSample Imu::sample(std::int64_t index,
   const bool is_first = !std::exchange(memory.has_begun, true);
   // the first sample has no walk: it starts at zero
   if (!is_first) {
-    memory.gyro_walk +=
-        errors_.gyro.bias_walk * std::sqrt(dt) * normals(StreamId::kImuGyroBias, number);
-    memory.accel_walk +=
-        errors_.accel.bias_walk * std::sqrt(dt) * normals(StreamId::kImuAccelBias, number);
+    memory.gyro_walk += errors_.gyro.bias_walk * std::sqrt(dt) *
+                        normals(StreamId::kImuGyroBias, number, memory.gyro_walk_draws);
+    memory.accel_walk += errors_.accel.bias_walk * std::sqrt(dt) *
+                         normals(StreamId::kImuAccelBias, number, memory.accel_walk_draws);
   }
   // lever arm: a point off the centre of mass also feels the body turn
   const RigidBodyState& body = state.body;
@@ -174,12 +178,12 @@ ImuSample Imu::sample(std::int64_t index,
   sample.time = time;
   sample.stamp = time;
   sample.q_world_imu = body.q_world_body * q_imu_body_.conjugate();
-  sample.gyro =
-      q_imu_body_ * rates + memory.gyro_walk +
-      errors_.gyro.noise_density / std::sqrt(dt) * normals(StreamId::kImuGyroNoise, number);
-  sample.accel =
-      q_imu_body_ * force + memory.accel_walk +
-      errors_.accel.noise_density / std::sqrt(dt) * normals(StreamId::kImuAccelNoise, number);
+  sample.gyro = q_imu_body_ * rates + memory.gyro_walk +
+                errors_.gyro.noise_density / std::sqrt(dt) *
+                    normals(StreamId::kImuGyroNoise, number, memory.gyro_draws);
+  sample.accel = q_imu_body_ * force + memory.accel_walk +
+                 errors_.accel.noise_density / std::sqrt(dt) *
+                     normals(StreamId::kImuAccelNoise, number, memory.accel_draws);
   if (!is_plain_)
     add_steady_errors(number, is_first, q_imu_body_ * rates, q_imu_body_ * force, memory, sample);
   return sample;

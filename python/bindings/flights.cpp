@@ -199,6 +199,17 @@ std::shared_ptr<const Obstacles> obstacles_of(const Scenario& scenario,
       scenario.obstacles, scenario.obstacle_world(map), *executor(), kSlices);
 }
 
+/// What a sensor reports in a map.
+std::shared_ptr<const ReturnModel> returns_of(const std::string& sensor,
+                                              const SurfelMap& map,
+                                              const Scenario& scenario) {
+  const LidarSettings settings = load_lidar(sensor);
+  if (settings.measures_depth()) {
+    throw py::value_error("sensor: " + sensor + " is a depth camera; a LiDAR is wanted");
+  }
+  return std::make_shared<const ReturnModel>(settings, surroundings_in(map, scenario.surroundings));
+}
+
 std::shared_ptr<FlightsObject> make_flights(const MapObject& map,
                                             const VehicleSettings& vehicle,
                                             std::size_t count,
@@ -211,6 +222,7 @@ std::shared_ptr<FlightsObject> make_flights(const MapObject& map,
                                             const Array<float>& shares,
                                             float range_max,
                                             std::size_t pooled,
+                                            const std::string& sensor,
                                             const Scenario& scenario,
                                             std::size_t team) {
   if (count < 1 || count > 1'000'000) throw py::value_error("count: 1 to 1000000");
@@ -234,6 +246,7 @@ std::shared_ptr<FlightsObject> make_flights(const MapObject& map,
   }
   RangePattern pattern(
       std::move(beams), {shares.data(), shares.data() + shares.size()}, range_max, pooled);
+  if (!sensor.empty()) pattern.report_by(returns_of(sensor, *map.map, scenario));
   return std::make_shared<FlightsObject>(map, vehicle, count, options, std::move(pattern));
 }
 
@@ -255,6 +268,7 @@ void add_flights(py::module_& module) {
            py::arg("shares"),
            py::arg("range_max"),
            py::arg("pooled"),
+           py::arg("sensor"),
            py::arg("scenario"),
            py::arg("team"))
       .def("place", &Object::place, py::arg("which"), py::arg("starts"), py::arg("seeds"))

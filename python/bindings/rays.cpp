@@ -1,4 +1,6 @@
 // Single rays: from anywhere, and of range images.
+#include "python/bindings/rays.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -19,6 +21,8 @@ namespace {
 
 constexpr double kNoHit = std::numeric_limits<double>::infinity();
 
+constexpr std::uint16_t kNothing = 65535;  // label of a ray that hits nothing
+
 /// Normals towards the rays' origins, world frame.
 void write_normals(const SurfelMap& map,
                    std::span<const Ray> rays,
@@ -38,40 +42,7 @@ py::tuple cast_in(const MapObject& object,
                   const Array<double>& origins,
                   const Array<double>& directions,
                   double range_max) {
-  const std::vector<Ray> rays = rays_from(rows_of_three(origins, "origins"),
-                                          rows_of_three(directions, "directions"),
-                                          range_limit(range_max));
-  const std::size_t count = rays.size();
-  std::vector<double> ranges(count, kNoHit);
-  std::vector<double> points(3 * count, std::numeric_limits<double>::quiet_NaN());
-  std::vector<float> normals(3 * count);
-  std::vector<float> incidences(count, std::numeric_limits<float>::quiet_NaN());
-  std::vector<float> intensities(count, 0.0f);
-  std::vector<std::uint32_t> surfels(count, kNoSurfel);
-  {
-    const py::gil_scoped_release unlocked;
-    std::vector<Hit> hits(count);
-    cast_rays(*object.beams, rays, hits, *executor());
-    write_normals(*object.map, rays, hits, normals);
-    for (std::size_t i = 0; i < count; ++i) {
-      if (!hits[i].is_return()) continue;
-      ranges[i] = static_cast<double>(hits[i].range);
-      const Vector3d point =
-          rays[i].origin_world + ranges[i] * rays[i].direction_world.cast<double>();
-      for (int k = 0; k < 3; ++k) points[3 * i + static_cast<std::size_t>(k)] = point[k];
-      const double cosine = std::clamp(static_cast<double>(hits[i].cos_incidence), 0.0, 1.0);
-      incidences[i] = static_cast<float>(math::acos(cosine));
-      intensities[i] = hits[i].intensity;
-      surfels[i] = hits[i].surfel;
-    }
-  }
-  const auto n = static_cast<py::ssize_t>(count);
-  return py::make_tuple(array_of(std::move(ranges), {n}),
-                        array_of(std::move(points), {n, 3}),
-                        array_of(std::move(normals), {n, 3}),
-                        array_of(std::move(incidences), {n}),
-                        array_of(std::move(intensities), {n}),
-                        array_of(std::move(surfels), {n}));
+  return hits_in(*object.map, *object.beams, origins, directions, range_max, {}, {});
 }
 
 py::array_t<float> ranges_in(const MapObject& object,
@@ -127,6 +98,52 @@ py::array_t<double> grid_of(
 }
 
 }  // namespace
+
+py::tuple hits_in(const SurfelMap& map,
+                  const Renderer& beams,
+                  const Array<double>& origins,
+                  const Array<double>& directions,
+                  double range_max,
+                  std::span<const Body> bodies,
+                  SimTime time) {
+  const std::vector<Ray> rays = rays_from(rows_of_three(origins, "origins"),
+                                          rows_of_three(directions, "directions"),
+                                          range_limit(range_max));
+  const std::size_t count = rays.size();
+  std::vector<double> ranges(count, kNoHit);
+  std::vector<double> points(3 * count, std::numeric_limits<double>::quiet_NaN());
+  std::vector<float> normals(3 * count);
+  std::vector<float> incidences(count, std::numeric_limits<float>::quiet_NaN());
+  std::vector<float> intensities(count, 0.0f);
+  std::vector<std::uint32_t> surfels(count, kNoSurfel);
+  std::vector<std::uint16_t> labels(count, kNothing);
+  {
+    const py::gil_scoped_release unlocked;
+    std::vector<Hit> hits(count);
+    cast_rays(beams, rays, hits, *executor(), bodies, time);
+    write_normals(map, rays, hits, normals);
+    for (std::size_t i = 0; i < count; ++i) {
+      if (!hits[i].is_return()) continue;
+      ranges[i] = static_cast<double>(hits[i].range);
+      const Vector3d point =
+          rays[i].origin_world + ranges[i] * rays[i].direction_world.cast<double>();
+      for (int k = 0; k < 3; ++k) points[3 * i + static_cast<std::size_t>(k)] = point[k];
+      const double cosine = std::clamp(static_cast<double>(hits[i].cos_incidence), 0.0, 1.0);
+      incidences[i] = static_cast<float>(math::acos(cosine));
+      intensities[i] = hits[i].intensity;
+      surfels[i] = hits[i].surfel;
+      labels[i] = static_cast<std::uint16_t>(hits[i].label);
+    }
+  }
+  const auto n = static_cast<py::ssize_t>(count);
+  return py::make_tuple(array_of(std::move(ranges), {n}),
+                        array_of(std::move(points), {n, 3}),
+                        array_of(std::move(normals), {n, 3}),
+                        array_of(std::move(incidences), {n}),
+                        array_of(std::move(intensities), {n}),
+                        array_of(std::move(surfels), {n}),
+                        array_of(std::move(labels), {n}));
+}
 
 void add_rays(py::module_& module) {
   module.def("_raycast",

@@ -17,6 +17,7 @@
 #include "python/bindings/arrays.hpp"
 #include "python/bindings/link.hpp"
 #include "python/bindings/map_object.hpp"
+#include "python/bindings/rays.hpp"
 #include "python/bindings/run_objects.hpp"
 #include "python/bindings/work.hpp"
 
@@ -171,6 +172,20 @@ class SimulationObject {
     recorder->finish(simulation_);
   }
 
+  [[nodiscard]] py::tuple raycast(const Array<double>& origins,
+                                  const Array<double>& directions,
+                                  double range_max) {
+    const InUse guard(*this);
+    if (!beams_) beams_ = make_renderer("beam", Scene{simulation_.shared_map()});
+    return hits_in(simulation_.map(),
+                   *beams_,
+                   origins,
+                   directions,
+                   range_max,
+                   simulation_.bodies(),
+                   simulation_.time());
+  }
+
   template <class Function>
   auto read(const Function& function) {
     const InUse guard(*this);
@@ -211,6 +226,7 @@ class SimulationObject {
   Simulation simulation_;
   std::shared_ptr<const Family> family_;
   std::unique_ptr<FlightRecorder> recorder_;
+  std::unique_ptr<const Renderer> beams_;  ///< Made for the first `raycast`.
   std::atomic<bool> busy_ = false;
   bool failed_ = false;
 };
@@ -248,6 +264,11 @@ void add_simulation(py::module_& module) {
       .def("record", &Object::record, py::arg("folder"), py::arg("replace"))
       .def("end_recording", &Object::end_recording, py::arg("keep"))
       .def("interrupt", &Object::interrupt)
+      .def("raycast",
+           &Object::raycast,
+           py::arg("origins"),
+           py::arg("directions"),
+           py::arg("range_max"))
       .def_property_readonly(
           "time_ns",
           [](Object& o) {

@@ -52,16 +52,19 @@ class Map(metaclass=_Meta):
     def _surfels(self) -> NDArray[Any]: ...
     def verify(self) -> None: ...
 
-def _raycast(
-    map: Map, origins: NDArray[np.float64], directions: NDArray[np.float64], range_max: float
-) -> Tuple[
+_Hits = Tuple[
     NDArray[np.float64],
     NDArray[np.float64],
     NDArray[np.float32],
     NDArray[np.float32],
     NDArray[np.float32],
     NDArray[np.uint32],
-]: ...
+    NDArray[np.uint16],
+]
+
+def _raycast(
+    map: Map, origins: NDArray[np.float64], directions: NDArray[np.float64], range_max: float
+) -> _Hits: ...
 def _ranges(
     map: Map, poses: NDArray[np.float64], directions: NDArray[np.float64], range_max: float
 ) -> NDArray[np.float32]: ...
@@ -442,6 +445,9 @@ class _Simulation(metaclass=_Meta):
     def record(self, folder: str, replace: bool) -> None: ...
     def end_recording(self, keep: bool) -> None: ...
     def interrupt(self) -> None: ...
+    def raycast(
+        self, origins: NDArray[np.float64], directions: NDArray[np.float64], range_max: float
+    ) -> _Hits: ...
     @property
     def time_ns(self) -> int: ...
     @property
@@ -514,6 +520,7 @@ class _Flights(metaclass=_Meta):
         shares: NDArray[np.float32],
         range_max: float,
         pooled: int,
+        sensor: str,
         scenario: _Scenario,
         team: int,
     ) -> None: ...

@@ -67,6 +67,11 @@ class Lidar:
         self._handle = _pointflight._Lidar(self._name)
 
     @property
+    def name(self) -> str:
+        """As it was given."""
+        return self._name
+
+    @property
     def title(self) -> str:
         """Maker and model."""
         return self._handle.title

@@ -26,12 +26,15 @@ class Hits(NamedTuple):
     intensity: NDArray[np.float32]
     """(n,): in the scale of the map's cloud; 0 if it had none."""
     surfel: NDArray[np.uint32]
-    """(n,): that surfel's index in `Map.words`; 2**32 - 1 without a hit."""
+    """(n,): that surfel's index in `Map.words`; 2**32 - 1 of what moves and without a hit."""
+    label: NDArray[np.uint16]
+    """(n,): 0 the map, 1 and so on the vehicles, from 10001 on the obstacles; 65535 without a hit."""
 
 
 def raycast(map: Map, origins: ArrayLike, directions: ArrayLike, range_max: float = 100.0) -> Hits:
-    """Casts rays from origins (n, 3), world, m, along directions (n, 3) of any length; one of either, (3,), counts for
-    all of the other. Rays may start anywhere: they are sorted so that neighbours are cast together.
+    """Casts rays in a map (`Simulation.raycast`: among all that moves in a run as well) from origins (n, 3), world, m,
+    along directions (n, 3) of any length; one of either, (3,), counts for all of the other. Rays may start anywhere:
+    they are sorted so that neighbours are cast together.
     """
     return Hits(
         *_pointflight._raycast(

@@ -8,6 +8,8 @@ import os
 from types import TracebackType
 from typing import Any, Dict, Iterable, Iterator, List, Mapping, Optional, Sequence, Tuple, Type, Union, get_args
 
+from numpy.typing import ArrayLike
+
 from . import _pointflight
 from ._pointflight import (
     Acceleration,
@@ -34,6 +36,8 @@ from ._pointflight import (
     Waypoints,
 )
 from .map import Map
+from .poses import numbers
+from .rays import Hits
 from .settings import Path, Scenario
 
 Sample = Union[
@@ -352,6 +356,10 @@ class Simulation:
         """
         self._handle.record(os.fspath(folder), replace)
         return Recording(self)
+
+    def raycast(self, origins: ArrayLike, directions: ArrayLike, range_max: float = 100.0) -> Hits:
+        """What rays hit at `time`, as `pointflight.raycast`: the map, vehicles (their own as well) and obstacles."""
+        return Hits(*self._handle.raycast(numbers(origins), numbers(directions), range_max))
 
     def interrupt(self) -> None:
         """Ends the run early."""

@@ -212,10 +212,29 @@ class ConditionsTest(unittest.TestCase):
         self.assertAlmostEqual(np.degrees(lidar.elevation[0]), -7.2, delta=1.0)
         self.assertAlmostEqual(np.degrees(lidar.elevation[1]), 52.2, delta=1.0)
         avia = lidar_of(pf.Lidar("avia"))
-        self.assertEqual(avia.noise, pf.Lidar("avia").values["noise"]["range_sigma"])
+        self.assertEqual((avia.sensor, avia.noise), ("avia", 0.0))
         self.assertLess(avia.azimuth[1], np.radians(40))
         seen = VectorEnv(room(), 2, task=goal(), lidar=avia).reset(seed=0)[0]["range"]
         self.assertEqual(seen.shape, (2, 16, 64))
+
+    def test_beams_come_back_as_a_sensor_s_do(self) -> None:
+        def images(**surroundings: object) -> np.ndarray:
+            sensed = lidar_of("vlp16", 8, 32, rolling=False)
+            env = VectorEnv(room(), 4, task=goal(), lidar=sensed, scenario={"surroundings": surroundings})
+            return env.reset(seed=0)[0]["range"]
+
+        plain = lidar_of("vlp16", 8, 32, rolling=False)._replace(sensor=None)
+        exact = VectorEnv(room(), 4, task=goal(), lidar=plain).reset(seed=0)[0]["range"]
+        bright = images(reflectivity=0.5)
+        off = 10.0 * (bright - exact)[(exact < 1.0) & (bright < 1.0)]
+        self.assertTrue(0.002 < off[np.abs(off) < 0.2].std() < 0.03)
+        self.assertGreater((bright < 1.0).mean(), (exact < 1.0).mean() - 0.02)
+        self.assertTrue(same(bright, images(reflectivity=0.5)))
+        self.assertLess((images(reflectivity=0.00005) < 1.0).mean(), 0.9 * (bright < 1.0).mean())
+        with self.assertRaisesRegex(pf.InputError, "no_such"):
+            VectorEnv(room(), 1, task=goal(), lidar=Lidar(sensor="no_such"))
+        with self.assertRaisesRegex(ValueError, "depth camera"):
+            VectorEnv(room(), 1, task=goal(), lidar=Lidar(sensor="d455"))
 
     def test_agents_of_a_team(self) -> None:
         env = ParallelEnv(room(), task=formation(), lidar=SMALL)

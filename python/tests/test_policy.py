@@ -6,7 +6,7 @@ import unittest
 import numpy as np
 
 import pointflight as pf
-from pointflight.gym import Goal, Lidar, Observer, Policy
+from pointflight.gym import FacingGoal, Goal, Lidar, Observer, Policy, VectorEnv, facing_goal, straight, turned
 from support import path_of, room, run
 
 LIDAR = Lidar(3, 12, pool=(2, 2), range_max=6.0)
@@ -20,7 +20,7 @@ KEYS = {
 }
 
 
-def policy_file(lidar: "Lidar | None" = LIDAR) -> str:
+def policy_file(lidar: "Lidar | None" = LIDAR, **others: object) -> str:
     """A network of small random numbers about half of the straight way."""
     random = np.random.default_rng(5)
     inputs = 15 + (0 if lidar is None else lidar.rows * lidar.columns)
@@ -30,7 +30,7 @@ def policy_file(lidar: "Lidar | None" = LIDAR) -> str:
     ]
     about = {
         "task": "goal", "time_limit": 20.0, "action": "velocity", "speed": 1.5, "yaw_rate": 1.0, "action_period": 0.1,
-        "base": 0.5, **({} if lidar is None else {"lidar": lidar._asdict()}),
+        "base": 0.5, **others, **({} if lidar is None else {"lidar": lidar._asdict()}),
     }  # fmt: skip
     path = path_of("policy.npz" if lidar else "blind.npz")
     Policy(layers, about).save(path)
@@ -61,8 +61,13 @@ def flown_in_python(policy: Policy, seconds: float) -> np.ndarray:
 
 class PolicyTest(unittest.TestCase):
     def test_program_and_module_fly_alike(self) -> None:
+        for others in ({}, {"faces_goal": True}):
+            with self.subTest(**others):
+                self._fly_alike(**others)
+
+    def _fly_alike(self, **others: object) -> None:
         room()
-        path = policy_file()
+        path = policy_file(**others)
         result = run("fly", scenario_file(), "--policy", path, "-o", path_of("policy_run"), "--no-picture", "--force")
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertIn("pilot reached 1 of 1 goals", result.stderr)
@@ -74,6 +79,52 @@ class PolicyTest(unittest.TestCase):
             row = np.argmin(np.abs(table["time"] - 0.1 * (i + 1)))
             np.testing.assert_allclose(places[row], position, atol=0.03)
         self.assertLess(np.linalg.norm(places[-1] - GOAL), 1.5)
+
+    def test_that_faces_its_goal_flies_turned_situations_alike(self) -> None:
+        random = np.random.default_rng(2)
+        image = random.uniform(0, 1, (6, 3, 12)).astype(np.float32)
+        state = random.uniform(-0.5, 0.5, (6, 15)).astype(np.float32)
+        bearing = random.uniform(-0.2, 0.2, 6)
+        state[:, 0], state[:, 1] = np.cos(bearing), np.sin(bearing)
+        policy = Policy.load(policy_file(LIDAR, faces_goal=True))
+        ahead = policy({"range": image, "state": state})
+        plain = Policy.load(policy_file(LIDAR))({"range": image, "state": state})
+        np.testing.assert_array_equal(ahead, plain)
+        by = np.arange(6) * np.radians(30)  # to the left, whole columns
+        turn = np.stack([np.cos(by), np.sin(by)], 1).astype(np.float32)
+        elsewhere = state.copy()
+        for x in (0, 4, 7, 11):
+            elsewhere[:, x : x + 2] = turned(state[:, x : x + 2], turn)
+        rolled = np.stack([np.roll(image[k], -k, 1) for k in range(6)])
+        seen, found = facing_goal({"range": rolled, "state": elsewhere})
+        np.testing.assert_allclose(found, turn, atol=1e-6)
+        np.testing.assert_array_equal(seen["range"], image)
+        np.testing.assert_allclose(policy({"range": rolled, "state": elsewhere}), turned(ahead, turn), atol=1e-5)
+        with self.assertRaisesRegex(ValueError, "full circle"):
+            Policy(policy.layers, {**policy.about, "lidar": LIDAR._replace(azimuth=(-1.0, 1.0))._asdict()})
+
+    def test_environments_that_face_the_goal(self) -> None:
+        env = VectorEnv(room(), 6, task=Goal(distance=(1, 3), clearance=0.4), lidar=LIDAR, autoreset="same_step")
+        facing = FacingGoal(VectorEnv(room(), 6, task=Goal(distance=(1, 3), clearance=0.4), lidar=LIDAR,
+                                      autoreset="same_step"))  # fmt: skip
+        seen, plain = facing.reset(seed=1)[0], env.reset(seed=1)[0]
+        self.assertTrue(facing.about()["faces_goal"] and facing.num_envs == 6)
+        finals = 0
+        for _ in range(60):
+            turn = facing_goal(plain)[1]
+            action = np.pad(0.9 * straight(seen)[:, :3], ((0, 0), (0, 1)))
+            seen, reward, terminated, _, infos = facing.step(action)
+            plain, expected, ended, _, others = env.step(turned(action, turn))
+            np.testing.assert_array_equal(reward, expected)
+            np.testing.assert_array_equal(seen["state"], facing_goal(plain)[0]["state"])
+            self.assertTrue((np.abs(np.arctan2(seen["state"][:, 1], seen["state"][:, 0])) < np.radians(15.1)).all())
+            for i in np.flatnonzero(infos.get("_final_obs", ())):
+                last = {name: values[None] for name, values in others["final_obs"][i].items()}
+                np.testing.assert_array_equal(infos["final_obs"][i]["range"], facing_goal(last)[0]["range"][0])
+                finals += 1
+        self.assertGreater(finals, 0)
+        with self.assertRaisesRegex(ValueError, "full circle"):
+            FacingGoal(VectorEnv(room(), 1, task=Goal(distance=(1, 3), clearance=0.4), lidar=None))
 
     def test_without_ranges(self) -> None:
         room()

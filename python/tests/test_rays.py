@@ -31,6 +31,7 @@ class RaysTest(unittest.TestCase):
         near = np.abs(hits.range - exact) < 0.05
         self.assertGreater(near.mean(), 0.98)
         np.testing.assert_allclose(hits.point, self.origins + hits.range[:, None] * self.directions, atol=1e-5)
+        self.assertTrue((hits.label[near] == 0).all())
         flat = near & (np.abs(hits.normal).max(1) > 0.99)
         self.assertGreater(flat.mean(), 0.8)
         toward = -np.einsum("nk,nk->n", hits.normal, self.directions)
@@ -52,7 +53,7 @@ class RaysTest(unittest.TestCase):
     def test_without_a_hit(self) -> None:
         hits = pf.raycast(room(), [[0, 0, 1.5], [0, 0, 50]], [[0, 0, -1], [0, 0, 1]], range_max=1.0)
         self.assertTrue(np.isinf(hits.range).all() and np.isnan(hits.point).all() and np.isnan(hits.normal).all())
-        self.assertTrue((hits.surfel == 2**32 - 1).all())
+        self.assertTrue((hits.surfel == 2**32 - 1).all() and (hits.label == 65535).all())
 
     def test_none_are_fine(self) -> None:
         hits = pf.raycast(room(), np.zeros((0, 3)), np.zeros((0, 3)))

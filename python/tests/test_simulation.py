@@ -60,6 +60,25 @@ class SimulationTest(unittest.TestCase):
         with open(path_of("by_python/files.txt"), "rb") as file:
             self.assertIn(b"summary.json", file.read())
 
+    def test_rays_hit_what_moves(self) -> None:
+        balls = {"count": 4, "radius": 0.2, "speed": 0.5, "speed_max": 1.0}
+        sim = pf.Simulation(scenario(obstacles=[balls]))
+        sim.advance_to(0.7)
+        # another run of the same scenario says where they are when that time comes
+        later = next(s for s in pf.Simulation(scenario(obstacles=[balls])).samples(pf.ObstacleSample) if s.time >= 0.7)
+        self.assertAlmostEqual(later.time, sim.time)
+        away = np.array([[0.0, 0.0, 2.9]])
+        ways = later.poses[:, :3, 3] - away
+        hits = sim.raycast(away, ways)
+        seen = hits.label == later.labels
+        self.assertGreater(seen.sum(), 0)
+        np.testing.assert_allclose(hits.range[seen], np.linalg.norm(ways, axis=1)[seen] - 0.2, atol=1e-3)
+        self.assertTrue((hits.surfel[hits.label > 0] == 2**32 - 1).all())
+        vehicle = sim.raycast([0, 0, 2.9], [0, 0, -1])
+        self.assertEqual(vehicle.label[0], 1)
+        self.assertTrue(0.0 < 1.4 - vehicle.range[0] < 0.3)
+        self.assertEqual(pf.raycast(room(), [0, 0, 2.9], [0, 0, -1]).label[0], 0)
+
     def test_recording_leaves_nothing_after_an_exception(self) -> None:
         sim = pf.Simulation(scenario())
         with self.assertRaises(ZeroDivisionError):

@@ -109,6 +109,46 @@ TEST(Policy, SeesGoalVelocityTiltAndTime) {
   EXPECT_NEAR(static_cast<double>(action[3]), up.y(), 1e-6);
 }
 
+/// 4 x 2 cells, 15 numbers of the state; a layer of random numbers.
+Arrays facing(bool faces) {
+  std::vector<float> weights;
+  for (int i = 0; i < 3 * 23; ++i) weights.push_back(0.02f * static_cast<float>(i * 37 % 23 - 11));
+  std::string text = about("goal", 1, kImage);
+  if (faces) text.insert(text.size() - 1, R"(, "faces_goal": true)");
+  return {{"about.npy", document(text)},
+          {"weight0.npy", array("(3, 23)", weights)},
+          {"bias0.npy", array("(3,)", {0.1f, -0.1f, 0.0f})}};
+}
+
+TEST(Policy, ThatFacesItsGoalFliesTurnedSituationsAlike) {
+  const TemporaryFolder folder;
+  const Policy policy = load(folder, facing(true));
+  const Policy plain = load(folder, facing(false));
+  const std::vector<float> ahead{0.1f, 0.2f, 0.3f, 0.4f, 0.5f, 0.6f, 0.7f, 0.8f};
+  const std::vector<float> left{
+      0.4f, 0.1f, 0.2f, 0.3f, 0.8f, 0.5f, 0.6f, 0.7f};  // all to the right
+  RigidBodyState body;
+  body.v_world = {0.6, -0.3, 0.15};
+  PolicyTarget target;
+  target.goal_world = {6, 0.5, 1};
+  target.last_action = {0.2f, -0.3f, 0.1f, 0.0f};
+  const auto expected = plain.act(ahead, body, target);
+  const auto same = policy.act(ahead, body, target);
+  for (std::size_t k = 0; k < 4; ++k) EXPECT_EQ(same[k], expected[k]);
+  // the same world for a heading that is 90 degrees to the left of it: one of four columns
+  body.q_world_body = quaternion_from_rpy(0, 0, 1.5707963267948966);
+  target.last_action = {-0.3f, -0.2f, 0.1f, 0.0f};
+  const auto turned = policy.act(left, body, target);
+  EXPECT_NEAR(turned[0], expected[1], 1e-6f);
+  EXPECT_NEAR(turned[1], -expected[0], 1e-6f);
+  EXPECT_NEAR(turned[2], expected[2], 1e-6f);
+  EXPECT_GT(std::abs(plain.act(left, body, target)[1] - turned[1]), 1e-3f);
+  Arrays blind = picking("goal", {0}, 15);
+  std::string text = about("goal", 1);
+  blind["about.npy"] = document(text.insert(text.size() - 1, R"(, "faces_goal": true)"));
+  expect_contains(error_of([&] { load(folder, blind); }), "full circle");
+}
+
 TEST(Policy, HoversByItsOwnState) {
   const TemporaryFolder folder;
   PolicyTarget target;

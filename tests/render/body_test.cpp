@@ -121,6 +121,7 @@ TEST(Bodies, Statistics_AreSeenWhereTheyAreAtEachBeamsOwnTime) {
       }
       ASSERT_EQ(with[i].range, expected.range) << seed << " " << i;
       ASSERT_EQ(with[i].label, expected.label);
+      ASSERT_TRUE(with[i].label == kMapLabel || with[i].surfel == kNoSurfel);
       ASSERT_EQ(with[i].intensity, expected.intensity);
       seen += expected.label != kMapLabel ? 1 : 0;
     }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "pointflight/core/constants.hpp"
+#include "pointflight/core/random.hpp"
 #include "pointflight/core/resources.hpp"
 #include "pointflight/geometry/rotation.hpp"
 #include "tests/support.hpp"
@@ -51,6 +52,17 @@ TEST(Imu, ReadsPlusGravityAtRestAndTheLeverArmWhileTurning) {
   EXPECT_NEAR(imu.sample(2, SimTime{}, body(rolled), {}, memory).accel.y(), kGravity, 1e-12);
   EXPECT_LT(imu.sample(3, SimTime{}, {}, {{0, 0, -kGravity}, {0, 0, 0}}, memory).accel.norm(),
             1e-12);
+}
+
+TEST(Imu, DrawsOfSeveralSamplesAreThoseOfEach) {
+  const RandomStream stream(7, StreamId::kImuGyroNoise, 3);
+  AxisNormals draws;
+  for (const std::uint64_t sample : {0, 1, 15, 16, 17, 40, 3, 1'000'003}) {
+    const double* drawn = draws.of(stream, sample);
+    for (std::uint64_t axis = 0; axis < 3; ++axis) {
+      EXPECT_EQ(drawn[axis], stream.normal(sample * 3 + axis)) << sample;
+    }
+  }
 }
 
 TEST(Imu, NoiseAndBiasWalkHaveTheFilesDensities) {

@@ -207,6 +207,7 @@ void meet_solid(const RayBatch& batch,
     hits[i].cos_incidence = static_cast<float>(std::abs(met->normal.dot(direction)));
     hits[i].intensity = body.intensity;
     hits[i].label = body.label;
+    hits[i].surfel = kNoSurfel;  // not that of the map behind it
   }
 }
 

@@ -81,7 +81,7 @@ std::vector<Vector3f> world_points(const Scan& scan,
 }
 
 bool is_camera(const LidarSettings& lidar) {
-  return lidar.pattern == ScanPattern::kGrid && lidar.grid.projection == GridProjection::kPinhole;
+  return lidar.measures_depth();
 }
 
 msg::Image depth_image_of(const Scan& scan, const LidarSettings& lidar) {

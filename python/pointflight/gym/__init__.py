@@ -8,6 +8,7 @@ from .conditions import Conditions
 from .courses import TASKS, Corridor, Formation
 from .env import Env
 from .evaluation import Score, advantages, evaluate, wilson
+from .facing import FacingGoal, facing_goal, turned
 from .images import Lidar, lidar_of
 from .observer import Observer
 from .parallel import ParallelEnv
@@ -22,6 +23,7 @@ __all__ = [
     "Corridor",
     "Env",
     "Explore",
+    "FacingGoal",
     "Formation",
     "Goal",
     "Hover",
@@ -38,12 +40,14 @@ __all__ = [
     "VectorEnv",
     "advantages",
     "evaluate",
+    "facing_goal",
     "features",
     "hold",
     "in_formation",
     "lidar_of",
     "reactive",
     "straight",
+    "turned",
     "wander",
     "wilson",
 ]

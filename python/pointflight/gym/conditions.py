@@ -12,7 +12,7 @@ from .draws import CONDITIONS, DROPS, bits, draws
 
 Floats = NDArray[np.float64]
 Numbers = NDArray[np.uint32]
-_KEYS = ("seed", "obstacles", "air", "faults")
+_KEYS = ("seed", "obstacles", "air", "faults", "surroundings")
 _FAULTS = ("rotor", "lidar", "scan_drop")
 _CLOCK = 60.0  # s: episodes begin somewhere in the first minute of the obstacles
 
@@ -30,9 +30,10 @@ class Conditions:
         num_envs: int,
         team: int,
     ) -> None:
-        """scenario: "obstacles", "air" and "faults" (rotor, lidar, scan_drop) as a scenario file has them, and the
-        "seed" of the obstacles. vary: least and greatest by key: "air.wind.mean" (3 each), "faults[0].from", ".until"
-        or ".value", and "mass", a share of the vehicle file's, which its controller knows nothing of."""
+        """scenario: "obstacles", "air" and "faults" (rotor, lidar, scan_drop) as a scenario file has them, the "seed"
+        of the obstacles, and the "surroundings" of a `Lidar` with a sensor. vary: least and greatest by key:
+        "air.wind.mean" (3 each), "faults[0].from", ".until" or ".value", and "mass", a share of the vehicle file's,
+        which its controller knows nothing of."""
         for key in scenario:
             if key not in _KEYS:
                 raise ValueError(f"scenario: {', '.join(_KEYS)} have an effect here, {key!r} has none")
@@ -88,10 +89,10 @@ class Conditions:
         wind = drawn[:, self._columns["air.wind.mean"]]
         return np.concatenate([positions, facing, wind, drawn[:, self._columns["mass"]], clock[:, None]], 1)
 
-    def gust_seeds(
+    def flight_seeds(
         self, which: Numbers, seeds: NDArray[np.uint64], episodes: NDArray[np.uint64]
     ) -> NDArray[np.uint64]:
-        """(m,): of each vehicle its own."""
+        """(m,): of each vehicle its own, for gusts and what its sensor reports."""
         found = bits(seeds[which], episodes[which], self._team, CONDITIONS + np.uint64(1 << 16))
         seed: NDArray[np.uint64] = found[np.arange(len(which)), which % self._team] >> np.uint64(1)
         return seed

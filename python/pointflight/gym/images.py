@@ -36,11 +36,14 @@ class Lidar(NamedTuple):
     """Standard deviation of ranges, m; bell-shaped, at most 3.46 of it."""
     dropout: float = 0.0
     """Share of cells that see nothing."""
+    sensor: Optional[str] = None
+    """A LiDAR (`pointflight.Lidar`'s name or path): beams report what it would of what they hit, by its detection,
+    range noise and false alarms and the scenario's "surroundings"; None: exact ranges."""
 
 
 def lidar_of(sensor: Union[str, Sensor], rows: int = 16, columns: int = 64, **others: Any) -> Lidar:
-    """The field of view and the noise of a sensor file (a name, a path or a `pointflight.Lidar`), seen as an image of
-    so many cells. others: of `Lidar`; range_max is 10 m at most unless it is given."""
+    """The field of view of a sensor file (a name, a path or a `pointflight.Lidar`), seen as an image of so many cells
+    whose beams come back as the sensor's do. others: of `Lidar`; range_max is 10 m at most unless it is given."""
     sensor = sensor if isinstance(sensor, Sensor) else Sensor(sensor)
     directions = sensor.beams().direction.astype(np.float64)
     up = np.arcsin(np.clip(directions[:, 2], -1.0, 1.0))
@@ -51,8 +54,8 @@ def lidar_of(sensor: Union[str, Sensor], rows: int = 16, columns: int = 64, **ot
         "elevation": (float(up.min()), float(up.max())),
         "azimuth": (-math.pi, math.pi) if whole else (float(around.min()), float(around.max())),
         "range_max": min(10.0, values["range_max"]),
-        "noise": values["noise"]["range_sigma"],
         "rolling": True,
+        "sensor": sensor.name,
     }
     return Lidar(rows, columns, **{**given, **others})
 

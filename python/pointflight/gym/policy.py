@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..settings import Path
+from .facing import faces_all, facing_goal, turned
 from .images import Lidar, Observation
 from .pilots import straight
 
@@ -30,12 +31,17 @@ class Policy:
 
     def __init__(self, layers: List[Tuple[Floats, Floats]], about: Mapping[str, Any]) -> None:
         """layers: weights (out, in) and biases (out,). about: `VectorEnv.about()` and "base", the share of the straight
-        way that its actions add to, 0 unless the task is `Goal` or `Race`."""
+        way that its actions add to, 0 unless the task is `Goal` or `Race`; "faces_goal": it has learned by what
+        `facing_goal` gives."""
         self.layers, self.about = layers, dict(about)
         seen = self.about.get("lidar")
         as_tuples = {name: tuple(v) if isinstance(v, list) else v for name, v in (seen or {}).items()}
         self.lidar = None if seen is None else Lidar(**as_tuples)
         """What it sees by."""
+        self._faces_goal = bool(self.about.get("faces_goal", False))
+        if self._faces_goal:
+            if not faces_all(self.lidar, str(self.about["task"]), str(self.about["action"])):
+                raise ValueError("faces_goal: the full circle, goal or race, and velocities are wanted")
 
     @staticmethod
     def load(path: Path) -> Policy:
@@ -55,6 +61,9 @@ class Policy:
 
     def __call__(self, observation: Observation) -> Floats:
         """Actions (n, a), -1 to 1."""
+        turn = None
+        if self._faces_goal:
+            observation, turn = facing_goal(observation)
         x = features(observation, 1.0 if self.lidar is None else self.lidar.range_max)
         for i, (weight, bias) in enumerate(self.layers):
             x = x @ weight.T + bias
@@ -64,4 +73,6 @@ class Policy:
         actions[:, : x.shape[1]] = x
         if self.about["base"] != 0.0:
             actions += np.float32(self.about["base"]) * straight(observation)
+        if turn is not None:
+            actions = turned(actions, turn)
         return np.clip(actions, -1.0, 1.0)

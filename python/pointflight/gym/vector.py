@@ -119,6 +119,7 @@ class VectorEnv(_Base):  # type: ignore[misc]
                 place._handle, self.vehicle._handle, block.stop - block.start, action, action_period, physics_step,
                 steps_per_control, greatest, directions, shares, 1.0 if lidar is None else lidar.range_max,
                 1 if lidar is None else lidar.pool[0] * lidar.pool[1],
+                "" if lidar is None or lidar.sensor is None else lidar.sensor,
                 self.conditions.scenario_in(place.info().name)._handle, self.team,
             )
             for place, block in zip(self.maps, self._blocks)
@@ -234,7 +235,7 @@ class VectorEnv(_Base):  # type: ignore[misc]
     def place(self, which: NDArray[np.uint32], positions: Floats, facing: Floats) -> None:
         """Vehicles begin anew, hovering at positions (m, 3) and heading for others (m, 3), world, m."""
         starts = self.conditions.starts(which, positions, facing)
-        seeds = self.conditions.gust_seeds(which, self.seeds, self._episodes)
+        seeds = self.conditions.flight_seeds(which, self.seeds, self._episodes)
         for k, rows, own in self._parts(which):
             self._flights[k].place(own, starts[rows], seeds[rows])
 
