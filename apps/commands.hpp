@@ -19,6 +19,7 @@ void add_bag_command(CLI::App& app, int& exit_code);
 void add_fidelity_command(CLI::App& app, int& exit_code);
 void add_view_command(CLI::App& app, int& exit_code);
 void add_campaign_command(CLI::App& app, int& exit_code);
+void add_gpu_command(CLI::App& app, int& exit_code);
 void add_study_command(CLI::App& app, int& exit_code);
 
 /// Exit codes that scripts can trust.

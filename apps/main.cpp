@@ -22,6 +22,9 @@
 #include "pointflight/core/mapped_file.hpp"
 #include "pointflight/core/version.hpp"
 #include "pointflight_commit.hpp"
+#if POINTFLIGHT_WITH_GPU
+#include "pointflight/gpu/gpu_renderer.hpp"
+#endif
 
 namespace {
 
@@ -48,6 +51,9 @@ void add_shell_commands(CLI::App& app) {
 }
 
 int run(int argc, char** argv) {
+#if POINTFLIGHT_WITH_GPU
+  pointflight::add_gpu_renderer();
+#endif
   using namespace pointflight::apps;  // NOLINT(google-build-using-namespace): this function only
   CLI::App app{"pointflight: a LiDAR drone in point-cloud maps of real places", "pointflight"};
   app.set_version_flag("--version", version_text);
@@ -66,6 +72,7 @@ int run(int argc, char** argv) {
   add_view_command(app, exit_code);
   add_study_command(app, exit_code);
   add_campaign_command(app, exit_code);
+  add_gpu_command(app, exit_code);
   add_shell_commands(app);
   app.footer(  // not of the commands, which have examples of their own
       "A first tour: pointflight map forest -o forest.pcd\n"

@@ -1,5 +1,8 @@
 #pragma once
 
+#include <bit>
+#include <cstdint>
+
 #include "pointflight/map/surfel.hpp"
 
 namespace pointflight {
@@ -31,5 +34,10 @@ struct SurfelScale {
   /// 1 / ratio.
   alignas(32) float inverse_ratio[8] = {};
 };
+
+/// s2^2 of a surfel word's code of five bits, in r^2.
+inline float variance2_of(std::uint32_t code) {
+  return std::bit_cast<float>(0x3b6bedfau + code * 0x288000u);
+}
 
 }  // namespace pointflight

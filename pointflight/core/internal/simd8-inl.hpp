@@ -330,6 +330,11 @@ POINTFLIGHT_INLINE I8 operator+(const I8& a, const I8& b) {
   POINTFLIGHT_EACH(hn::Add(a.v[p], b.v[p]))
   return out;
 }
+POINTFLIGHT_INLINE I8 operator-(const I8& a, const I8& b) {
+  I8 out;
+  POINTFLIGHT_EACH(hn::Sub(a.v[p], b.v[p]))
+  return out;
+}
 POINTFLIGHT_INLINE I8 operator*(const I8& a, const I8& b) {
   I8 out;
   POINTFLIGHT_EACH(hn::Mul(a.v[p], b.v[p]))

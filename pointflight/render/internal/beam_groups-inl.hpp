@@ -30,7 +30,14 @@ struct Group {
   alignas(32) std::int32_t total[8];
   alignas(32) float nearest[8];  ///< The least t of all hits.
   float mean[3];                 ///< Of the directions.
-  double origin[3][8];           ///< From the map's origin, m.
+  /// `GridOrigin`s, by axis.
+  ///@{
+  alignas(32) std::int32_t voxel[3][8];
+  alignas(32) float rest[3][8];
+  ///@}
+  GridOrigin origin(int axis, std::size_t beam) const {
+    return {voxel[axis][beam], rest[axis][beam]};
+  }
 };
 
 /// Up to 64 beams.
@@ -41,9 +48,9 @@ struct BeamGroups {
   float u[3], v[3], w[3];
   float low_u, high_u, low_v, high_v;  ///< Around all groups.
   float norm;                          ///< Of the frustum's normals below, the greatest.
-  double apex[3];                      ///< From the map's origin.
-  float apex_box[3];                   ///< The same in float, for boxes.
-  float spread;                        ///< Origins lie so far from the apex at most.
+  GridOrigin apex[3];
+  float apex_box[3];  ///< The same from the map's origin, m, for boxes.
+  float spread;       ///< Origins lie so far from the apex at most.
   bool one_origin;
   float plane[4][3];               ///< Inward normals of the frustum's sides.
   float offset[4];                 ///< n . (p - apex) >= offset inside.
@@ -67,7 +74,11 @@ POINTFLIGHT_INLINE bool take_beams(
     group.dy[i] = ray.direction_world.y();
     group.dz[i] = ray.direction_world.z();
     group.end[i] = ray.range_max;
-    for (int k = 0; k < 3; ++k) group.origin[k][i] = ray.origin_world[k] - map.origin[k];
+    for (int k = 0; k < 3; ++k) {
+      const GridOrigin origin = grid_origin(ray.origin_world[k] - map.origin[k], map.resolution);
+      group.voxel[k][i] = origin.voxel;
+      group.rest[k][i] = origin.rest;
+    }
   }
   const F8 dx = load(group.dx);
   const F8 dy = load(group.dy);
@@ -95,24 +106,33 @@ POINTFLIGHT_INLINE bool lies_near(const Group& group, const Group& other, float 
   return squared <= farthest * farthest;
 }
 
+/// From eight beams' origins to a voxel along an axis, m: `to_corner`.
+POINTFLIGHT_INLINE F8 to_voxel(const KernelMap& map,
+                               const Group& group,
+                               int axis,
+                               std::int32_t voxel) {
+  const F8 voxels = to_float(splat_int(voxel) - load(group.voxel[axis]));
+  return voxels * splat(map.r) - load(group.rest[axis]);
+}
+
 /// How far the origins of the beams lie from the apex, which is the first one.
-POINTFLIGHT_INLINE float spread_of(const BeamGroups& p) {
+POINTFLIGHT_INLINE float spread_of(const KernelMap& map, const BeamGroups& p) {
   F8 squared = splat(0.0f);
   bool moves = false;
   for (std::size_t g = 0; g < p.count; ++g) {
     for (int k = 0; k < 3; ++k) {
-      for (std::size_t i = 0; i < 8; ++i) moves = moves || p.groups[g].origin[k][i] != p.apex[k];
+      const Group& group = p.groups[g];
+      for (std::size_t i = 0; i < 8; ++i) {
+        moves = moves || group.voxel[k][i] != p.apex[k].voxel || group.rest[k][i] != p.apex[k].rest;
+      }
     }
   }
   if (!moves) return 0.0f;
   for (std::size_t g = 0; g < p.count; ++g) {
     F8 distance = splat(0.0f);
     for (int k = 0; k < 3; ++k) {
-      alignas(32) float away[8];
-      for (std::size_t i = 0; i < 8; ++i) {
-        away[i] = static_cast<float>(p.groups[g].origin[k][i] - p.apex[k]);
-      }
-      distance = distance + load(away) * load(away);
+      const F8 away = to_voxel(map, p.groups[g], k, p.apex[k].voxel) + splat(p.apex[k].rest);
+      distance = distance + away * away;
     }
     squared = max(squared, distance);
   }
@@ -139,19 +159,19 @@ POINTFLIGHT_INLINE void set_up_planes(BeamGroups& p,
 }
 
 /// The apex is the first beam's origin; the others lie up to the spread away.
-POINTFLIGHT_INLINE void set_up_apex(BeamGroups& p) {
+POINTFLIGHT_INLINE void set_up_apex(const KernelMap& map, BeamGroups& p) {
   for (int k = 0; k < 3; ++k) {
-    p.apex[k] = p.groups[0].origin[k][0];
-    p.apex_box[k] = static_cast<float>(p.apex[k]);
+    p.apex[k] = p.groups[0].origin(k, 0);
+    p.apex_box[k] = -to_corner(0, p.apex[k], map.r);
   }
-  p.spread = spread_of(p);
+  p.spread = spread_of(map, p);
   p.one_origin = p.spread == 0.0f;
 }
 
 /// Sets up the frustum around the first `count` groups.
-POINTFLIGHT_INLINE void set_up(BeamGroups& p, std::size_t count) {
+POINTFLIGHT_INLINE void set_up(const KernelMap& map, BeamGroups& p, std::size_t count) {
   p.count = count;
-  set_up_apex(p);
+  set_up_apex(map, p);
 
   // the frame: w along the mean direction, u and v across it
   Vector3f mean = Vector3f::Zero();

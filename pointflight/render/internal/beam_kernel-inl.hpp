@@ -16,6 +16,7 @@
 #include <memory>
 
 #include "pointflight/map/internal/children-inl.hpp"
+#include "pointflight/render/internal/grid_origin.hpp"
 #include "pointflight/render/internal/hit_rule-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
@@ -44,7 +45,7 @@ struct RayState : BeamState {
   float direction[3];
   std::uint32_t near_side[3];  ///< Byte of the node at which the nearer planes begin, a axis.
   std::uint32_t far_side[3];
-  double origin[3];
+  GridOrigin origin[3];
   std::uint32_t ray;
   const Bvh8Node* node;
   std::size_t steps;  ///< That are left.
@@ -72,8 +73,9 @@ POINTFLIGHT_INLINE void start_ray(const KernelMap& map,
   s.steps = most_steps(map);
   s.depth = 0;
   for (int axis = 0; axis < 3; ++axis) {
-    s.origin[axis] = ray.origin_world[axis] - map.origin[axis];
-    s.start[axis] = static_cast<float>(s.origin[axis]);
+    const double origin = ray.origin_world[axis] - map.origin[axis];
+    s.origin[axis] = grid_origin(origin, map.resolution);
+    s.start[axis] = static_cast<float>(origin);
     const float d = ray.direction_world[axis];
     s.direction[axis] = d;
     // a zero would make 0 * inf; a tiny slope reaches as far
@@ -170,10 +172,10 @@ POINTFLIGHT_INLINE void visit_leaf(const KernelMap& map,
                                    std::uint64_t& overflows) {
   if (!is_readable_leaf(entry, map.word_count)) return;
   const LeafHeader leaf = decode_leaf(map.words[entry.index]);
-  // in double: maps may be kilometres wide; and nothing here depends on the way to the leaf
-  const auto vx = static_cast<float>(leaf.x * map.resolution - s.origin[0]);
-  const auto vy = static_cast<float>(leaf.y * map.resolution - s.origin[1]);
-  const auto vz = static_cast<float>(leaf.z * map.resolution - s.origin[2]);
+  // nothing here depends on the way to the leaf
+  const float vx = to_corner(leaf.x, s.origin[0], map.r);
+  const float vy = to_corner(leaf.y, s.origin[1], map.r);
+  const float vz = to_corner(leaf.z, s.origin[2], map.r);
   const F8 dx = splat(s.direction[0]);
   const F8 dy = splat(s.direction[1]);
   const F8 dz = splat(s.direction[2]);

@@ -33,14 +33,15 @@ KernelMap kernel_map_of(const SurfelMap& map) {
   k.word_count = map.words().size();
   for (int axis = 0; axis < 3; ++axis) k.origin[axis] = map.origin_world()[axis];
   k.resolution = map.resolution();
+  k.r = static_cast<float>(map.resolution());
   k.support = m.support;
   k.support_squared = m.support * m.support;
   k.inverse_support = 1.0f / k.support_squared;
   // c = 36 / (pi M^2): the weights of a covered plane average 1
   k.weight_scale = kWeightOne * 36.0f / (static_cast<float>(kPi) * k.support_squared);
   k.scale = map.scale();
-  k.window = m.window * static_cast<float>(map.resolution());
-  k.widest_group = std::min(0.036f, 0.23f * static_cast<float>(map.resolution()));
+  k.window = m.window * k.r;
+  k.widest_group = std::min(0.036f, 0.23f * k.r);
   k.tau = static_cast<std::int32_t>(m.tau * kWeightOne);
   return k;
 }

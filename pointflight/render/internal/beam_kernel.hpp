@@ -20,6 +20,7 @@ struct KernelMap {
   std::size_t word_count = 0;
   double origin[3] = {0, 0, 0};  ///< World position of voxel (0, 0, 0), m.
   double resolution = 0.0;
+  float r = 0.0f;                ///< The same.
   float support = 0.0f;          ///< M
   float support_squared = 0.0f;  ///< M^2
   float inverse_support = 0.0f;  ///< 1 / M^2
@@ -34,6 +35,8 @@ struct KernelMap {
 
 /// Weights are whole numbers of 2^-20: their sums do not depend on the order of adding.
 inline constexpr float kWeightOne = 1048576.0f;
+/// Shares of a window's depth and of cosines are whole numbers of 1 / 4096, likewise.
+inline constexpr float kShareSteps = 4096.0f;
 
 /// What a beam hit, before intensities are looked up.
 struct KernelHit {

@@ -86,14 +86,13 @@ template <bool kOneOrigin>
 POINTFLIGHT_INLINE void meet_group(
     const KernelMap& map, Packet& p, std::size_t g, const PacketLeaf& leaf, std::uint32_t which) {
   Group& group = p.groups[g];
-  alignas(32) float from[3][8];  // the leaf's origin from the beams'
-  if constexpr (!kOneOrigin) {
-    for (int axis = 0; axis < 3; ++axis) {
-      for (std::size_t i = 0; i < 8; ++i) {
-        from[axis][i] = static_cast<float>(leaf.corner[axis] - group.origin[axis][i]);
-      }
-    }
-  }
+  const auto from = [&](int axis) {  // the leaf's origin from the beams'
+    return to_voxel(map, group, axis, static_cast<std::int32_t>(leaf.corner[axis]));
+  };
+  const F8 zero = splat(0.0f);
+  const F8 from_x = kOneOrigin ? zero : from(0);
+  const F8 from_y = kOneOrigin ? zero : from(1);
+  const F8 from_z = kOneOrigin ? zero : from(2);
   const F8 dx = load(group.dx);
   const F8 dy = load(group.dy);
   const F8 dz = load(group.dz);
@@ -111,9 +110,9 @@ POINTFLIGHT_INLINE void meet_group(
       u = {splat(leaf.whitened[0][i]), splat(leaf.whitened[1][i]), splat(leaf.whitened[2][i])};
     } else {
       u = whiten(e,
-                 splat(leaf.center[0][i]) + load(from[0]),
-                 splat(leaf.center[1][i]) + load(from[1]),
-                 splat(leaf.center[2][i]) + load(from[2]));
+                 splat(leaf.center[0][i]) + from_x,
+                 splat(leaf.center[1][i]) + from_y,
+                 splat(leaf.center[2][i]) + from_z);
     }
     const Meeting meeting = meet(u, whiten(e, dx, dy, dz), e.s0);
     const M8 accepted = (meeting.m2 < support) & (splat(0.0f) <= meeting.t) & (meeting.t <= end);
@@ -145,13 +144,13 @@ POINTFLIGHT_INLINE void visit_leaf(const KernelMap& map, Packet& p, const Entry&
   leaf.lanes = load_surfels(map.scale, map.words + entry.index + 1);
   leaf.first_word = entry.index + 1;
   leaf.count = entry.meta;
-  leaf.corner[0] = header.x * map.resolution;
-  leaf.corner[1] = header.y * map.resolution;
-  leaf.corner[2] = header.z * map.resolution;
+  leaf.corner[0] = header.x;
+  leaf.corner[1] = header.y;
+  leaf.corner[2] = header.z;
   // centres from the apex
-  const Place center = {leaf.lanes.x + splat(static_cast<float>(leaf.corner[0] - p.apex[0])),
-                        leaf.lanes.y + splat(static_cast<float>(leaf.corner[1] - p.apex[1])),
-                        leaf.lanes.z + splat(static_cast<float>(leaf.corner[2] - p.apex[2]))};
+  const Place center = {leaf.lanes.x + splat(to_corner(header.x, p.apex[0], map.r)),
+                        leaf.lanes.y + splat(to_corner(header.y, p.apex[1], map.r)),
+                        leaf.lanes.z + splat(to_corner(header.z, p.apex[2], map.r))};
   const InFrustum in = in_frustum(map, p, leaf, center);
   if (in.surfels == 0) return;
   const Shapes e = decode_shapes(map.scale, leaf.lanes);

@@ -45,8 +45,8 @@ struct Bundle : BundleWay {
 inline constexpr float kBundleRoom = 4e-6f;
 
 /// Sets up the way of the first `count` groups, whose beams are no wider than lines.
-POINTFLIGHT_INLINE void set_up_way(BundleWay& b, std::size_t count) {
-  set_up(b, count);
+POINTFLIGHT_INLINE void set_up_way(const KernelMap& map, BundleWay& b, std::size_t count) {
+  set_up(map, b, count);
   for (std::size_t g = 0; g < count; ++g) {
     const Group& group = b.groups[g];
     const F8 dx = load(group.dx);
@@ -85,8 +85,8 @@ POINTFLIGHT_INLINE void widen(BundleWay& b, float wider_u, float wider_v) {
 }
 
 /// Sets up a bundle of the first `count` groups.
-POINTFLIGHT_INLINE void set_up_bundle(Bundle& b, std::size_t count) {
-  set_up_way(b, count);
+POINTFLIGHT_INLINE void set_up_bundle(const KernelMap& map, Bundle& b, std::size_t count) {
+  set_up_way(map, b, count);
   for (std::size_t n = 0; n < 8 * count; ++n) {
     start_beam(b.groups[n / 8].end[n % 8], b.beams[n]);
   }
@@ -253,16 +253,14 @@ template <bool kOneOrigin>
 POINTFLIGHT_INLINE void visit_leaf(const KernelMap& map, Bundle& b, const BundleEntry& entry) {
   if (!is_readable_leaf(entry.place, map.word_count)) return;
   const LeafHeader header = decode_leaf(map.words[entry.place.index]);
-  const double corner[3] = {
-      header.x * map.resolution, header.y * map.resolution, header.z * map.resolution};
   const SurfelLanes surfels = load_surfels(map.scale, map.words + entry.place.index + 1);
   const std::uint32_t lanes = (1u << entry.place.meta) - 1u;
   const Shapes e = decode_shapes(map.scale, surfels);
-  const auto from = [&](double x, double y, double z) {
+  const auto from = [&](const GridOrigin& x, const GridOrigin& y, const GridOrigin& z) {
     return whiten(e,
-                  surfels.x + splat(static_cast<float>(corner[0] - x)),
-                  surfels.y + splat(static_cast<float>(corner[1] - y)),
-                  surfels.z + splat(static_cast<float>(corner[2] - z)));
+                  surfels.x + splat(to_corner(header.x, x, map.r)),
+                  surfels.y + splat(to_corner(header.y, y, map.r)),
+                  surfels.z + splat(to_corner(header.z, z, map.r)));
   };
   Whitened u = from(b.apex[0], b.apex[1], b.apex[2]);
   std::uint32_t shorter = 0;  // groups with beams that end earlier now
@@ -274,7 +272,7 @@ POINTFLIGHT_INLINE void visit_leaf(const KernelMap& map, Bundle& b, const Bundle
     BeamState& s = b.beams[n];
     if (s.end < entry.place.t) continue;
     if constexpr (!kOneOrigin) {
-      u = from(group.origin[0][i], group.origin[1][i], group.origin[2][i]);
+      u = from(group.origin(0, i), group.origin(1, i), group.origin(2, i));
     }
     const Meeting meeting =
         meet(u, whiten(e, splat(group.dx[i]), splat(group.dy[i]), splat(group.dz[i])), e.s0);

@@ -140,7 +140,7 @@ POINTFLIGHT_INLINE void visit_leaf(const ConeCall& call, const BundleEntry& entr
   float corner[3];
   const auto set_corner = [&](std::size_t n) {
     for (int k = 0; k < 3; ++k) {
-      corner[k] = static_cast<float>(leaf.corner[k] - b.groups[n >> 3].origin[k][n & 7]);
+      corner[k] = to_corner(leaf.corner[k], b.groups[n >> 3].origin(k, n & 7), map.r);
     }
   };
   set_corner(0);
@@ -328,7 +328,7 @@ static void trace_wide(const KernelMap& map,
   const Widths widths{kWidestBundle, kWidestBundle};
   const auto run =
       [&](std::size_t groups, const std::uint32_t* const* of_groups, std::uint64_t which) {
-        set_up_cones(wide, bundle, groups, of_groups);
+        set_up_cones(map, wide, bundle, groups, of_groups);
         walk(call, which);
         for (; which != 0; which &= which - 1) finish(call, bundle.beams[std::countr_zero(which)]);
       };

@@ -19,7 +19,7 @@ struct ConeLeaf {                  // NOLINT(cppcoreguidelines-pro-type-member-i
   alignas(32) float covariance[3][3][8];  ///< m^2
   alignas(32) float reach[3][8];          ///< Of the supports, m.
   alignas(32) float normal[3][8];         ///< e0
-  double corner[3];                       ///< The leaf's origin from the map's, m.
+  std::uint32_t corner[3];                ///< Voxel of the leaf's origin.
   std::uint32_t first_word, lanes;
 };
 
@@ -28,9 +28,9 @@ POINTFLIGHT_INLINE ConeLeaf cone_leaf(const KernelMap& map, const Entry& entry) 
   const LeafHeader header = decode_leaf(map.words[entry.index]);
   leaf.first_word = entry.index + 1;
   leaf.lanes = (1u << entry.meta) - 1u;
-  leaf.corner[0] = header.x * map.resolution;
-  leaf.corner[1] = header.y * map.resolution;
-  leaf.corner[2] = header.z * map.resolution;
+  leaf.corner[0] = header.x;
+  leaf.corner[1] = header.y;
+  leaf.corner[2] = header.z;
   const SurfelLanes surfels = load_surfels(map.scale, map.words + entry.index + 1);
   store(surfels.x, leaf.center[0]);
   store(surfels.y, leaf.center[1]);

@@ -250,14 +250,15 @@ POINTFLIGHT_INLINE void set_up_sections(const WideBeams& wide,
 }
 
 /// Sets up a bundle of the first `count` groups; `rays[g]` are those of group g.
-POINTFLIGHT_INLINE void set_up_cones(const WideBeams& wide,
+POINTFLIGHT_INLINE void set_up_cones(const KernelMap& map,
+                                     const WideBeams& wide,
                                      ConeBundle& b,
                                      std::size_t count,
                                      const std::uint32_t* const* rays) {
   for (std::size_t g = 0; g < count; ++g) {
     for (std::size_t i = 0; i < 8; ++i) hwy::Prefetch(&wide.across[rays[g][i]]);
   }
-  set_up_way(b, count);
+  set_up_way(map, b, count);
   b.used = 0;
   b.first_look = kNever;
   b.wide_u = b.wide_v = 0.0f;

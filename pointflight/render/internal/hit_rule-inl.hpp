@@ -159,7 +159,6 @@ static HWY_NOINLINE bool make_room(HitLanes& h, float end) {
 struct Shares {
   I8 weight, depth, cosine;
 };
-inline constexpr float kShareSteps = 4096.0f;
 
 POINTFLIGHT_INLINE Shares
 shares_of(const KernelMap& map, const F8& first, const F8& t, const I8& weight, const F8& cosine) {

@@ -35,8 +35,8 @@ struct Packet : BeamGroups {
 };
 
 /// Sets up a packet of the first `count` groups.
-POINTFLIGHT_INLINE void set_up_packet(Packet& p, std::size_t count) {
-  set_up(p, count);
+POINTFLIGHT_INLINE void set_up_packet(const KernelMap& map, Packet& p, std::size_t count) {
+  set_up(map, p, count);
   p.failed = 0;
   for (std::size_t g = 0; g < count; ++g) p.rows[g].count = 0;
 }

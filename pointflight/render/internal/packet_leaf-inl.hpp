@@ -17,7 +17,7 @@ namespace pointflight::HWY_NAMESPACE {
 // NOLINTNEXTLINE(cppcoreguidelines-pro-type-member-init): written before it is read
 struct PacketLeaf {
   SurfelLanes lanes;
-  double corner[3];  ///< The leaf's origin from the map's origin, m.
+  std::uint32_t corner[3];  ///< Voxel of the leaf's origin.
   std::uint32_t first_word;
   std::uint32_t count;
   // one value per surfel

@@ -53,7 +53,7 @@ static std::uint64_t trace_bundles(const Beams& beams,
     const std::size_t groups = fill(beams, order, count, widths, at, bundle, taken, waiting);
     if (!waiting.has_room()) trace_waiting();
     if (groups == 0) continue;
-    set_up_bundle(bundle, groups);
+    set_up_bundle(beams.map, bundle, groups);
     walk(beams.map, bundle);
     for (std::size_t n = 0; n < 8 * groups; ++n) {
       const std::uint32_t* beam = order + taken[n / 8] + n % 8;
@@ -100,7 +100,7 @@ static std::uint64_t trace_packets(const Beams& beams,
     const std::size_t groups = fill(beams, order, count, widths, at, packet, taken, waiting);
     if (!waiting.has_room()) trace_waiting();
     if (groups == 0) continue;
-    set_up_packet(packet, groups);
+    set_up_packet(beams.map, packet, groups);
     walk(beams.map, packet);
     for (std::size_t g = 0; g < groups; ++g) {
       const std::uint32_t* eight = order + taken[g];

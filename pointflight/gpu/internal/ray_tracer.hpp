@@ -1,0 +1,101 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "pointflight/gpu/internal/device_layout.hpp"
+#include "pointflight/gpu/internal/gpu_device.hpp"
+#include "pointflight/map/surfel_map.hpp"
+
+namespace pointflight {
+
+/// How a device comes to quotients and roots as IEEE 754 has them (kernel/exact.glsl).
+enum class ExactBy { kDevice, kResiduals, kDoubles };
+
+/// A kernel of kernel/rays.comp.
+struct RayKernel {
+  ExactBy exact = ExactBy::kResiduals;
+  /// Subgroups stay and take ray after ray; else an invocation a ray.
+  bool is_persistent = false;
+  /// A subgroup of the former takes rays so many times; 0: as long as there are any. llvmpipe ends
+  /// a shader after 65,535 turns of its loops.
+  std::uint32_t most_chunks = 0;
+};
+
+/// In a word or two, for users.
+std::string name_of(const RayKernel& kernel);
+/// Those that a device may run, the fastest first.
+std::vector<RayKernel> kernels_for(const GpuDevice& device);
+
+/// What a kernel needs of a map beside nodes and words.
+device::MapNumbers numbers_of(const SurfelMap& map);
+
+/// A map in a device's memory.
+class DeviceMap {
+ public:
+  /// Throws GpuError if it does not fit, InputError if the map is damaged: kernels read what nodes
+  /// say without a look.
+  DeviceMap(GpuDevice& device, const SurfelMap& map);
+
+  /// Numbers, nodes and words, as the kernel binds them.
+  [[nodiscard]] const std::array<GpuBuffer, 3>& buffers() const { return buffers_; }
+
+ private:
+  std::array<GpuBuffer, 3> buffers_;
+};
+
+/// Rays through a map on a device. What is on its way lies in slots, so that the host fills one and
+/// reads another meanwhile. For one thread at a time.
+class RayTracer {
+ public:
+  static constexpr std::size_t kSlots = 3;
+  static constexpr std::size_t kMostRays = std::size_t{1} << 20;  ///< Of a slot.
+
+  /// Device and map must outlive it. Throws GpuError.
+  RayTracer(GpuDevice& device, const DeviceMap& map, const RayKernel& kernel);
+  /// Waits for what is on its way.
+  ~RayTracer();
+  RayTracer(const RayTracer&) = delete;
+  RayTracer& operator=(const RayTracer&) = delete;
+
+  /// Room for the rays of a slot that is not on its way.
+  [[nodiscard]] std::span<device::DeviceRay> rays(std::size_t slot, std::size_t count);
+  /// Sends the first `count` of them off. Throws GpuError.
+  void submit(std::size_t slot, std::size_t count);
+  /// Waits for them: a hit for each, until the slot is filled again. Throws GpuError.
+  [[nodiscard]] std::span<const device::DeviceHit> collect(std::size_t slot);
+  /// How long the kernel of the last `collect` took, s.
+  [[nodiscard]] double kernel_time() const { return kernel_time_; }
+
+ private:
+  struct Slot {
+    GpuBuffer upload, rays, hits, read_back;
+    VkDescriptorSet set = VK_NULL_HANDLE;
+    VkCommandBuffer commands = VK_NULL_HANDLE;
+    VkFence fence = VK_NULL_HANDLE;
+    std::size_t count = 0;  ///< On its way.
+  };
+  void make_pipeline(const RayKernel& kernel);
+  void make_slots();
+  void make_room(Slot& slot, std::size_t count);
+  void record(Slot& slot);
+  void release() noexcept;
+
+  GpuDevice& device_;
+  const DeviceMap& map_;
+  RayKernel kernel_;
+  VkDescriptorSetLayout set_layout_ = VK_NULL_HANDLE;
+  VkPipelineLayout layout_ = VK_NULL_HANDLE;
+  VkPipeline pipeline_ = VK_NULL_HANDLE;
+  VkDescriptorPool descriptors_ = VK_NULL_HANDLE;
+  VkCommandPool pool_ = VK_NULL_HANDLE;
+  VkQueryPool queries_ = VK_NULL_HANDLE;
+  GpuBuffer counter_;
+  std::array<Slot, kSlots> slots_;
+  double kernel_time_ = 0.0;
+};
+
+}  // namespace pointflight

@@ -1,0 +1,64 @@
+#include "pointflight/gpu/internal/vulkan_functions.hpp"
+
+#include <dlfcn.h>
+#include <fmt/format.h>
+
+#include <cstdlib>
+#include <vector>
+
+#include "pointflight/core/input_error.hpp"
+
+namespace pointflight {
+namespace {
+
+/// The layer that checks how Vulkan is used, if POINTFLIGHT_VULKAN_VALIDATION asks for it.
+std::vector<const char*> layers() {
+  // NOLINTNEXTLINE(concurrency-mt-unsafe): nothing writes the environment
+  if (std::getenv("POINTFLIGHT_VULKAN_VALIDATION") == nullptr) return {};
+  return {"VK_LAYER_KHRONOS_validation"};
+}
+
+}  // namespace
+
+VulkanFunctions::VulkanFunctions() {
+  void* library = dlopen("libvulkan.so.1", RTLD_NOW | RTLD_LOCAL);
+  if (library == nullptr) {
+    throw InputError(
+        "no GPU: libvulkan.so.1 is not installed (Debian: libvulkan1, and the driver)");
+  }
+  const auto load =
+      reinterpret_cast<PFN_vkGetInstanceProcAddr>(dlsym(library, "vkGetInstanceProcAddr"));
+  const auto create =
+      load == nullptr ? nullptr
+                      : reinterpret_cast<PFN_vkCreateInstance>(load(nullptr, "vkCreateInstance"));
+  if (create == nullptr) throw InputError("no GPU: libvulkan.so.1 is no Vulkan loader");
+  VkApplicationInfo application{};
+  application.sType = VK_STRUCTURE_TYPE_APPLICATION_INFO;
+  application.pApplicationName = "pointflight";
+  application.apiVersion = VK_API_VERSION_1_1;
+  const std::vector<const char*> wanted = layers();
+  VkInstanceCreateInfo info{};
+  info.sType = VK_STRUCTURE_TYPE_INSTANCE_CREATE_INFO;
+  info.pApplicationInfo = &application;
+  info.enabledLayerCount = static_cast<std::uint32_t>(wanted.size());
+  info.ppEnabledLayerNames = wanted.data();
+  const VkResult result = create(&info, nullptr, &instance);
+  if (result != VK_SUCCESS) {
+    throw InputError(fmt::format("no GPU: Vulkan does not start (error {}); is a driver installed?",
+                                 static_cast<int>(result)));
+  }
+  bool has_all = true;
+#define POINTFLIGHT_LOAD(name)                                       \
+  name = reinterpret_cast<PFN_vk##name>(load(instance, "vk" #name)); \
+  has_all = has_all && name != nullptr;
+  POINTFLIGHT_VULKAN_FUNCTIONS(POINTFLIGHT_LOAD)
+#undef POINTFLIGHT_LOAD
+  if (!has_all) throw InputError("no GPU: the Vulkan loader is older than version 1.1");
+}
+
+const VulkanFunctions& VulkanFunctions::get() {
+  static const VulkanFunctions functions;
+  return functions;
+}
+
+}  // namespace pointflight

@@ -1,0 +1,72 @@
+// The kernel's text, which is C++ too.
+#pragma once
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+
+#include "pointflight/gpu/internal/device_layout.hpp"
+
+namespace pointflight::device {
+
+struct uvec2 {
+  uint x, y;
+};
+struct uvec4 {
+  uint x, y, z, w;
+};
+
+inline float uintBitsToFloat(uint bits) {
+  return std::bit_cast<float>(bits);
+}
+inline uint floatBitsToUint(float x) {
+  return std::bit_cast<uint>(x);
+}
+inline uint bitfieldExtract(uint x, int first, int count) {
+  return (x >> first) & ((1u << count) - 1u);
+}
+inline int bitCount(uint x) {
+  return std::popcount(x);
+}
+inline int findLSB(uint x) {
+  return x == 0 ? -1 : std::countr_zero(x);
+}
+
+/// One ray at a time: `start_way`, `step_node` and `step_leaf` until `s.next` is kDone, `end_way`.
+struct KernelAsCpp {
+  MapNumbers map;
+  const uvec4* nodes;
+  const uvec2* words;
+
+  static float abs(float x) { return std::fabs(x); }
+  static float sqrt(float x) { return std::sqrt(x); }
+  template <class T>
+  static T min(T a, T b) {
+    return std::min(a, b);
+  }
+  template <class T>
+  static T max(T a, T b) {
+    return std::max(a, b);
+  }
+#define precise
+#define EXACT_BY 0
+#include "pointflight/gpu/kernel/exact.glsl"
+#include "pointflight/gpu/kernel/trace.glsl"
+#undef EXACT_BY
+#undef precise
+
+  DeviceHit trace(const DeviceRay& ray) {
+    start_way(ray);
+    while (s.next != kDone) {
+      if (s.next == kInner) {
+        step_node();
+      } else {
+        step_leaf();
+      }
+    }
+    return end_way();
+  }
+};
+
+}  // namespace pointflight::device
