@@ -12,6 +12,7 @@
 #include "apps/error_table.hpp"
 #include "apps/flags.hpp"
 #include "apps/input_kind.hpp"
+#include "apps/renderer_flags.hpp"
 #include "apps/settings_json.hpp"
 #include "apps/surroundings_flags.hpp"
 #include "apps/survey_flags.hpp"
@@ -33,7 +34,7 @@ struct CompareFlags {
   std::string map;
   ScansFlags scans;
   std::string cloud;
-  std::string renderer = "beam";
+  RendererFlags renderer{"beam", ""};
   bool floor = false;
   std::string lidar;
   Surroundings surroundings;
@@ -220,7 +221,8 @@ void compare(const CompareFlags& flags) {
   end_progress();
   std::optional<SupportedCells> cloud;
   if (!flags.cloud.empty()) cloud = supported_by_cloud(flags.cloud);
-  const auto renderer = make_renderer(flags.renderer, Scene{map});
+  choose_renderer(flags.renderer);
+  const auto renderer = make_renderer(flags.renderer.renderer, Scene{map});
   ErrorCollector all;
   ErrorCollector supported;
   ErrorCollector assumed;
@@ -297,9 +299,7 @@ void add_compare_command(CLI::App& parent, int& /*exit_code*/) {
                   flags->cloud,
                   "The cloud that the map was made from: also restricts the comparison to rays "
                   "that it supports: one of its points lies within 0.1 m of the return");
-  app->add_option("--renderer", flags->renderer, "How ranges are made")
-      ->check(CLI::IsMember(renderer_names()))
-      ->capture_default_str();
+  add_renderer_flags(*app, flags->renderer, "How ranges are made");
   app->add_flag(
       "--floor",
       flags->floor,

@@ -14,6 +14,7 @@
 #include "apps/fly_links.hpp"
 #include "apps/input_kind.hpp"
 #include "apps/policy_flags.hpp"
+#include "apps/renderer_flags.hpp"
 #include "apps/ros_flags.hpp"
 #include "apps/run_cost.hpp"
 #include "apps/scenario_command.hpp"
@@ -54,6 +55,7 @@ struct FlyFlags {
   bool no_picture = false;
   bool json = false;
   std::string policy;  ///< Path of a .npz; empty: none.
+  RendererFlags renderer;
   RosFlags ros;
   ShareFlags share;
 };
@@ -264,6 +266,7 @@ std::vector<std::unique_ptr<FlightPart>> parts_of(const FlyFlags& flags, int thr
   std::vector<std::unique_ptr<FlightPart>> parts;
   parts.push_back(std::make_unique<SharePart>(flags.share, flags.output));
   parts.push_back(std::make_unique<PolicyPart>(flags.policy));
+  parts.push_back(std::make_unique<RendererPart>(flags.renderer));
   parts.push_back(std::make_unique<FolderPart>(
       FolderOptions{flags.output, existing, !flags.no_picture}, threads));
   parts.push_back(std::make_unique<TerminalPart>());
@@ -377,6 +380,7 @@ void add_fly_command(CLI::App& parent, int& exit_code) {
       "Take all beams of a scan from one pose, without motion distortion, as in the paper");
   app->footer("Example: pointflight fly forest.pfmap -o run --record run.mcap");
   add_policy_flag(*app, flags->policy);
+  add_renderer_flags(*app, flags->renderer, "Of all LiDARs, instead of the scenario's");
   add_ros_flags(*app, flags->ros);
   add_view_flags(*app, flags->ros.view);
   add_share_flags(*app, flags->share);

@@ -1,17 +1,15 @@
 #include <fmt/format.h>
 
+#include <chrono>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
 
 #include "apps/commands.hpp"
 #include "apps/flags.hpp"
-#include "pointflight/core/input_error.hpp"
 #include "pointflight/core/parallel.hpp"
-#if POINTFLIGHT_WITH_GPU
 #include "pointflight/gpu/gpu_list.hpp"
-#include "pointflight/gpu/gpu_test.hpp"
-#endif
+#include "pointflight/gpu/gpu_trial.hpp"
 
 namespace pointflight::apps {
 namespace {
@@ -20,8 +18,6 @@ struct GpuFlags {
   std::string gpu;
   bool json = false;
 };
-
-#if POINTFLIGHT_WITH_GPU
 
 std::string gigabytes(std::uint64_t bytes) {
   return fmt::format("{:.1f} GB", 1e-9 * static_cast<double>(bytes));
@@ -56,44 +52,48 @@ void print_gpus(const GpuFlags& flags) {
   }
 }
 
+/// Rays a second; at least one round, and some tenths of a second.
+template <class Action>
+double speed_of(const GpuTrial& trial, const Action& round) {
+  using Clock = std::chrono::steady_clock;
+  constexpr double kLongEnough = 0.3;  // s
+  round();                             // once for what is made at first
+  const auto begin = Clock::now();
+  double rounds = 0.0;
+  double seconds = 0.0;
+  do {
+    round();
+    rounds += 1.0;
+    seconds = std::chrono::duration<double>(Clock::now() - begin).count();
+  } while (seconds < kLongEnough);
+  return rounds * static_cast<double>(trial.rays()) / seconds;
+}
+
 void print_test(const GpuFlags& flags) {
   const GpuInfo gpu = find_gpu(flags.gpu);
-  const GpuTest test = test_gpu(flags.gpu, Executor());
+  const Executor executor;
+  GpuTrial trial(flags.gpu);
+  const double there = speed_of(trial, [&] { trial.trace_on_device(); });
+  const double here = speed_of(trial, [&] { trial.trace_on_processor(executor); });
   if (flags.json) {
     const nlohmann::json out = {{"name", gpu.name},
                                 {"driver", gpu.driver},
-                                {"exact_by", test.exact_by},
-                                {"rays", test.rays},
-                                {"equal", test.equal},
-                                {"rays_per_second", test.speed},
-                                {"processor_rays_per_second", test.processor_speed}};
+                                {"exact_by", trial.exact_by()},
+                                {"rays", trial.rays()},
+                                {"equal", trial.equal()},
+                                {"rays_per_second", there},
+                                {"processor_rays_per_second", here}};
     fmt::print("{}\n", out.dump(2));
     return;
   }
   fmt::print("{} {}\n", gpu.index, gpu.name);
-  fmt::print("  {} of {} rays have this processor's bits\n", test.equal, test.rays);
+  fmt::print("  {} of {} rays have this processor's bits\n", trial.equal(), trial.rays());
+  fmt::print("  divides exactly by {}\n",
+             trial.exact_by().empty() ? "no way that was tried: --renderer gpu is refused"
+                                      : trial.exact_by());
   fmt::print(
-      "  divides exactly by {}\n",
-      test.exact_by.empty() ? "no way that was tried: --renderer gpu is refused" : test.exact_by);
-  fmt::print("  {:.1f} M rays/s there and back, {:.1f} M on this processor\n",
-             1e-6 * test.speed,
-             1e-6 * test.processor_speed);
+      "  {:.1f} M rays/s there and back, {:.1f} M on this processor\n", 1e-6 * there, 1e-6 * here);
 }
-
-#else
-
-[[noreturn]] void refuse() {
-  throw InputError(
-      "gpu: this build has no Vulkan; install libvulkan-dev and glslang-tools and build again");
-}
-void print_gpus(const GpuFlags& /*flags*/) {
-  refuse();
-}
-void print_test(const GpuFlags& /*flags*/) {
-  refuse();
-}
-
-#endif
 
 }  // namespace
 

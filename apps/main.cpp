@@ -21,10 +21,8 @@
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/core/mapped_file.hpp"
 #include "pointflight/core/version.hpp"
-#include "pointflight_commit.hpp"
-#if POINTFLIGHT_WITH_GPU
 #include "pointflight/gpu/gpu_renderer.hpp"
-#endif
+#include "pointflight_commit.hpp"
 
 namespace {
 
@@ -51,9 +49,7 @@ void add_shell_commands(CLI::App& app) {
 }
 
 int run(int argc, char** argv) {
-#if POINTFLIGHT_WITH_GPU
   pointflight::add_gpu_renderer();
-#endif
   using namespace pointflight::apps;  // NOLINT(google-build-using-namespace): this function only
   CLI::App app{"pointflight: a LiDAR drone in point-cloud maps of real places", "pointflight"};
   app.set_version_flag("--version", version_text);

@@ -8,6 +8,7 @@
 #include "apps/commands.hpp"
 #include "apps/flags.hpp"
 #include "apps/input_kind.hpp"
+#include "apps/renderer_flags.hpp"
 #include "apps/settings_json.hpp"
 #include "apps/surroundings_flags.hpp"
 #include "apps/terminal.hpp"
@@ -25,7 +26,7 @@ struct ScanFlags {
   std::string pose;
   std::int64_t sub_rays = -1;
   std::string returns;
-  std::string renderer = "beam";
+  RendererFlags renderer{"beam", ""};
   std::uint64_t seed = 1;
   std::uint64_t index = 0;
   bool no_noise = false;
@@ -55,7 +56,7 @@ void print_scan(const Scan& scan, const ScanFlags& flags) {
   if (flags.json) {
     nlohmann::ordered_json json;
     json["lidar"] = flags.lidar;
-    json["renderer"] = flags.renderer;
+    json["renderer"] = flags.renderer.renderer;
     json["seed"] = flags.seed;
     json["beams"] = scan.beams;
     json["points"] = scan.points.size();
@@ -93,7 +94,8 @@ void take_scan(const ScanFlags& flags) {
     if (flags.returns == mode.name) settings.detection.returns = mode.value;
   }
   const Lidar lidar(settings, 0, nullptr, surroundings_in(*map, flags.surroundings));
-  const auto renderer = make_renderer(flags.renderer, Scene{map});
+  choose_renderer(flags.renderer);
+  const auto renderer = make_renderer(flags.renderer.renderer, Scene{map});
   const Executor executor(flags.threads);
   ScanRequest request;
   request.index = flags.index;
@@ -104,6 +106,7 @@ void take_scan(const ScanFlags& flags) {
   request.map = map.get();
   if (flags.mark_unknown) request.known = &known_space_of(*map);
   const Scan scan = lidar.take(request, PoseTrack(pose), *renderer, executor);
+  say_gpu_notices();
   if (scan.points.empty()) {
     log("no beam hit anything: is the pose inside the map? (pointflight map info shows its "
         "extent)");
@@ -133,9 +136,7 @@ void add_scan_command(CLI::App& parent, int& /*exit_code*/) {
                   flags->pose,
                   "x,y,z[,roll,pitch,yaw] of the sensor in the world: metres, degrees")
       ->required();
-  app->add_option("--renderer", flags->renderer, "How points are made")
-      ->check(CLI::IsMember(renderer_names()))
-      ->capture_default_str();
+  add_renderer_flags(*app, flags->renderer, "How points are made");
   app->add_option("--seed", flags->seed, "Of the noise")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();

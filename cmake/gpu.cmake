@@ -1,12 +1,10 @@
 # The renderer "gpu": kernels in GLSL, compiled to SPIR-V here and carried in the library; Vulkan's own library is opened
 # at run time.
-if(NOT POINTFLIGHT_GPU)
-  return()
-endif()
 find_path(POINTFLIGHT_VULKAN_HEADERS vulkan/vulkan_core.h)
 find_program(POINTFLIGHT_GLSLANG glslangValidator)
-if(NOT POINTFLIGHT_VULKAN_HEADERS OR NOT POINTFLIGHT_GLSLANG)
+if(NOT POINTFLIGHT_GPU OR NOT POINTFLIGHT_VULKAN_HEADERS OR NOT POINTFLIGHT_GLSLANG)
   message(STATUS "Vulkan headers or glslangValidator not found: --renderer gpu is left out (libvulkan-dev glslang-tools)")
+  pointflight_module(gpu WITHOUT "/gpu/(internal/.*|gpu_.*)[.]cpp$" PUBLIC pointflight_render pointflight_map_import)
   return()
 endif()
 set(POINTFLIGHT_HAS_GPU ON)
@@ -14,22 +12,23 @@ set(POINTFLIGHT_HAS_GPU ON)
 set(kernel_folder ${PROJECT_SOURCE_DIR}/pointflight/gpu/kernel)
 file(GLOB kernel_texts CONFIGURE_DEPENDS ${kernel_folder}/*.glsl)
 set(kernels)
+file(MAKE_DIRECTORY ${generated}/gpu/kernels)
 foreach(persistent 0 1)
   foreach(exact 0 1 2)
     set(name rays_${persistent}_${exact})
     set(code ${generated}/gpu/kernels/${name}.inc)
-    add_custom_command(OUTPUT ${code}
-      COMMAND ${CMAKE_COMMAND} -E make_directory ${generated}/gpu/kernels
-      COMMAND ${POINTFLIGHT_GLSLANG} -V --quiet --target-env vulkan1.1 -DPERSISTENT=${persistent} -DEXACT_BY=${exact}
-              -I${kernel_folder} --vn ${name} -o ${code} ${kernel_folder}/rays.comp
-      DEPENDS ${kernel_folder}/rays.comp ${kernel_texts}
-      COMMENT "Compiling kernel ${name}"
-      VERBATIM)
+    set(compile ${POINTFLIGHT_GLSLANG} -V --quiet --target-env vulkan1.1 -DPERSISTENT=${persistent} -DEXACT_BY=${exact}
+      -I${kernel_folder} --vn ${name} -o ${code} ${kernel_folder}/rays.comp)
+    if(NOT EXISTS ${code})
+      execute_process(COMMAND ${compile} OUTPUT_QUIET)  # for linters, which build nothing
+    endif()
+    add_custom_command(OUTPUT ${code} COMMAND ${compile}
+      DEPENDS ${kernel_folder}/rays.comp ${kernel_texts} COMMENT "Compiling kernel ${name}" VERBATIM)
     list(APPEND kernels ${code})
   endforeach()
 endforeach()
 add_custom_target(pointflight_kernels DEPENDS ${kernels})
 
-pointflight_module(gpu PUBLIC pointflight_render pointflight_map_import PRIVATE fmt::fmt ${CMAKE_DL_LIBS})
+pointflight_module(gpu WITHOUT "/without_vulkan[.]cpp$" PUBLIC pointflight_render pointflight_map_import PRIVATE fmt::fmt ${CMAKE_DL_LIBS})
 add_dependencies(pointflight_gpu pointflight_kernels)
 target_include_directories(pointflight_gpu SYSTEM PRIVATE ${POINTFLIGHT_VULKAN_HEADERS})

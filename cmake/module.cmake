@@ -59,11 +59,11 @@ function(pointflight_batched result name)
   set(${result} ${all} PARENT_SCOPE)
 endfunction()
 
-# pointflight_module(name [FOLDER folder] PUBLIC libs... PRIVATE libs...): the library target pointflight::<name> from
+# pointflight_module(name [FOLDER folder] [WITHOUT regex] PUBLIC libs... PRIVATE libs...): the library target pointflight::<name> from
 # all sources in pointflight/<folder>, which is the name if none is given, but for folders that are targets of their own.
 set(POINTFLIGHT_OWN_TARGETS map/import map/edit campaign/mpi share/dds)
 function(pointflight_module name)
-  cmake_parse_arguments(ARG "" "FOLDER" "PUBLIC;PRIVATE" ${ARGN})
+  cmake_parse_arguments(ARG "" "FOLDER;WITHOUT" "PUBLIC;PRIVATE" ${ARGN})
   if(NOT ARG_FOLDER)
     set(ARG_FOLDER ${name})
   endif()
@@ -73,6 +73,9 @@ function(pointflight_module name)
       list(FILTER sources EXCLUDE REGEX "/pointflight/${folder}/")
     endif()
   endforeach()
+  if(ARG_WITHOUT)
+    list(FILTER sources EXCLUDE REGEX ${ARG_WITHOUT})
+  endif()
   pointflight_batched(batches ${name} ${sources})
   add_library(pointflight_${name} STATIC ${batches})
   add_library(pointflight::${name} ALIAS pointflight_${name})

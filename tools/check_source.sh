@@ -18,6 +18,7 @@ allowed() {
     map) echo "$ground" ;;
     map/import | map/edit) echo "$ground map" ;;
     render) echo "core geometry map" ;;
+    gpu) echo "$ground map map/import render gpu/kernel gpu/kernels" ;;
     lidar) echo "$ground map render" ;;
     vehicle) echo "$ground" ;;
     world) echo "$ground map map/import" ;;

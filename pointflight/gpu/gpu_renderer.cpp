@@ -20,7 +20,7 @@
 namespace pointflight {
 namespace {
 
-constexpr std::size_t kChunk = 4096;  // rays
+constexpr std::size_t kPackChunk = 4096;  // rays
 
 /// What `take_gpu_notices` gives, by any thread.
 struct Notices {
@@ -175,7 +175,7 @@ class GpuRenderer : public Renderer {
             std::size_t first,
             std::span<device::DeviceRay> packed,
             const Executor& executor) const {
-    executor.parallel_for(packed.size(), kChunk, [&](std::size_t begin, std::size_t end) {
+    executor.parallel_for(packed.size(), kPackChunk, [&](std::size_t begin, std::size_t end) {
       line.for_parts(
           first + begin,
           first + end,
@@ -189,7 +189,7 @@ class GpuRenderer : public Renderer {
               std::size_t first,
               std::span<const device::DeviceHit> found,
               const Executor& executor) const {
-    executor.parallel_for(found.size(), kChunk, [&](std::size_t begin, std::size_t end) {
+    executor.parallel_for(found.size(), kPackChunk, [&](std::size_t begin, std::size_t end) {
       line.for_parts(
           first + begin,
           first + end,
@@ -222,16 +222,8 @@ class GpuRenderer : public Renderer {
 
 }  // namespace
 
-void add_gpu_renderer() {
-  static const bool once = [] {
-    RendererKind::table().add(
-        {.name = "gpu",
-         .help = "as beam, to the same bits, on a GPU by Vulkan",
-         .make = [](const Scene& scene) { return std::make_unique<GpuRenderer>(scene); },
-         .one_pose = false});
-    return true;
-  }();
-  static_cast<void>(once);
+std::unique_ptr<Renderer> make_gpu_renderer(const Scene& scene) {
+  return std::make_unique<GpuRenderer>(scene);
 }
 
 std::vector<std::string> take_gpu_notices() {

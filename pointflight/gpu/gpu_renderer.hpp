@@ -1,5 +1,6 @@
 #pragma once
 
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -10,6 +11,10 @@ namespace pointflight {
 /// Adds the renderer "gpu" to `RendererKind::table`: the bits of "beam", on the device that
 /// `choose_gpu` names. Programs call it before they read scenarios; more than once does no harm.
 void add_gpu_renderer();
+
+/// One of a scene, on the device that `choose_gpu` names. Throws InputError if there is none, if it
+/// cannot hold the map, or if it has not this processor's bits.
+std::unique_ptr<Renderer> make_gpu_renderer(const Scene& scene);
 
 /// What went wrong with devices since this was last asked, in a sentence each: those that were
 /// lost, for which the processor renders from then on. For programs to say.

@@ -3,6 +3,7 @@
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/core/resources.hpp"
 #include "pointflight/core/version.hpp"
+#include "pointflight/gpu/gpu_renderer.hpp"
 #include "python/bindings/map_object.hpp"
 #include "python/bindings/run_objects.hpp"
 #include "python/bindings/work.hpp"
@@ -14,6 +15,7 @@ namespace py = pybind11;
 
 void add_all(py::module_& module) {
   module.doc() = "Compiled part of pointflight.";
+  add_gpu_renderer();
   module.attr("__version__") = kVersion;
   py::register_exception<InputError>(module, "InputError", PyExc_ValueError).doc() =
       "Something outside the program is wrong: a file, a name, a value. One line that says what, "

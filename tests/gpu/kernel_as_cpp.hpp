@@ -11,7 +11,9 @@
 namespace pointflight::device {
 
 struct uvec2 {
-  uint x, y;
+  uvec2() = default;
+  uvec2(uint first, uint second) : x(first), y(second) {}
+  uint x = 0, y = 0;
 };
 struct uvec4 {
   uint x, y, z, w;

@@ -41,14 +41,14 @@ void PrintTo(const Recorded& recorded, std::ostream* out) {
 
 constexpr Recorded kRecorded[] = {{"hall",
                                    17539116693610813141u,
-                                   4059414513879431154u,
-                                   2954704805267848359u,
-                                   5723585351655682169u},
+                                   3940173689077779487u,
+                                   6828965012094551286u,
+                                   3293491058186207321u},
                                   {"forest",
                                    11867312887941650756u,
-                                   15492054562056105351u,
-                                   9145290068512322580u,
-                                   15452751064221995336u}};
+                                   7784435363323122930u,
+                                   6910349985814777616u,
+                                   433360125384573909u}};
 
 std::vector<std::byte> map_of_scene(const ExactScene& scene) {
   SceneSampling sampling;

@@ -57,7 +57,7 @@ void pack_rays(const SurfelMap& map,
                std::span<const Ray> rays,
                std::span<const std::uint32_t> order,
                std::span<device::DeviceRay> packed) {
-  const Vector3d origin = map.origin_world();
+  const Vector3d& origin = map.origin_world();
   const double r = map.resolution();
   for (std::size_t i = 0; i < order.size(); ++i) {
     const Ray& ray = rays[order[i]];

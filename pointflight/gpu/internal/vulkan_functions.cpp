@@ -3,7 +3,10 @@
 #include <dlfcn.h>
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
 #include <cstdlib>
+#include <type_traits>
 #include <vector>
 
 #include "pointflight/core/input_error.hpp"
@@ -47,12 +50,15 @@ VulkanFunctions::VulkanFunctions() {
     throw InputError(fmt::format("no GPU: Vulkan does not start (error {}); is a driver installed?",
                                  static_cast<int>(result)));
   }
-  bool has_all = true;
-#define POINTFLIGHT_LOAD(name)                                       \
-  name = reinterpret_cast<PFN_vk##name>(load(instance, "vk" #name)); \
-  has_all = has_all && name != nullptr;
-  POINTFLIGHT_VULKAN_FUNCTIONS(POINTFLIGHT_LOAD)
-#undef POINTFLIGHT_LOAD
+  const auto find = [&](const char* name, auto& function) {
+    function = reinterpret_cast<std::remove_reference_t<decltype(function)>>(load(instance, name));
+    return function != nullptr;
+  };
+#define POINTFLIGHT_FIND(name) find("vk" #name, name),
+  const std::array found = {POINTFLIGHT_VULKAN_FUNCTIONS(POINTFLIGHT_FIND) true};
+#undef POINTFLIGHT_FIND
+  const bool has_all =
+      std::all_of(found.begin(), found.end(), [](bool is_there) { return is_there; });
   if (!has_all) throw InputError("no GPU: the Vulkan loader is older than version 1.1");
 }
 

@@ -1,0 +1,16 @@
+#include "pointflight/gpu/gpu_renderer.hpp"
+
+namespace pointflight {
+
+void add_gpu_renderer() {
+  static const bool once = [] {
+    RendererKind::table().add({.name = "gpu",
+                               .help = "as beam, to the same bits, on a GPU by Vulkan",
+                               .make = make_gpu_renderer,
+                               .one_pose = false});
+    return true;
+  }();
+  static_cast<void>(once);
+}
+
+}  // namespace pointflight
