@@ -171,37 +171,53 @@ class GpuRenderer : public Renderer {
     }
   }
 
-  void pack(const Line& line,
-            std::size_t first,
-            std::span<device::DeviceRay> packed,
-            const Executor& executor) const {
-    executor.parallel_for(packed.size(), kPackChunk, [&](std::size_t begin, std::size_t end) {
+  /// Calls `action(job, order, at)` for `count` rays from `first` on, by all threads; `at`: of the
+  /// first ray of `order` among them.
+  template <class Action>
+  static void for_rays(const Line& line,
+                       std::size_t first,
+                       std::size_t count,
+                       const Executor& executor,
+                       const Action& action) {
+    executor.parallel_for(count, kPackChunk, [&](std::size_t begin, std::size_t end) {
       line.for_parts(
           first + begin,
           first + end,
           [&](const RenderJob& job, std::span<const std::uint32_t> order, std::size_t at) {
-            pack_rays(*map_, job.batch.rays, order, packed.subspan(begin + at, order.size()));
+            action(job, order, begin + at);
           });
     });
+  }
+
+  void pack(const Line& line,
+            std::size_t first,
+            std::span<device::DeviceRay> packed,
+            const Executor& executor) const {
+    for_rays(line,
+             first,
+             packed.size(),
+             executor,
+             [&](const RenderJob& job, std::span<const std::uint32_t> order, std::size_t at) {
+               pack_rays(*map_, job.batch.rays, order, packed.subspan(at, order.size()));
+             });
   }
 
   void unpack(const Line& line,
               std::size_t first,
               std::span<const device::DeviceHit> found,
               const Executor& executor) const {
-    executor.parallel_for(found.size(), kPackChunk, [&](std::size_t begin, std::size_t end) {
-      line.for_parts(
-          first + begin,
-          first + end,
-          [&](const RenderJob& job, std::span<const std::uint32_t> order, std::size_t at) {
-            for (std::size_t i = 0; i < order.size(); ++i) {
-              const device::DeviceHit& hit = found[begin + at + i];
-              job.hits[order[i]] = hit.range == device::kTooMany
-                                       ? beam_.trace(job.batch.rays[order[i]])
-                                       : hit_of(hit);
-            }
-          });
-    });
+    for_rays(line,
+             first,
+             found.size(),
+             executor,
+             [&](const RenderJob& job, std::span<const std::uint32_t> order, std::size_t at) {
+               for (std::size_t i = 0; i < order.size(); ++i) {
+                 const device::DeviceHit& hit = found[at + i];
+                 job.hits[order[i]] = hit.range == device::kTooMany
+                                          ? beam_.trace(job.batch.rays[order[i]])
+                                          : hit_of(hit);
+               }
+             });
   }
 
   [[nodiscard]] Hit hit_of(const device::DeviceHit& found) const {

@@ -11,8 +11,8 @@ namespace pointflight {
 /// are voxels, too, so that the way to one takes no double: the same bits on processors and on GPUs
 /// that have none.
 struct GridOrigin {
-  std::int32_t voxel = 0;
-  float rest = 0.0f;
+  std::int32_t voxel;
+  float rest;  ///< m
 };
 
 /// Of a coordinate from the map's origin, m.
