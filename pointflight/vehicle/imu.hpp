@@ -96,8 +96,10 @@ class Imu {
     FlickerNoise::Values accel_flicker{};    ///< m/s^2
     std::vector<double> rotor_angles;        ///< rad; empty without vibration.
     bool has_begun = false;                  ///< A sample was taken.
-    /// Of walks and of white noise; nothing that is not drawn again where it is missing.
-    AxisNormals gyro_walk_draws, accel_walk_draws, gyro_draws, accel_draws;
+    AxisNormals gyro_walk_draws;             ///< Drawn again if they are missing, as all below.
+    AxisNormals accel_walk_draws;            ///< Of the accelerometer's bias.
+    AxisNormals gyro_draws;                  ///< Of white noise.
+    AxisNormals accel_draws;                 ///< The same of the accelerometer.
   };
 
   /// Sample number `index` (ask for each once and in order; a run may begin late, and skip some).

@@ -93,7 +93,7 @@ TEST_F(Program, SaysWhichCommandOrFlagWasMeant) {
   expect_user_error(run("flyy x"), "unknown command 'flyy', did you mean 'fly'?; see pointflight");
   expect_user_error(run("map improt a"), "did you mean 'import'?; see pointflight map --help");
   expect_user_error(run("map zzz"), "unknown command 'zzz', expected one of: import, info");
-  expect_user_error(run("info x.pfmap"), "did you mean 'map info' or 'bag info'?");
+  expect_user_error(run("info x.pfmap"), "did you mean 'map info' or 'bag info' or 'gpu info'?");
   expect_user_error(run("map"), "a command is missing, one of: import, info");
   expect_user_error(run("fly x -o y --bogus --zeta 1"), "not expected: --bogus --zeta 1;");
   expect_user_error(run("scan x --lidr avia --pose 0"), "--lidr avia, did you mean '--lidar'?");
