@@ -266,6 +266,7 @@ void compare(const CompareFlags& flags) {
     }
   }
   end_progress();
+  say_gpu_notices();
   if (flags.json) {
     nlohmann::ordered_json json = {{"overall",
                                     {{"all", table.json(all.statistics())},

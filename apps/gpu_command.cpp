@@ -1,12 +1,13 @@
 #include <fmt/format.h>
 
 #include <chrono>
+#include <cstdint>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <vector>
 
 #include "apps/commands.hpp"
-#include "apps/flags.hpp"
 #include "pointflight/core/parallel.hpp"
 #include "pointflight/gpu/gpu_list.hpp"
 #include "pointflight/gpu/gpu_trial.hpp"

@@ -1,8 +1,5 @@
 #include "apps/renderer_flags.hpp"
 
-#include <algorithm>
-#include <memory>
-
 #include "apps/flags.hpp"
 #include "apps/terminal.hpp"
 #include "pointflight/core/input_error.hpp"

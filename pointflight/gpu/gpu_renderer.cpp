@@ -16,6 +16,7 @@
 #include "pointflight/render/internal/beam_renderer.hpp"
 #include "pointflight/render/internal/body_renderer.hpp"
 #include "pointflight/render/internal/direction_order.hpp"
+#include "pointflight/render/internal/job_check.hpp"
 
 namespace pointflight {
 namespace {
@@ -87,12 +88,6 @@ class Line {
   std::size_t size_ = 0;
 };
 
-/// All is there already.
-class RenderedOnDevice : public Rendering {
- public:
-  void collect() override {}
-};
-
 /// Lines on the device; wide beams, bodies and single rays by `beam` on the processor, whose bits
 /// all have.
 class GpuRenderer : public Renderer {
@@ -115,6 +110,7 @@ class GpuRenderer : public Renderer {
 
   [[nodiscard]] std::unique_ptr<Rendering> submit(std::span<const RenderJob> jobs,
                                                   const Executor& executor) const override {
+    for (const RenderJob& job : jobs) require_valid(job);
     if (is_lost_) return beam_.submit(jobs, executor);
     std::vector<RenderJob> wide;
     for (const RenderJob& job : jobs) {
@@ -130,8 +126,7 @@ class GpuRenderer : public Renderer {
       }
       return beam_.submit(jobs, executor);
     }
-    beam_.render(wide, executor);
-    return std::make_unique<RenderedOnDevice>();
+    return beam_.submit(wide, executor);
   }
 
   [[nodiscard]] Hit trace(const Ray& ray) const override { return beam_.trace(ray); }
@@ -215,19 +210,9 @@ class GpuRenderer : public Renderer {
                  const device::DeviceHit& hit = found[at + i];
                  job.hits[order[i]] = hit.range == device::kTooMany
                                           ? beam_.trace(job.batch.rays[order[i]])
-                                          : hit_of(hit);
+                                          : beam_.hit_of({hit.range, hit.cosine, hit.surfel});
                }
              });
-  }
-
-  [[nodiscard]] Hit hit_of(const device::DeviceHit& found) const {
-    Hit hit;
-    if (found.range < 0.0f) return hit;
-    hit.range = found.range;
-    hit.cos_incidence = found.cosine;
-    hit.intensity = map_->intensity(found.surfel);
-    hit.surfel = found.surfel;
-    return hit;
   }
 
   std::shared_ptr<const SurfelMap> map_;

@@ -8,6 +8,7 @@
 #include "pointflight/core/argument.hpp"
 #include "pointflight/render/internal/beam_renderer.hpp"
 #include "pointflight/render/internal/direction_order.hpp"
+#include "pointflight/render/internal/job_check.hpp"
 #include "pointflight/render/internal/paper_renderer.hpp"
 #include "pointflight/render/internal/sub_ray_renderer.hpp"
 
@@ -20,7 +21,9 @@ class Rendered : public Rendering {
   void collect() override {}
 };
 
-void check(const RenderJob& job) {
+}  // namespace
+
+void require_valid(const RenderJob& job) {
   const RayBatch& batch = job.batch;
   if (job.wide) {
     require_argument(job.wide->across.size() == batch.rays.size() &&
@@ -51,8 +54,6 @@ void check(const RenderJob& job) {
   }));
 }
 
-}  // namespace
-
 Registry<RendererKind>& RendererKind::table() {
   static Registry<RendererKind> table = {
       {.name = "beam",
@@ -80,7 +81,7 @@ void Renderer::render(const RayBatch& batch, std::span<Hit> hits, const Executor
 
 std::unique_ptr<Rendering> Renderer::submit(std::span<const RenderJob> jobs,
                                             const Executor& executor) const {
-  for (const RenderJob& job : jobs) check(job);
+  for (const RenderJob& job : jobs) require_valid(job);
   executor.parallel_for(jobs.size(), 1, [&](std::size_t k, std::size_t) {
     CpuAccount* const account = jobs[k].account;
     const ChargeTo charge(account != nullptr ? account : ChargeTo::current());

@@ -130,6 +130,25 @@ TEST(GpuRenderer, ScansAreThoseOfTheProcessor) {
   }
 }
 
+TEST(GpuRenderer, RefusesJobsThatDoNotFit) {
+  SKIP_WITHOUT_DEVICE();
+  const auto renderer = make_gpu_renderer(Scene{trial_scene()});
+  const std::vector<Ray> rays = trial_rays(10);
+  std::vector<Hit> hits(9);
+  RayBatch batch;
+  batch.rays = rays;
+  EXPECT_THROW(renderer->render(batch, hits, Executor(1)), std::invalid_argument);
+  hits.resize(10);
+  const std::vector<std::uint32_t> order{0, 1};
+  batch.order = order;
+  EXPECT_THROW(renderer->render(batch, hits, Executor(1)), std::invalid_argument);
+  batch.order = {};
+  renderer->render(batch, hits, Executor(1));
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    EXPECT_EQ(hits[i].range, renderer->trace(rays[i]).range);
+  }
+}
+
 TEST(GpuRenderer, WideBeamsAreThoseOfTheProcessor) {
   SKIP_WITHOUT_DEVICE();
   add_gpu_renderer();

@@ -25,13 +25,14 @@ class BeamRenderer : public Renderer {
 
   [[nodiscard]] Scene scene() const { return {map_}; }
 
+  /// What a kernel found, with the map's intensity.
+  [[nodiscard]] Hit hit_of(const KernelHit& found) const;
+
  protected:
   void render_one(const RenderJob& job, const Executor& executor) const override;
   void render_wide(const RenderJob& job, const Executor& executor) const override;
 
  private:
-  [[nodiscard]] Hit hit_of(const KernelHit& found) const;
-
   std::shared_ptr<const SurfelMap> map_;
   KernelMap kernel_map_;
   BeamGrouping grouping_;
