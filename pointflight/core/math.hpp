@@ -2,8 +2,6 @@
 
 #include <sleef.h>
 
-#include <cstdint>
-
 /// Transcendental functions that give the same bits on every CPU.
 ///
 /// glibc picks other code for sin, cos, exp, ... when it finds FMA or AVX2, and a few results in
@@ -70,13 +68,3 @@ inline SinCos sincos(double x) {
 }
 
 }  // namespace pointflight::math
-
-namespace pointflight {
-
-/// Floor of |x| < 2^63, inline if std::floor is a call (CPUs before SSE4.1).
-inline std::int64_t floor_to_integer(double x) {
-  const auto towards_zero = static_cast<std::int64_t>(x);
-  return towards_zero - (x < static_cast<double>(towards_zero) ? 1 : 0);
-}
-
-}  // namespace pointflight

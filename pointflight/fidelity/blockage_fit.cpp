@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "pointflight/core/input_error.hpp"
-#include "pointflight/core/math.hpp"
+#include "pointflight/core/floor.hpp"
 #include "pointflight/fidelity/real_beams.hpp"
 #include "pointflight/fidelity/sensor_lines.hpp"
 

@@ -6,6 +6,7 @@
 #include <map>
 
 #include "pointflight/core/constants.hpp"
+#include "pointflight/core/floor.hpp"
 #include "pointflight/core/math.hpp"
 
 namespace pointflight {

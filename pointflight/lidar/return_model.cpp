@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "pointflight/core/constants.hpp"
+#include "pointflight/core/floor.hpp"
 #include "pointflight/core/math.hpp"
 #include "pointflight/lidar/internal/return_kernel.hpp"
 

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "pointflight/core/constants.hpp"
+#include "pointflight/core/floor.hpp"
 #include "pointflight/core/math.hpp"
 
 namespace pointflight {

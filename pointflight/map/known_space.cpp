@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "pointflight/core/argument.hpp"
-#include "pointflight/core/math.hpp"
+#include "pointflight/core/floor.hpp"
 
 namespace pointflight {
 namespace {

@@ -1,6 +1,6 @@
 // A sensor's settings with the figures of a fit.
 #include "pointflight/core/constants.hpp"
-#include "pointflight/core/math.hpp"
+#include "pointflight/core/floor.hpp"
 #include "pointflight/survey/sensor_fit.hpp"
 
 namespace pointflight {

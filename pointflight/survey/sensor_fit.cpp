@@ -11,6 +11,7 @@
 
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/input_error.hpp"
+#include "pointflight/core/floor.hpp"
 #include "pointflight/core/math.hpp"
 #include "pointflight/survey/median.hpp"
 

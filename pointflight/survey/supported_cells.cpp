@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "pointflight/core/floor.hpp"
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/geometry/internal/grid_cells.hpp"
 #include "pointflight/io/cloud_reader.hpp"

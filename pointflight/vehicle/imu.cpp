@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "pointflight/core/floor.hpp"
 #include "pointflight/core/math.hpp"
 #include "pointflight/core/random.hpp"
 #include "pointflight/geometry/rotation.hpp"

@@ -7,7 +7,7 @@
 #include <unordered_map>
 #include <vector>
 
-#include "pointflight/core/math.hpp"
+#include "pointflight/core/floor.hpp"
 #include "pointflight/geometry/internal/morton.hpp"
 #include "pointflight/geometry/types.hpp"
 

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "pointflight/core/hash.hpp"
-#include "pointflight/core/math.hpp"
+#include "pointflight/core/floor.hpp"
 
 namespace pointflight {
 namespace {

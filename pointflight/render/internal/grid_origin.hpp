@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cstdint>
 
-#include "pointflight/core/math.hpp"
+#include "pointflight/core/floor.hpp"
 
 namespace pointflight {
 
