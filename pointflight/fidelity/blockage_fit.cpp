@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "pointflight/core/input_error.hpp"
 #include "pointflight/core/floor.hpp"
+#include "pointflight/core/input_error.hpp"
 #include "pointflight/fidelity/real_beams.hpp"
 #include "pointflight/fidelity/sensor_lines.hpp"
 

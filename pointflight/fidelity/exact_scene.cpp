@@ -11,9 +11,9 @@
 #include <unordered_set>
 
 #include "pointflight/core/constants.hpp"
+#include "pointflight/core/floor.hpp"
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/core/mapped_file.hpp"
-#include "pointflight/core/floor.hpp"
 #include "pointflight/core/math.hpp"
 #include "pointflight/core/resources.hpp"
 #include "pointflight/geometry/internal/morton.hpp"

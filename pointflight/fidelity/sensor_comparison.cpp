@@ -259,8 +259,8 @@ class Counter {
       beside.push_back(even.beside(all.directions_sensor[i]));
       count_error(&Sides::real, static_cast<double>(all.ranges[i]) - rendered.back());
     }
-    const auto beams =
-        std::make_shared<const ScanBeams>(std::make_unique<GivenBeams>(std::move(chosen)));
+    const auto beams = std::make_shared<const ScanBeams>(
+        settings_, std::make_unique<GivenBeams>(std::move(chosen)));
     const auto count = [&](double Sides::*side, const std::optional<Surroundings>& surroundings) {
       LidarSettings settings = settings_;
       settings.noise = {};  // it is in what is added

@@ -1,5 +1,6 @@
 #include "pointflight/gpu/gpu_trial.hpp"
 
+#include <algorithm>
 #include <numeric>
 #include <optional>
 #include <vector>
@@ -33,7 +34,8 @@ struct GpuTrial::Parts {
   }
 
   std::shared_ptr<const SurfelMap> map = trial_scene();
-  std::vector<Ray> rays = trial_rays(kSpeedRays);
+  KernelMap kernel_map = kernel_map_of(*map);
+  std::vector<MapRay> rays = map_rays(kernel_map, trial_rays(kSpeedRays));
   std::shared_ptr<GpuDevice> device;
   DeviceMap there;
   RayTracer tracer;
@@ -62,17 +64,16 @@ std::size_t GpuTrial::rays() const {
 void GpuTrial::trace_on_device() {
   Parts& p = *parts_;
   in_words([&] {
-    pack_rays(*p.map, p.rays, p.order, p.tracer.rays(0, kSpeedRays));
+    std::copy(p.rays.begin(), p.rays.end(), p.tracer.rays(0, kSpeedRays).begin());
     p.tracer.submit(0, kSpeedRays);
-    static_cast<void>(p.tracer.collect(0));
+    p.tracer.wait(0);
   });
 }
 
 void GpuTrial::trace_on_processor(const Executor& executor) {
   Parts& p = *parts_;
-  const KernelMap map = kernel_map_of(*p.map);
   executor.parallel_for(kSpeedRays, kTrialChunk, [&](std::size_t begin, std::size_t end) {
-    trace_beams(map, p.rays, std::span(p.order).subspan(begin, end - begin), p.hits);
+    trace_beams(p.kernel_map, p.rays, std::span(p.order).subspan(begin, end - begin), p.hits);
   });
 }
 

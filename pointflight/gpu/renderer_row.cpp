@@ -8,6 +8,11 @@ void add_gpu_renderer() {
                                .help = "as beam, to the same bits, on a GPU by Vulkan",
                                .make = make_gpu_renderer,
                                .one_pose = false});
+    RendererKind::table().add(
+        {.name = "auto",
+         .help = "gpu where there is one and the batch is worth it, else beam",
+         .make = make_automatic_renderer,
+         .one_pose = false});
     return true;
   }();
   static_cast<void>(once);

@@ -34,6 +34,10 @@ std::unique_ptr<Renderer> make_gpu_renderer(const Scene& /*scene*/) {
   refuse();
 }
 
+std::unique_ptr<Renderer> make_automatic_renderer(const Scene& scene) {
+  return make_renderer("beam", scene);
+}
+
 std::vector<std::string> take_gpu_notices() {
   return {};
 }

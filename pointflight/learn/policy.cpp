@@ -9,8 +9,8 @@
 #include <utility>
 
 #include "pointflight/core/constants.hpp"
-#include "pointflight/core/input_error.hpp"
 #include "pointflight/core/floor.hpp"
+#include "pointflight/core/input_error.hpp"
 #include "pointflight/core/math.hpp"
 #include "pointflight/geometry/rotation.hpp"
 #include "pointflight/io/byte_cursor.hpp"

@@ -1,6 +1,7 @@
 #include "pointflight/learn/range_pattern.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -12,7 +13,8 @@
 namespace pointflight {
 namespace {
 
-constexpr std::size_t kRaysAtOnce = 1 << 16;  // 2 MiB of them; whole vehicles
+constexpr std::size_t kRaysAtOnce = 1 << 16;  // of whole vehicles
+constexpr std::uint32_t kPieces = 8;          // of a period, in which a vehicle turns evenly
 
 /// What moves around a vehicle, for as long as its rays are under way.
 struct Around {
@@ -26,37 +28,44 @@ RangePattern::RangePattern(std::vector<Vector3f> directions,
                            std::vector<float> shares,
                            float range_max,
                            std::size_t pooled)
-    : directions_(std::move(directions)),
-      shares_(std::move(shares)),
-      range_max_(range_max),
-      pooled_(pooled) {
+    : shares_(std::move(shares)), range_max_(range_max), pooled_(pooled) {
   require_argument(range_max > 0.0f, "RangePattern: a range above 0");
-  require_argument(pooled >= 1 && directions_.size() % pooled == 0,
+  require_argument(pooled >= 1 && directions.size() % pooled == 0,
                    "RangePattern: whole groups of directions");
-  require_argument(shares_.empty() || shares_.size() == directions_.size(),
+  require_argument(shares_.empty() || shares_.size() == directions.size(),
                    "RangePattern: a share for each direction");
-  for (const Vector3f& direction : directions_) {
+  for (const Vector3f& direction : directions) {
     require_argument(std::abs(direction.norm() - 1.0f) < 1e-4f, "RangePattern: unit vectors");
   }
   for (const float share : shares_) {
     require_argument(share >= 0.0f && share <= 1.0f, "RangePattern: shares from 0 to 1");
   }
-  order_ = direction_order(directions_, Executor(1));
+  auto beams = std::make_shared<SensorBeams>();
+  beams->pieces = kPieces;
+  beams->order = direction_order(directions, Executor(1));
+  for (std::size_t k = 0; k < directions.size(); ++k) {
+    const Vector3f& d = directions[k];
+    const Vector3f across = horizontal_across(d);
+    const float at = shares_.empty() ? 0.0f : shares_[k] * static_cast<float>(kPieces);
+    const float piece = std::min(std::floor(at), static_cast<float>(kPieces - 1));
+    beams->beams.push_back({{d.x(), d.y(), d.z()},
+                            {0.0f, 0.0f, 0.0f},
+                            {across.x(), across.y()},
+                            1.0f,
+                            at - piece,
+                            static_cast<std::uint32_t>(piece),
+                            static_cast<std::uint32_t>(k)});
+  }
+  beams_ = std::move(beams);
 }
 
-void RangePattern::aim(const PosePair& poses, std::span<Ray> rays) const {
-  if (shares_.empty()) {
-    const Eigen::Matrix3f R = poses.now.rotation.toRotationMatrix().cast<float>();
-    for (std::size_t k = 0; k < rays.size(); ++k) {
-      rays[k] = {poses.now.translation, R * directions_[k], range_max_};
-    }
-    return;
+AimedBeams RangePattern::aimed(const PosePair& poses) const {
+  if (shares_.empty()) return aim_beams(beams_, {&poses.now, 1}, range_max_);
+  std::array<Pose, kPieces + 1> all;
+  for (std::size_t k = 0; k <= kPieces; ++k) {
+    all[k] = interpolate(poses.before, poses.now, static_cast<double>(k) / kPieces);
   }
-  for (std::size_t k = 0; k < rays.size(); ++k) {
-    const Pose at = interpolate(poses.before, poses.now, shares_[k]);
-    rays[k] = {
-        at.translation, (at.rotation * directions_[k].cast<double>()).cast<float>(), range_max_};
-  }
+  return aim_beams(beams_, all, range_max_);
 }
 
 /// Of each direction since the start of the period; empty if all are measured at its end.
@@ -92,12 +101,15 @@ void RangePattern::measure(const Renderer& renderer,
                            const Executor& executor,
                            const BodiesOf& bodies_of,
                            const DrawsOf& draws_of) const {
-  const std::size_t beams = directions_.size();
+  const std::size_t beams = beams_->beams.size();
   if (beams == 0) return;
   require_argument(!returns_ || draws_of, "RangePattern: a sensor's reports need draws");
   const std::size_t at_once = std::max<std::size_t>(1, kRaysAtOnce / beams);
-  std::vector<Ray> rays(std::min(at_once, vehicles.size()) * beams);
-  std::vector<Hit> hits(rays.size());
+  const std::size_t most = std::min(at_once, vehicles.size());
+  const bool wants_hits = bodies_of || returns_;
+  std::vector<AimedBeams> all_aimed(most);
+  std::vector<Hit> hits(wants_hits ? most * beams : 0);
+  std::vector<float> found(wants_hits ? 0 : most * beams);
   std::vector<RenderJob> jobs;
   std::vector<Around> around;
   for (std::size_t first = 0; first < vehicles.size(); first += at_once) {
@@ -105,14 +117,17 @@ void RangePattern::measure(const Renderer& renderer,
     jobs.assign(count, RenderJob{});
     around.assign(bodies_of ? count : 0, Around{});
     executor.parallel_for(count, 1, [&](std::size_t i, std::size_t) {
-      const std::span own(rays.data() + i * beams, beams);
       const PosePair& pair = poses[vehicles[first + i]];
-      aim(pair, own);
-      jobs[i].batch.rays = own;
-      jobs[i].batch.order = order_;
+      all_aimed[i] = aimed(pair);
+      jobs[i].batch.aimed = &all_aimed[i];
+      jobs[i].batch.order = beams_->order;
       jobs[i].batch.T_world_sensor = pair.now;
       jobs[i].batch.range_max = range_max_;
-      jobs[i].hits = std::span(hits.data() + i * beams, beams);
+      if (wants_hits) {
+        jobs[i].hits = std::span(hits).subspan(i * beams, beams);
+      } else {
+        jobs[i].ranges = std::span(found).subspan(i * beams, beams);
+      }
       if (!bodies_of) return;
       around[i] = {bodies_of(vehicles[first + i]), offsets(pair)};
       jobs[i].batch.bodies = around[i].bodies;
@@ -126,9 +141,9 @@ void RangePattern::measure(const Renderer& renderer,
       std::fill(row.begin(), row.end(), 1.0f);
       if (returns_) report(jobs[i].hits, draws_of(vehicles[first + i]));
       for (std::size_t k = 0; k < beams; ++k) {
-        const Hit& hit = jobs[i].hits[k];
+        const float range = wants_hits ? jobs[i].hits[k].range : jobs[i].ranges[k];
         float& least = row[k / pooled_];
-        if (hit.is_return()) least = std::min(least, hit.range / range_max_);
+        if (range >= 0.0f) least = std::min(least, range / range_max_);
       }
     });
   }

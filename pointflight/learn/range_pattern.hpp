@@ -36,7 +36,7 @@ class RangePattern {
   void report_by(std::shared_ptr<const ReturnModel> returns) { returns_ = std::move(returns); }
 
   /// Numbers of one image.
-  [[nodiscard]] std::size_t size() const { return directions_.size() / pooled_; }
+  [[nodiscard]] std::size_t size() const { return beams_->beams.size() / pooled_; }
   /// m
   [[nodiscard]] float range_max() const { return range_max_; }
 
@@ -54,14 +54,13 @@ class RangePattern {
 
  private:
   [[nodiscard]] std::vector<Duration> offsets(const PosePair& poses) const;
-  void aim(const PosePair& poses, std::span<Ray> rays) const;
+  [[nodiscard]] AimedBeams aimed(const PosePair& poses) const;
   void report(std::span<Hit> hits, const ScanAddress& address) const;
 
-  std::vector<Vector3f> directions_;
+  std::shared_ptr<const SensorBeams> beams_;
   std::vector<float> shares_;
   float range_max_;
   std::size_t pooled_;
-  std::vector<std::uint32_t> order_;            ///< In which they are traced.
   std::shared_ptr<const ReturnModel> returns_;  ///< Or null.
 };
 

@@ -10,31 +10,12 @@
 #include "pointflight/core/math.hpp"
 #include "pointflight/core/random.hpp"
 #include "pointflight/lidar/internal/aimed.hpp"
-#include "pointflight/lidar/internal/direction_kernel.hpp"
 
 namespace pointflight {
 namespace {
 
 constexpr std::size_t kChunk = 2048;         // beams
 constexpr std::uint32_t kPhases = 1u << 20;  // scans: a day of 10 Hz
-
-/// Written out: with Eigen's products by the quaternion, in the baseline's pairs of numbers, this
-/// took 8 % of a swarm's time instead of 3 %.
-Vector3d turned(const Matrix3d& m, const Vector3f& v) {
-  const double x = static_cast<double>(v.x());
-  const double y = static_cast<double>(v.y());
-  const double z = static_cast<double>(v.z());
-  return {m(0, 0) * x + m(0, 1) * y + m(0, 2) * z,
-          m(1, 0) * x + m(1, 1) * y + m(1, 2) * z,
-          m(2, 0) * x + m(2, 1) * y + m(2, 2) * z};
-}
-
-/// The horizontal of the sensor across a beam; straight up or down, its y axis.
-Vector3f across(const Vector3f& direction_sensor) {
-  const float level = std::hypot(direction_sensor.x(), direction_sensor.y());
-  if (level < 1e-6f) return Vector3f::UnitY();
-  return {-direction_sensor.y() / level, direction_sensor.x() / level, 0.0f};
-}
 
 }  // namespace
 
@@ -105,49 +86,29 @@ Duration Lidar::period() const {
   return from_seconds(1.0 / settings_.rate);
 }
 
-/// Each beam from the pose at its own time, those of a snapshot from the one in the middle.
-void Lidar::aim_beams(const PoseTrack& T_world_sensor,
-                      Aimed& aimed,
-                      const Executor& executor) const {
-  const std::vector<Beam>& beams = aimed.beams();
-  const ScanRequest& request = aimed.request;
-  const bool snapshot = aimed.snapshot;
-  aimed.rays.resize(beams.size());
-  aimed.offsets.resize(request.bodies.empty() || snapshot ? 0 : beams.size());
-  aimed.across.resize(returns_ && !footprint_.is_line() ? beams.size() : 0);
-  const auto range_max = static_cast<float>(range_limit());
-  executor.parallel_for(beams.size(), kChunk, [&](std::size_t begin, std::size_t end) {
-    Vector3d position = aimed.middle.translation;
-    Matrix3d rotation = aimed.middle.rotation.toRotationMatrix();
-    Duration pose_time{-1};
-    for (std::size_t i = begin; i < end; ++i) {
-      if (!snapshot && beams[i].time_offset != pose_time) {
-        pose_time = beams[i].time_offset;
-        const Pose pose = T_world_sensor.at(request.start + pose_time);
-        position = pose.translation;
-        rotation = pose.rotation.toRotationMatrix();
-      }
-      Ray& ray = aimed.rays[i];
-      ray.origin_world = turned(rotation, beams[i].origin_sensor) + position;
-      ray.direction_world = turned(rotation, beams[i].direction_sensor).cast<float>().normalized();
-      ray.range_max = range_max / depth_share(beams[i]);
-      if (!aimed.offsets.empty()) aimed.offsets[i] = beams[i].time_offset;
-      if (!aimed.across.empty()) {
-        aimed.across[i] = turned(rotation, across(beams[i].direction_sensor)).cast<float>();
-      }
-    }
-  });
+/// Where the sensor is while beams fire: at both ends of each piece of the scan, for a snapshot in
+/// its middle.
+std::vector<Pose> Lidar::poses_of(const PoseTrack& T_world_sensor, const Aimed& aimed) const {
+  if (aimed.snapshot) return {aimed.middle};
+  const auto pieces = static_cast<std::int64_t>(aimed.ordered->in_sensor->pieces);
+  std::vector<Pose> poses;
+  poses.reserve(static_cast<std::size_t>(pieces) + 1);
+  for (std::int64_t k = 0; k <= pieces; ++k) {
+    poses.push_back(T_world_sensor.at(aimed.request.start + period() * k / pieces));
+  }
+  return poses;
 }
 
-/// Turns each ray by the noise of its direction. The sensor knows nothing of it: points lie where
-/// the beams should have gone.
-void Lidar::add_direction_noise(Aimed& aimed, const Executor& executor) const {
-  const ScanRequest& request = aimed.request;
-  std::vector<Ray>& rays = aimed.rays;
+/// By how much each beam is turned. The sensor knows nothing of it: points lie where the beams
+/// should have gone.
+std::vector<BeamDeviation> Lidar::direction_noise(const ScanRequest& request,
+                                                  std::size_t beams,
+                                                  const Executor& executor) const {
   const double sigma = settings_.optics.angle_sigma_deg * kDegree;
-  if (sigma <= 0.0) return;
+  if (sigma <= 0.0) return {};
+  std::vector<BeamDeviation> noise(beams);
   const RandomStream random(request.seed, StreamId::kLidarAngle, sensor_);
-  executor.parallel_for(rays.size(), kChunk, [&](std::size_t begin, std::size_t end) {
+  executor.parallel_for(beams, kChunk, [&](std::size_t begin, std::size_t end) {
     // NOLINTBEGIN(cppcoreguidelines-pro-type-member-init): written on the next lines
     std::array<double, kChunk> us;
     std::array<double, kChunk> vs;
@@ -155,14 +116,18 @@ void Lidar::add_direction_noise(Aimed& aimed, const Executor& executor) const {
     random.normal2(request.index << 32 | begin,
                    std::span(us).first(end - begin),
                    std::span(vs).first(end - begin));
-    turn_rays(rays.data() + begin, end - begin, us.data(), vs.data(), sigma);
+    for (std::size_t i = begin; i < end; ++i) {
+      noise[i] = {static_cast<float>(sigma * us[i - begin]),
+                  static_cast<float>(sigma * vs[i - begin])};
+    }
   });
+  return noise;
 }
 
 RayBatch Lidar::batch_of(const Aimed& aimed) const {
   const SimTime middle = aimed.request.start + period() / 2;
   RayBatch batch;
-  batch.rays = aimed.rays;
+  batch.aimed = &aimed.in_world;
   batch.order = aimed.ordered->order;
   batch.T_world_sensor = aimed.middle;
   batch.range_max = static_cast<float>(reach());
@@ -182,14 +147,14 @@ class Lidar::OneScan : public Exposure {
         aimed_(std::move(aimed)),
         T_world_sensor_(T_world_sensor),
         is_wide_(is_wide),
-        hits_(is_wide ? 0 : aimed_.rays.size()),
-        echoes_(is_wide ? aimed_.rays.size() : 0) {}
-  OneScan(const OneScan&) = delete;  // the job refers to the rays
+        hits_(is_wide ? 0 : aimed_.beams().size()),
+        echoes_(is_wide ? aimed_.beams().size() : 0) {}
+  OneScan(const OneScan&) = delete;  // the job refers to the beams
   OneScan& operator=(const OneScan&) = delete;
 
   RenderJob job() override {
     RenderJob job{lidar_.batch_of(aimed_), hits_, std::nullopt};
-    if (is_wide_) job.wide = lidar_.footprint_.beams(aimed_.across, *lidar_.returns_, echoes_);
+    if (is_wide_) job.wide = lidar_.footprint_.beams({}, *lidar_.returns_, echoes_);
     return job;
   }
 
@@ -219,8 +184,15 @@ std::unique_ptr<Exposure> Lidar::aim(const ScanRequest& request,
   aimed.ordered = beams_->of(pattern_scan(request.index, request.seed), executor);
   aimed.snapshot = request.snapshot || renderer.is_snapshot();
   aimed.middle = T_world_sensor.at(request.start + period() / 2);
-  aim_beams(T_world_sensor, aimed, executor);
-  if (returns_ && request.noise) add_direction_noise(aimed, executor);
+  aimed.in_world = aim_beams(
+      aimed.ordered->in_sensor, poses_of(T_world_sensor, aimed), static_cast<float>(range_limit()));
+  if (returns_ && request.noise) {
+    aimed.in_world.deviations = direction_noise(request, aimed.beams().size(), executor);
+  }
+  if (!request.bodies.empty() && !aimed.snapshot) {
+    aimed.offsets.reserve(aimed.beams().size());
+    for (const Beam& beam : aimed.beams()) aimed.offsets.push_back(beam.time_offset);
+  }
   // what a renderer of images sees has no parts
   const bool is_wide = returns_ && !footprint_.is_line() && !renderer.is_snapshot();
   return std::make_unique<OneScan>(*this, std::move(aimed), T_world_sensor, is_wide);

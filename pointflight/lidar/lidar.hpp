@@ -90,8 +90,11 @@ class Lidar {
  private:
   struct Aimed;
   class OneScan;
-  void aim_beams(const PoseTrack& T_world_sensor, Aimed& aimed, const Executor& executor) const;
-  void add_direction_noise(Aimed& aimed, const Executor& executor) const;
+  [[nodiscard]] std::vector<Pose> poses_of(const PoseTrack& T_world_sensor,
+                                           const Aimed& aimed) const;
+  [[nodiscard]] std::vector<BeamDeviation> direction_noise(const ScanRequest& request,
+                                                           std::size_t beams,
+                                                           const Executor& executor) const;
   [[nodiscard]] RayBatch batch_of(const Aimed& aimed) const;
 
   struct Received;

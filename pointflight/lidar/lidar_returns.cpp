@@ -358,7 +358,9 @@ Scan Lidar::written(const Aimed& aimed,
   if (request.truth) add_truth(received.returns, T_world_sensor, request.map, scan);
   leave_motion(aimed, T_world_sensor, scan);
   if (request.known != nullptr) {
-    mark_unknown(*request.known, aimed.rays, marked, scan, executor);
+    std::vector<Ray> rays(beams.size());
+    make_rays(aimed.in_world, 0, rays);
+    mark_unknown(*request.known, rays, marked, scan, executor);
   }
   return scan;
 }

@@ -10,6 +10,7 @@
 #include "pointflight/core/parallel.hpp"
 #include "pointflight/lidar/beam_pattern.hpp"
 #include "pointflight/lidar/lidar_settings.hpp"
+#include "pointflight/render/sensor_beams.hpp"
 
 namespace pointflight {
 
@@ -18,9 +19,9 @@ namespace pointflight {
 class ScanBeams {
  public:
   /// Throws InputError.
-  explicit ScanBeams(const LidarSettings& settings) : pattern_(make_pattern(settings)) {}
-  /// Of a pattern that no settings name; not null.
-  explicit ScanBeams(std::unique_ptr<BeamPattern> pattern) : pattern_(std::move(pattern)) {}
+  explicit ScanBeams(const LidarSettings& settings) : ScanBeams(settings, make_pattern(settings)) {}
+  /// Of another pattern than the settings name; not null.
+  ScanBeams(const LidarSettings& settings, std::unique_ptr<BeamPattern> pattern);
 
   /// Of one scan.
   struct Ordered {
@@ -28,6 +29,7 @@ class ScanBeams {
     /// Neighbours in direction one after the other; empty for patterns that do not repeat, whose
     /// neighbours fire at different times, so that it depends on how the sensor turns.
     std::vector<std::uint32_t> order;
+    std::shared_ptr<const SensorBeams> in_sensor;  ///< The beams for renderers.
   };
   /// Of scan `index`; scans that were asked for lately are kept.
   [[nodiscard]] std::shared_ptr<const Ordered> of(std::uint64_t index,
@@ -42,6 +44,8 @@ class ScanBeams {
   };
 
   std::unique_ptr<BeamPattern> pattern_;
+  Duration period_;
+  bool measures_depth_;
   mutable std::mutex mutex_;
   mutable std::array<Kept, kKept> kept_;
   mutable std::size_t next_ = 0;  ///< Of `kept_`, to be replaced.

@@ -8,6 +8,7 @@
 #include "pointflight/core/argument.hpp"
 #include "pointflight/render/internal/beam_renderer.hpp"
 #include "pointflight/render/internal/direction_order.hpp"
+#include "pointflight/render/internal/expanded_job.hpp"
 #include "pointflight/render/internal/job_check.hpp"
 #include "pointflight/render/internal/paper_renderer.hpp"
 #include "pointflight/render/internal/sub_ray_renderer.hpp"
@@ -25,19 +26,23 @@ class Rendered : public Rendering {
 
 void require_valid(const RenderJob& job) {
   const RayBatch& batch = job.batch;
+  const std::size_t count = batch.size();
+  require_argument(batch.aimed == nullptr || batch.rays.empty(),
+                   "render: rays are wanted or beams, not both");
   if (job.wide) {
-    require_argument(job.wide->across.size() == batch.rays.size() &&
-                         job.wide->echoes.size() == batch.rays.size() &&
-                         job.wide->receiver != nullptr,
+    const std::size_t across = job.wide->across.size();
+    require_argument((across == count || (across == 0 && batch.aimed != nullptr)) &&
+                         job.wide->echoes.size() == count && job.wide->receiver != nullptr,
                      "render: of wide beams a direction across each, as many echoes and a receiver "
                      "are wanted");
   } else {
-    require_argument(job.hits.size() == batch.rays.size(),
-                     "render: as many hits as rays are wanted");
+    require_argument(
+        job.hits.size() + job.ranges.size() == count && (job.hits.empty() || job.ranges.empty()),
+        "render: as many hits or ranges as rays are wanted");
   }
-  require_argument(batch.order.empty() || batch.order.size() == batch.rays.size(),
+  require_argument(batch.order.empty() || batch.order.size() == count,
                    "render: an order of all rays is wanted, or none");
-  require_argument(batch.time_offsets.empty() || batch.time_offsets.size() == batch.rays.size(),
+  require_argument(batch.time_offsets.empty() || batch.time_offsets.size() == count,
                    "render: a time offset for each ray is wanted, or none");
   const Pose& pose = batch.T_world_sensor;
   require_argument(pose.translation.allFinite() && pose.rotation.coeffs().allFinite() &&
@@ -85,11 +90,20 @@ std::unique_ptr<Rendering> Renderer::submit(std::span<const RenderJob> jobs,
   executor.parallel_for(jobs.size(), 1, [&](std::size_t k, std::size_t) {
     CpuAccount* const account = jobs[k].account;
     const ChargeTo charge(account != nullptr ? account : ChargeTo::current());
-    if (jobs[k].wide) {
-      render_wide(jobs[k], executor);
-    } else {
-      render_one(jobs[k], executor);
+    const auto render_job = [&](const RenderJob& job) {
+      if (job.wide) {
+        render_wide(job, executor);
+      } else {
+        render_one(job, executor);
+      }
+    };
+    if (makes_rays() || (jobs[k].batch.aimed == nullptr && jobs[k].ranges.empty())) {
+      render_job(jobs[k]);
+      return;
     }
+    const ExpandedJob expanded(jobs[k], executor);
+    render_job(expanded.job());
+    expanded.finish();
   });
   return std::make_unique<Rendered>();
 }

@@ -15,6 +15,7 @@
 #include "pointflight/map/body.hpp"
 #include "pointflight/map/surfel_map.hpp"
 #include "pointflight/render/hit.hpp"
+#include "pointflight/render/sensor_beams.hpp"
 #include "pointflight/render/wide_beams.hpp"
 
 namespace pointflight {
@@ -27,6 +28,8 @@ struct Scene {
 /// The rays of one scan and what a renderer that makes images needs to lay them out.
 struct RayBatch {
   std::span<const Ray> rays;  ///< World; those of a snapshot may differ in origin.
+  /// Or, if it is not null, the beams that rays are to be made of, by whoever traces them.
+  const AimedBeams* aimed = nullptr;
   /// The rays' `direction_order`, or empty: the renderer finds it if it needs one. For patterns
   /// that repeat.
   std::span<const std::uint32_t> order;
@@ -46,16 +49,22 @@ struct RayBatch {
   [[nodiscard]] SimTime time_of(std::size_t ray) const {
     return time_offsets.empty() ? time : time + time_offsets[ray];
   }
+  /// How many rays it has.
+  [[nodiscard]] std::size_t size() const {
+    return aimed != nullptr ? aimed->beams->beams.size() : rays.size();
+  }
 };
 
 /// What a renderer is asked for. What it refers to must stay as it is until the hits are there.
 struct RenderJob {
   RayBatch batch;       ///< Of one scan.
-  std::span<Hit> hits;  ///< Of `batch.rays[i]`, written; none of wide beams.
+  std::span<Hit> hits;  ///< Of each ray, written; none of wide beams, or if `ranges` are asked for.
   /// The beams' cross-sections, if they have any: then rays are their axes, and what is written are
   /// `WideBeams::echoes`, no hits.
   std::optional<WideBeams> wide;
   CpuAccount* account = nullptr;  ///< Is charged with what the job costs; null: whoever asks.
+  /// Instead of hits, for who wants no more: `Hit::range` of each ray, written.
+  std::span<float> ranges{};
 };
 
 /// Jobs that a renderer has been given (`Renderer::submit`).
@@ -81,8 +90,8 @@ class Renderer {
   /// The same of one scan's rays, each a beam; `hits` has their length.
   void render(const RayBatch& batch, std::span<Hit> hits, const Executor& executor) const;
 
-  /// The same for callers that have other things to do meanwhile. All that the jobs refer to must
-  /// outlive the rendering. Here: everything is rendered at once.
+  /// The same for callers that have other things to do meanwhile. All that the jobs refer to, the
+  /// renderer and the executor must outlive the rendering. Here: everything is rendered at once.
   [[nodiscard]] virtual std::unique_ptr<Rendering> submit(std::span<const RenderJob> jobs,
                                                           const Executor& executor) const;
 
@@ -92,7 +101,14 @@ class Renderer {
   /// True if all rays are rendered from `T_world_sensor` whatever their own origins are.
   [[nodiscard]] virtual bool is_snapshot() const { return false; }
 
+  /// How many scans it would rather have together, while as many others are being finished; 0: as
+  /// many as there are threads, and nothing meanwhile.
+  [[nodiscard]] virtual std::size_t jobs_at_once() const { return 0; }
+
  protected:
+  /// True if `render_one` and `render_wide` make rays of aimed beams and write ranges; else they
+  /// are given rays and hits.
+  [[nodiscard]] virtual bool makes_rays() const { return false; }
   /// One job of beams that are lines, which is valid.
   virtual void render_one(const RenderJob& job, const Executor& executor) const = 0;
   /// One job of wide beams, which is valid. Here: by rays over each, 32 unless it says how many.

@@ -53,7 +53,7 @@ class EchoReceiver {
 /// of the centre's (2 sigma), which optics calls the beam's radius.
 struct WideBeams {
   /// Of each ray, which is its beam's axis, the direction across it in which sigma is
-  /// `sigma_across`: unit vectors in the world.
+  /// `sigma_across`: unit vectors in the world. Empty of aimed beams: `make_across`.
   std::span<const Vector3f> across;
   float sigma_across = 0.0f;  ///< rad
   float sigma_up = 0.0f;      ///< Across both the ray and `across`, rad.

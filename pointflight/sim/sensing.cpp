@@ -4,6 +4,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 namespace pointflight {
@@ -83,8 +84,8 @@ void count(const Sample& sample, VehicleSummary& summary) {
   summary.points += scanned->scan->points.size();
 }
 
-/// Measurements under way together: aim, one call of each renderer for the rays of all, receive,
-/// until no rays are left; then they are finished.
+/// Measurements under way together: they aim, each renderer is given the jobs of all, `take`
+/// finishes them.
 class Together {
  public:
   Together(const Fleet& fleet,
@@ -102,11 +103,14 @@ class Together {
       measurements_[k] =
           d.sensor->begin({d.index, d.start, d.end, tracks[d.vehicle], bodies_[k], executor});
     });
+    render();
   }
+
+  [[nodiscard]] std::span<const DueInterval> due() const { return due_; }
 
   /// By number of `due`; nothing of those that were lost.
   std::vector<std::optional<Sample>> take() {
-    render();
+    for (const auto& rendering : renderings_) rendering->collect();
     std::vector<std::optional<Sample>> samples(due_.size());
     executor_.parallel_for(due_.size(), 1, [&](std::size_t k, std::size_t) {
       const ChargeTo charge(&due_[k].accounts->rest);
@@ -119,26 +123,36 @@ class Together {
  private:
   /// What all measurements want to see.
   void render() {
-    std::map<const Renderer*, std::vector<RenderJob>> jobs;
     for (std::size_t k = 0; k < due_.size(); ++k) {
       if (!measurements_[k]) continue;
       auto job = measurements_[k]->job();
       if (!job) continue;
       job->account = &due_[k].accounts->rendering;
-      jobs[due_[k].sensor->renderer()].push_back(*job);
+      jobs_[due_[k].sensor->renderer()].push_back(*job);
     }
-    std::vector<std::unique_ptr<Rendering>> renderings;
-    for (const auto& [renderer, its_jobs] : jobs) {
-      renderings.push_back(renderer->submit(its_jobs, executor_));
+    for (const auto& [renderer, its_jobs] : jobs_) {
+      renderings_.push_back(renderer->submit(its_jobs, executor_));
     }
-    for (const auto& rendering : renderings) rendering->collect();
   }
 
   std::span<const DueInterval> due_;
   const Executor& executor_;
   std::vector<std::vector<Body>> bodies_;
   std::vector<std::unique_ptr<IntervalMeasurement>> measurements_;
+  std::map<const Renderer*, std::vector<RenderJob>> jobs_;
+  std::vector<std::unique_ptr<Rendering>>
+      renderings_;  ///< The first to go: they write to the rest.
 };
+
+/// As many as renderers want together; 0: none wants more than there are threads.
+std::size_t wanted_at_once(std::span<const DueInterval> due) {
+  std::size_t most = 0;
+  for (const DueInterval& d : due) {
+    const Renderer* renderer = d.sensor->renderer();
+    if (renderer != nullptr) most = std::max(most, renderer->jobs_at_once());
+  }
+  return most;
+}
 
 }  // namespace
 
@@ -159,19 +173,33 @@ void sense_intervals(const Fleet& fleet,
     for (std::size_t v = 0; v < fleet.size(); ++v) {
       tracks.push_back(fleet.track(statuses[v], v, start, end));
     }
-    // as many under way as there are threads: their beams, rays and hits take memory
-    const auto at_once = static_cast<std::size_t>(executor.threads());
-    for (std::size_t from = 0; from < due.size(); from += at_once) {
-      const std::span part = std::span(due).subspan(from, std::min(at_once, due.size() - from));
-      const auto samples = Together(fleet, obstacles, statuses, tracks, part, executor).take();
-      for (std::size_t k = 0; k < part.size(); ++k) {
-        VehicleStatus& status = statuses[part[k].vehicle];
-        ++status.sensors[part[k].sensor_number].next;
+    const auto finish = [&](Together& together) {
+      const auto samples = together.take();
+      for (std::size_t k = 0; k < samples.size(); ++k) {
+        const DueInterval& done = together.due()[k];
+        VehicleStatus& status = statuses[done.vehicle];
+        ++status.sensors[done.sensor_number].next;
         if (!samples[k]) continue;
         count(*samples[k], status.summary);
         sink.on_sample(*samples[k]);
       }
+    };
+    // as many under way as there are threads: their beams and hits take memory; a device has more,
+    // and renders some while others are finished
+    const std::size_t wanted = wanted_at_once(due);
+    const std::size_t at_once = std::max(wanted, static_cast<std::size_t>(executor.threads()));
+    std::unique_ptr<Together> before;
+    for (std::size_t from = 0; from < due.size(); from += at_once) {
+      const std::span part = std::span(due).subspan(from, std::min(at_once, due.size() - from));
+      auto together =
+          std::make_unique<Together>(fleet, obstacles, statuses, tracks, part, executor);
+      if (before) finish(*before);
+      before = std::move(together);
+      if (wanted > 0) continue;
+      finish(*before);
+      before.reset();
     }
+    if (before) finish(*before);
   }
 }
 

@@ -10,8 +10,8 @@
 #include <utility>
 
 #include "pointflight/core/constants.hpp"
-#include "pointflight/core/input_error.hpp"
 #include "pointflight/core/floor.hpp"
+#include "pointflight/core/input_error.hpp"
 #include "pointflight/core/math.hpp"
 #include "pointflight/survey/median.hpp"
 

@@ -21,14 +21,15 @@ std::uint64_t follow_survey(const SurfelMap& map,
   const float behind = static_cast<float>(right) + kernel.window;
   const auto reader = survey();
   std::vector<SurveyRay> batch;
-  std::vector<Ray> rays;
+  std::vector<MapRay> rays;
   std::atomic<std::uint64_t> overflows{0};
   while (reader->read(batch)) {
     report(progress, stage, reader->share_read());
     rays.clear();
     for (const SurveyRay& ray : batch) {
-      rays.push_back(
-          {ray.origin_world, ray.direction_world, ray.is_return ? ray.range + behind : ray.range});
+      rays.push_back(map_ray(
+          kernel,
+          {ray.origin_world, ray.direction_world, ray.is_return ? ray.range + behind : ray.range}));
     }
     const auto order = direction_order(rays, executor);
     executor.parallel_for(order.size(), kChunk, [&](std::size_t begin, std::size_t end) {

@@ -9,6 +9,7 @@
 #include "pointflight/gpu/gpu_trial.hpp"
 #include "pointflight/gpu/internal/kernel_choice.hpp"
 #include "pointflight/lidar/lidar.hpp"
+#include "tests/gpu/device.hpp"
 #include "tests/support.hpp"
 
 namespace pointflight {
@@ -16,17 +17,6 @@ namespace {
 
 using testing::error_of;
 using testing::expect_contains;
-
-bool has_device() {
-  try {
-    return !list_gpus().empty();
-  } catch (const InputError&) {
-    return false;
-  }
-}
-
-#define SKIP_WITHOUT_DEVICE() \
-  if (!has_device()) GTEST_SKIP() << "no Vulkan device (Debian: libvulkan1 mesa-vulkan-drivers)"
 
 TEST(GpuDevices, AreFoundByIndexAndName) {
   SKIP_WITHOUT_DEVICE();

@@ -35,11 +35,15 @@ inline int findLSB(uint x) {
   return x == 0 ? -1 : std::countr_zero(x);
 }
 
-/// One ray at a time: `start_way`, `step_node` and `step_leaf` until `s.next` is kDone, `end_way`.
+/// One ray at a time, given or made of beams (`ray_of`): `start_way`, `step_node` and `step_leaf`
+/// until `s.next` is kDone, `end_way`.
 struct KernelAsCpp {
   MapNumbers map;
   const uvec4* nodes;
   const uvec2* words;
+  DeviceCall call;
+  const uint* given;
+  const DeviceBeam* beams;
 
   static float abs(float x) { return std::fabs(x); }
   static float sqrt(float x) { return std::sqrt(x); }
@@ -53,6 +57,7 @@ struct KernelAsCpp {
   }
 #define precise
 #define EXACT_BY 0
+#include "pointflight/gpu/kernel/aim.glsl"
 #include "pointflight/gpu/kernel/exact.glsl"
 #include "pointflight/gpu/kernel/trace.glsl"
 #undef EXACT_BY

@@ -1,6 +1,8 @@
 // The kernel's text as C++ beside the processor's own renderer: no driver is needed.
 #include <gtest/gtest.h>
 
+#include <bit>
+#include <cstring>
 #include <numeric>
 
 #include "pointflight/core/random.hpp"
@@ -19,9 +21,9 @@ std::size_t expect_equal(const SurfelMap& map, const std::vector<Ray>& rays) {
   std::vector<std::uint32_t> order(rays.size());
   std::iota(order.begin(), order.end(), 0u);
   std::vector<KernelHit> expected(rays.size());
-  trace_beams(kernel_map_of(map), rays, order, expected);
-  std::vector<device::DeviceRay> packed(rays.size());
-  pack_rays(map, rays, order, packed);
+  const KernelMap kernel_map = kernel_map_of(map);
+  const std::vector<MapRay> packed = map_rays(kernel_map, rays);
+  trace_beams(kernel_map, packed, order, expected);
   device::KernelAsCpp kernel{};
   kernel.map = numbers_of(map);
   kernel.nodes = reinterpret_cast<const device::uvec4*>(map.nodes().data());
@@ -30,7 +32,7 @@ std::size_t expect_equal(const SurfelMap& map, const std::vector<Ray>& rays) {
   std::size_t hits = 0;
   std::size_t different = 0;
   for (std::size_t i = 0; i < rays.size(); ++i) {
-    const device::DeviceHit hit = kernel.trace(packed[i]);
+    const device::DeviceHit hit = kernel.trace(std::bit_cast<device::DeviceRay>(packed[i]));
     if (hit.range == device::kTooMany) {
       ++left;
       continue;
@@ -71,6 +73,46 @@ std::vector<Ray> rays_in(const SurfelMap& map, std::size_t count, float range_ma
 TEST(GpuKernel, TrialSceneHasTheProcessorsBits) {
   EXPECT_LT(expect_equal(*trial_scene(), trial_rays(40000)), 40u);
   EXPECT_LT(expect_equal(*trial_scene(), rays_in(*trial_scene(), 20000, 3.0f)), 40u);
+}
+
+TEST(GpuKernel, RaysOfBeamsHaveTheProcessorsBits) {
+  const KernelMap map = kernel_map_of(*trial_scene());
+  constexpr std::uint32_t kBeams = 3000;
+  const TrialAims trial = trial_aims(kBeams, 4);
+  for (const AimedBeams& aim : trial.aims) {
+    RayBatch batch;
+    batch.aimed = &aim;
+    const std::vector<MapRay> expected = map_rays(map, batch, Executor(1));
+    const MapPosition from = map_position(map, aim);
+    std::vector<std::uint32_t> given(device::kAimWords);
+    const auto append = [&](const auto& all) {
+      const std::size_t begin = given.size();
+      given.resize(begin + all.size() * sizeof all[0] / 4);
+      std::memcpy(given.data() + begin, all.data(), all.size() * sizeof all[0]);
+      return static_cast<std::uint32_t>(begin);
+    };
+    const std::uint32_t poses = append(aim.poses);
+    const device::DeviceAim own{from.axis[0].voxel,
+                                from.axis[1].voxel,
+                                from.axis[2].voxel,
+                                from.axis[0].rest,
+                                from.axis[1].rest,
+                                from.axis[2].rest,
+                                aim.range_max,
+                                poses,
+                                aim.poses.size() > 1 ? 1u : 0u,
+                                aim.deviations.empty() ? device::kNowhere : append(aim.deviations)};
+    std::memcpy(given.data(), &own, sizeof own);
+    device::KernelAsCpp kernel{};
+    kernel.call = {kBeams, kBeams, 1, 0};
+    kernel.given = given.data();
+    kernel.beams = reinterpret_cast<const device::DeviceBeam*>(trial.beams->beams.data());
+    for (std::uint32_t i = 0; i < kBeams; ++i) {
+      const auto made = std::bit_cast<MapRay>(kernel.ray_of(i));
+      ASSERT_EQ(std::memcmp(&made, &expected[i], sizeof made), 0) << i;
+      ASSERT_EQ(kernel.place_of(i), i);
+    }
+  }
 }
 
 TEST(GpuKernel, ThinAndNoisyMapsHaveTheProcessorsBits) {

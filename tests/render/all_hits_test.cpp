@@ -86,25 +86,28 @@ TEST(MeetAll, FindsWhatBruteForceFindsBehindSurfacesToo) {
     }
     expect_same(got, met_by_force(*map, rays[way.ray]));
   };
-  EXPECT_EQ(find_all_hits(kernel_map_of(*map), rays, order, visit), 0u);
+  const KernelMap kernel_map = kernel_map_of(*map);
+  EXPECT_EQ(find_all_hits(kernel_map, map_rays(kernel_map, rays), order, visit), 0u);
   EXPECT_EQ(seen, rays.size());
   EXPECT_GT(far_behind, 20u) << "the wall behind the ball";
 }
 
 TEST(MeetAll, AnEmptyMapAndNoRays) {
   const auto map = map_of(std::vector<Vector3d>{{1, 2, 3}}, 0.1);
-  std::vector<Ray> rays = {{Vector3d::Zero(), Vector3f::UnitX(), 5.0f}};
+  const KernelMap kernel_map = kernel_map_of(*map);
+  const std::vector<MapRay> rays = {
+      map_ray(kernel_map, {Vector3d::Zero(), Vector3f::UnitX(), 5.0f})};
   const std::vector<std::uint32_t> order = {0};
   std::size_t seen = 0;
-  find_all_hits(kernel_map_of(*map), rays, {}, [&](const RayHits&) { ++seen; });
+  find_all_hits(kernel_map, rays, {}, [&](const RayHits&) { ++seen; });
   EXPECT_EQ(seen, 0u);
-  find_all_hits(kernel_map_of(*map), rays, order, [&](const RayHits& way) {
+  find_all_hits(kernel_map, rays, order, [&](const RayHits& way) {
     ++seen;
     EXPECT_LT(way.range, 0.0f);
     EXPECT_TRUE(way.hits.empty());
   });
   EXPECT_EQ(seen, 1u);
-  KernelMap empty = kernel_map_of(*map);
+  KernelMap empty = kernel_map;
   empty.node_count = 0;
   find_all_hits(empty, rays, order, [&](const RayHits& way) {
     ++seen;

@@ -126,9 +126,10 @@ std::vector<Echoes> traced(const WideScan& scan,
   std::vector<Echoes> echoes(scan.rays.size());
   const WideBeams wide = scan.beams(receiver, 0, echoes);
   const KernelMap map = kernel_map_of(*grove());
+  const std::vector<MapRay> rays = map_rays(map, scan.rays);
   for (std::size_t from = 0; from < order.size(); from += at_once) {
     const std::span part = std::span(order).subspan(from, std::min(at_once, order.size() - from));
-    trace_cones(*grove(), map, scan.rays, part, wide);
+    trace_cones(*grove(), map, rays, part, wide);
   }
   return echoes;
 }
@@ -138,7 +139,8 @@ TEST(Cones, TheSameBitsHoweverBeamsGoTogether) {
     const WideScan scan({0, 0, 0}, speed, 0.4, 24, 60);
     for (const bool takes_strongest : {false, true}) {
       const EvenSurfaces receiver(takes_strongest);
-      std::vector<std::uint32_t> order = direction_order(scan.rays, Executor(1));
+      std::vector<std::uint32_t> order =
+          direction_order(std::span<const Ray>(scan.rays), Executor(1));
       const std::vector<Echoes> together = traced(scan, receiver, order, order.size());
       std::size_t mixed = 0;
       for (const Echoes& e : together) mixed += e.count > 1 ? 1 : 0;
@@ -163,7 +165,8 @@ TEST(Cones, TheSameBitsHoweverBeamsGoTogether) {
 TEST(Cones, TheSameBitsByEveryInstructionSet) {
   const WideScan scan({0, 0, 0}, 40.0, 2.0, 24, 60);
   const EvenSurfaces receiver;
-  const std::vector<std::uint32_t> order = direction_order(scan.rays, Executor(1));
+  const std::vector<std::uint32_t> order =
+      direction_order(std::span<const Ray>(scan.rays), Executor(1));
   const std::vector<Echoes> best = traced(scan, receiver, order, order.size());
   for (const std::string& kernel : kernel_names()) {
     use_kernel(kernel);
@@ -290,8 +293,10 @@ TEST(Cones, OfTooManySurfelsEightRaysAreTaken) {
   std::vector<Echoes> echoes(scan.rays.size());
   WideBeams wide = scan.beams(receiver, 0, echoes);
   wide.sigma_across = wide.sigma_up = 0.04f;
-  const std::vector<std::uint32_t> order = direction_order(scan.rays, Executor(1));
-  trace_cones(*map, kernel_map_of(*map), scan.rays, order, wide);
+  const std::vector<std::uint32_t> order =
+      direction_order(std::span<const Ray>(scan.rays), Executor(1));
+  const KernelMap kernel_map = kernel_map_of(*map);
+  trace_cones(*map, kernel_map, map_rays(kernel_map, scan.rays), order, wide);
   std::size_t seen = 0;
   for (const Echoes& e : echoes) {
     for (const Echo& echo : e.span()) {

@@ -1,16 +1,17 @@
 #include "pointflight/gpu/internal/kernel_choice.hpp"
 
+#include <algorithm>
 #include <map>
 #include <mutex>
 #include <numeric>
 #include <utility>
 
 #include "pointflight/core/random.hpp"
+#include "pointflight/geometry/rotation.hpp"
 #include "pointflight/geometry/shape_scene.hpp"
 #include "pointflight/map/import/map_builder.hpp"
 #include "pointflight/map/map_file.hpp"
 #include "pointflight/render/internal/beam_kernel.hpp"
-#include "pointflight/render/internal/grid_origin.hpp"
 
 namespace pointflight {
 namespace {
@@ -53,23 +54,6 @@ std::shared_ptr<const SurfelMap> imported(const ShapeScene& scene) {
 
 }  // namespace
 
-void pack_rays(const SurfelMap& map,
-               std::span<const Ray> rays,
-               std::span<const std::uint32_t> order,
-               std::span<device::DeviceRay> packed) {
-  const Vector3d& origin = map.origin_world();
-  const double r = map.resolution();
-  for (std::size_t i = 0; i < order.size(); ++i) {
-    const Ray& ray = rays[order[i]];
-    const GridOrigin x = grid_origin(ray.origin_world.x() - origin.x(), r);
-    const GridOrigin y = grid_origin(ray.origin_world.y() - origin.y(), r);
-    const GridOrigin z = grid_origin(ray.origin_world.z() - origin.z(), r);
-    const Vector3f& d = ray.direction_world;
-    packed[i] = {
-        x.voxel, y.voxel, z.voxel, x.rest, y.rest, z.rest, d.x(), d.y(), d.z(), ray.range_max};
-  }
-}
-
 std::vector<Ray> trial_rays(std::size_t count) {
   const RandomStream random(1, StreamId::kTest, 0);
   std::vector<Ray> rays;
@@ -87,20 +71,66 @@ std::vector<Ray> trial_rays(std::size_t count) {
   return rays;
 }
 
-std::size_t count_equal(GpuDevice& device, const RayKernel& kernel, std::size_t rays) {
-  const auto map = trial_scene();
-  const std::vector<Ray> all = trial_rays(rays);
-  std::vector<std::uint32_t> order(all.size());
+TrialAims trial_aims(std::size_t beams, std::size_t aims) {
+  constexpr std::uint32_t kPieces = 5;
+  const RandomStream random(2, StreamId::kTest, 0);
+  auto made = std::make_shared<SensorBeams>();
+  made->pieces = kPieces;
+  made->has_origins = true;
+  for (std::uint32_t i = 0; i < beams; ++i) {
+    const std::uint64_t at = std::uint64_t{7} * i;
+    const Vector3f d = (Vector3d(random.normal(at), random.normal(at + 1), random.normal(at + 2)) +
+                        Vector3d(0.01, 0.0, 0.0))
+                           .normalized()
+                           .cast<float>();
+    const Vector3f across = horizontal_across(d);
+    made->beams.push_back({{d.x(), d.y(), d.z()},
+                           {static_cast<float>(random.uniform(at + 3, -0.1, 0.1)),
+                            static_cast<float>(random.uniform(at + 4, -0.1, 0.1)),
+                            static_cast<float>(random.uniform(at + 5, -0.1, 0.1))},
+                           {across.x(), across.y()},
+                           1.0f + 0.25f * static_cast<float>(i % 2),
+                           static_cast<float>(random.uniform(at + 6, 0.0, 1.0)),
+                           i % kPieces,
+                           i});
+    // another order than that of the numbers
+    made->order.push_back(static_cast<std::uint32_t>(beams) - 1 - i);
+  }
+  TrialAims trial{made, {}};
+  for (std::uint64_t k = 0; k < aims; ++k) {
+    const std::uint64_t at = std::uint64_t{1} << 32 | 8 * k;
+    const Vector3d from(random.uniform(at, 1.0, 7.0),
+                        random.uniform(at + 1, 1.0, 5.0),
+                        random.uniform(at + 2, 0.5, 2.5));
+    const Vector3d turn(random.normal(at + 3), random.normal(at + 4), random.normal(at + 5));
+    std::vector<Pose> poses;
+    for (std::uint32_t p = 0; p <= (k % 2 == 0 ? kPieces : 0u); ++p) {
+      poses.push_back({quaternion_from_rotation_vector((1.0 + 0.1 * p) * turn),
+                       from + 0.05 * static_cast<double>(p) * turn.normalized()});
+    }
+    trial.aims.push_back(aim_beams(made, poses, 10.0f));
+    if (k % 4 < 2) continue;
+    for (std::uint64_t i = 0; i < beams; ++i) {
+      const std::uint64_t draw = (k + 2) << 32 | 2 * i;
+      trial.aims.back().deviations.push_back({static_cast<float>(0.004 * random.normal(draw)),
+                                              static_cast<float>(0.004 * random.normal(draw + 1))});
+    }
+  }
+  return trial;
+}
+
+namespace {
+
+/// How many rays have the same bits by both.
+std::size_t count_equal_hits(const KernelMap& map,
+                             std::span<const MapRay> rays,
+                             std::span<const device::DeviceHit> hits) {
+  std::vector<std::uint32_t> order(rays.size());
   std::iota(order.begin(), order.end(), 0u);
-  std::vector<KernelHit> expected(all.size());
-  trace_beams(kernel_map_of(*map), all, order, expected);
-  const DeviceMap there(device, *map);
-  RayTracer tracer(device, there, kernel);
-  pack_rays(*map, all, order, tracer.rays(0, all.size()));
-  tracer.submit(0, all.size());
+  std::vector<KernelHit> expected(rays.size());
+  trace_beams(map, rays, order, expected);
   std::size_t equal = 0;
-  const std::span hits = tracer.collect(0);
-  for (std::size_t i = 0; i < all.size(); ++i) {
+  for (std::size_t i = 0; i < rays.size(); ++i) {
     const KernelHit& e = expected[i];
     const device::DeviceHit& h = hits[i];
     const bool is_same = e.range < 0.0f ? h.range == device::kNothing
@@ -108,6 +138,38 @@ std::size_t count_equal(GpuDevice& device, const RayKernel& kernel, std::size_t 
                                               h.surfel == e.strongest;
     equal += is_same || h.range == device::kTooMany ? 1 : 0;
   }
+  return equal;
+}
+
+}  // namespace
+
+std::size_t count_equal(GpuDevice& device, const RayKernel& kernel, std::size_t rays) {
+  constexpr std::size_t kAims = 8;
+  const auto map = trial_scene();
+  const KernelMap kernel_map = kernel_map_of(*map);
+  const DeviceMap there(device, *map);
+  RayTracer tracer(device, there, kernel);
+  const std::size_t beams = rays / 2 / kAims;
+  const std::size_t given = rays - beams * kAims;
+  const std::vector<MapRay> all = map_rays(kernel_map, trial_rays(given));
+  std::copy(all.begin(), all.end(), tracer.rays(0, given).begin());
+  tracer.submit(0, given);
+  tracer.wait(0);
+  std::size_t equal = count_equal_hits(kernel_map, all, tracer.hits(0));
+  if (beams == 0) return equal;
+  const TrialAims trial = trial_aims(beams, kAims);
+  AimedPart part{trial.beams, {}, false};
+  std::vector<MapRay> made;
+  for (const AimedBeams& aim : trial.aims) {
+    part.aims.push_back(&aim);
+    RayBatch batch;
+    batch.aimed = &aim;
+    const std::vector<MapRay> own = map_rays(kernel_map, batch, Executor(1));
+    made.insert(made.end(), own.begin(), own.end());
+  }
+  tracer.submit(1, kernel_map, part);
+  tracer.wait(1);
+  equal += count_equal_hits(kernel_map, made, tracer.hits(1));
   return equal;
 }
 

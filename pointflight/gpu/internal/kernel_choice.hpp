@@ -15,13 +15,16 @@ std::shared_ptr<const SurfelMap> trial_scene();
 /// Rays from anywhere in it.
 std::vector<Ray> trial_rays(std::size_t count);
 
-/// The rays as a device takes them, in this order.
-void pack_rays(const SurfelMap& map,
-               std::span<const Ray> rays,
-               std::span<const std::uint32_t> order,
-               std::span<device::DeviceRay> packed);
+/// A sensor that tumbles through it, each time from another place: beams that leave beside its
+/// middle, at different times, with noise.
+struct TrialAims {
+  std::shared_ptr<const SensorBeams> beams;
+  std::vector<AimedBeams> aims;
+};
+TrialAims trial_aims(std::size_t beams, std::size_t aims);
 
-/// How many of the trial's rays have the processor's bits by a kernel. Throws GpuError.
+/// How many of so many rays through the trial's room have the processor's bits by a kernel: half of
+/// them are made of beams on the device. Throws GpuError.
 std::size_t count_equal(GpuDevice& device, const RayKernel& kernel, std::size_t rays);
 
 /// The first of `kernels_for` that has the processor's bits of a scene of its own, as it was found

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <cstring>
 #include <utility>
 
 namespace pointflight::device {
@@ -19,9 +20,15 @@ namespace {
 
 constexpr std::uint32_t kGroup = 128;      // invocations, as in the kernel
 constexpr std::uint32_t kResident = 2048;  // groups of a persistent kernel: more find nothing
-constexpr std::uint32_t kBindings = 6;     // of the kernel
-constexpr std::uint64_t kLongest = 20'000'000'000;     // ns that a device may take for a slot
-constexpr std::size_t kFewest = std::size_t{1} << 14;  // rays that a slot has room for
+constexpr std::uint32_t kBindings = 7;     // of the kernel
+constexpr std::uint64_t kLongest = 20'000'000'000;         // ns that a device may take for a slot
+constexpr std::uint32_t kEnoughToTell = 1u << 17;          // rays, how fast a device is
+constexpr std::uint64_t kFewest = std::uint64_t{1} << 18;  // bytes of a buffer
+
+static_assert(sizeof(MapRay) == sizeof(device::DeviceRay));
+static_assert(sizeof(SensorBeam) == sizeof(device::DeviceBeam));
+static_assert(sizeof(BeamPose) == 4 * device::kPoseWords);
+static_assert(sizeof(device::DeviceAim) == 4 * device::kAimWords);
 
 using Code = std::span<const std::uint32_t>;
 
@@ -110,13 +117,13 @@ void RayTracer::make_pipeline(const RayKernel& kernel) {
   set.bindingCount = kBindings;
   set.pBindings = bindings.data();
   require_success(vk.CreateDescriptorSetLayout(handle, &set, nullptr, &set_layout_), "kernel");
-  const VkPushConstantRange count{VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof(std::uint32_t)};
+  const VkPushConstantRange call{VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof(device::DeviceCall)};
   VkPipelineLayoutCreateInfo layout{};
   layout.sType = VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO;
   layout.setLayoutCount = 1;
   layout.pSetLayouts = &set_layout_;
   layout.pushConstantRangeCount = 1;
-  layout.pPushConstantRanges = &count;
+  layout.pPushConstantRanges = &call;
   require_success(vk.CreatePipelineLayout(handle, &layout, nullptr, &layout_), "kernel");
 
   const Code code = code_of(kernel);
@@ -183,27 +190,40 @@ void RayTracer::make_slots() {
 }
 
 /// Buffers grow to what is asked for: twice as much at least.
-void RayTracer::make_room(Slot& slot, std::size_t count) {
-  const std::size_t has = slot.upload.bytes() / sizeof(device::DeviceRay);
-  if (has >= count) return;
-  const std::size_t room = std::min(kMostRays, std::max({count, 2 * has, kFewest}));
-  const std::uint64_t rays = room * sizeof(device::DeviceRay);
-  const std::uint64_t hits = room * sizeof(device::DeviceHit);
-  slot.upload = GpuBuffer(device_, rays, GpuBuffer::Use::kUpload);
-  slot.rays = GpuBuffer(device_, rays, GpuBuffer::Use::kDevice);
-  slot.hits = GpuBuffer(device_, hits, GpuBuffer::Use::kDevice);
-  slot.read_back = GpuBuffer(device_, hits, GpuBuffer::Use::kReadBack);
+void RayTracer::make_room(Slot& slot, const Needs& needs) {
+  using Use = GpuBuffer::Use;
+  bool has_grown = false;
+  const auto grow = [&](GpuBuffer& buffer, std::uint64_t bytes, Use use) {
+    if (buffer.bytes() >= bytes && buffer.bytes() > 0) return;
+    const std::uint64_t most = device_.info().largest_buffer;
+    const std::uint64_t room = std::min(most, std::max({bytes, 2 * buffer.bytes(), kFewest}));
+    buffer = GpuBuffer(device_, std::max(room, bytes), use);
+    has_grown = true;
+  };
+  grow(slot.upload, needs.given + needs.beams, Use::kUpload);
+  grow(slot.given, needs.given, Use::kDevice);
+  grow(slot.results, needs.results, Use::kDevice);
+  grow(slot.read_back, needs.results, Use::kReadBack);
+  if (slot.beams.bytes() < std::max<std::uint64_t>(needs.beams, 1)) slot.has_beams.reset();
+  grow(slot.beams, needs.beams, Use::kDevice);
+  if (has_grown) bind(slot);
+}
+
+void RayTracer::bind(Slot& slot) {
   const std::array<VkBuffer, kBindings> buffers = {map_.buffers()[0].handle(),
                                                    map_.buffers()[1].handle(),
                                                    map_.buffers()[2].handle(),
-                                                   slot.rays.handle(),
-                                                   slot.hits.handle(),
-                                                   counter_.handle()};
+                                                   slot.given.handle(),
+                                                   slot.results.handle(),
+                                                   counter_.handle(),
+                                                   slot.beams.handle()};
   std::array<VkDescriptorBufferInfo, kBindings> infos{};
   std::array<VkWriteDescriptorSet, kBindings> writes{};
   const auto number = static_cast<std::uint64_t>(&slot - slots_.data());
   for (std::uint32_t i = 0; i < kBindings; ++i) {
     infos[i] = {buffers[i], 0, VK_WHOLE_SIZE};
+    // offsets of 256 suit all devices
+    if (buffers[i] == counter_.handle()) infos[i] = {buffers[i], 256 * number, 256};
     writes[i].sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET;
     writes[i].dstSet = slot.set;
     writes[i].dstBinding = i;
@@ -211,51 +231,124 @@ void RayTracer::make_room(Slot& slot, std::size_t count) {
     writes[i].descriptorType = VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
     writes[i].pBufferInfo = &infos[i];
   }
-  infos[kBindings - 1] = {counter_.handle(), 256 * number, 256};  // offsets of 256 suit all devices
   device_.vk().UpdateDescriptorSets(device_.handle(), kBindings, writes.data(), 0, nullptr);
 }
 
-std::span<device::DeviceRay> RayTracer::rays(std::size_t slot, std::size_t count) {
-  make_room(slots_[slot], count);
-  return slots_[slot].upload.as<device::DeviceRay>(count);
+std::span<MapRay> RayTracer::rays(std::size_t slot, std::size_t count) {
+  make_room(slots_[slot], {count * sizeof(MapRay), 0, count * sizeof(device::DeviceHit)});
+  return slots_[slot].upload.as<MapRay>(count);
 }
 
-void RayTracer::record(Slot& slot) {
+void RayTracer::submit(std::size_t slot, std::size_t count) {
+  slots_[slot].call = {static_cast<std::uint32_t>(count), 0, 0, 0};
+  send(slots_[slot], count * sizeof(MapRay), 0);
+}
+
+void RayTracer::submit(std::size_t number, const KernelMap& map, const AimedPart& part) {
+  Slot& slot = slots_[number];
+  const std::size_t count = part.beams->beams.size();
+  const std::size_t rays = count * part.aims.size();
+  std::size_t words = part.aims.size() * device::kAimWords;
+  for (const AimedBeams* aim : part.aims) {
+    words += aim->poses.size() * device::kPoseWords + 2 * aim->deviations.size();
+  }
+  const std::uint64_t table = count * sizeof(SensorBeam);
+  const std::uint64_t per_ray = part.wants_ranges ? sizeof(float) : sizeof(device::DeviceHit);
+  make_room(slot, {4 * words, table, rays * per_ray});
+  auto* const given = slot.upload.as<std::uint32_t>(words).data();
+  auto* const aims = reinterpret_cast<device::DeviceAim*>(given);
+  std::size_t at = part.aims.size() * device::kAimWords;
+  const auto append = [&](const auto& all) {
+    const std::size_t begin = at;
+    std::memcpy(given + at, all.data(), all.size() * sizeof all[0]);
+    at += all.size() * sizeof all[0] / 4;
+    return static_cast<std::uint32_t>(begin);
+  };
+  for (std::size_t i = 0; i < part.aims.size(); ++i) {
+    const AimedBeams& aim = *part.aims[i];
+    const MapPosition from = map_position(map, aim);
+    const std::uint32_t poses = append(aim.poses);
+    const bool is_rolling = aim.poses.size() > 1;
+    aims[i] = {from.axis[0].voxel,
+               from.axis[1].voxel,
+               from.axis[2].voxel,
+               from.axis[0].rest,
+               from.axis[1].rest,
+               from.axis[2].rest,
+               aim.range_max,
+               poses,
+               is_rolling ? 1u : 0u,
+               aim.deviations.empty() ? device::kNowhere : append(aim.deviations)};
+  }
+  const bool brings_beams = slot.has_beams != part.beams;
+  if (brings_beams) {
+    const std::span all(part.beams->beams);
+    auto* const beams = reinterpret_cast<SensorBeam*>(given + words);
+    const bool has_order = part.beams->order.size() == count;
+    for (std::size_t i = 0; i < count; ++i) beams[i] = all[has_order ? part.beams->order[i] : i];
+    slot.has_beams = part.beams;
+  }
+  slot.call = {static_cast<std::uint32_t>(rays),
+               static_cast<std::uint32_t>(count),
+               part.beams->has_origins ? 1u : 0u,
+               part.wants_ranges ? 1u : 0u};
+  send(slot, 4 * words, brings_beams ? table : 0);
+}
+
+std::size_t RayTracer::slot_for(const SensorBeams* beams,
+                                const std::function<bool(std::size_t)>& is_free) const {
+  std::size_t best = kSlots;
+  for (std::size_t i = 0; i < kSlots; ++i) {
+    if (!is_free(i)) continue;
+    if (beams != nullptr && slots_[i].has_beams.get() == beams) return i;
+    if (best == kSlots || slots_[i].used < slots_[best].used) best = i;
+  }
+  return best;
+}
+
+void RayTracer::send(Slot& slot, std::uint64_t given, std::uint64_t beams) {
+  slot.used = ++calls_;
+  record(slot, given, beams);
+  device_.submit(slot.commands, slot.fence);
+}
+
+/// Of the upload buffer `given` bytes are copied, and behind them `beams`.
+void RayTracer::record(Slot& slot, std::uint64_t given, std::uint64_t beams) {
   const VulkanFunctions& vk = device_.vk();
   const auto number = static_cast<std::uint32_t>(&slot - slots_.data());
-  const auto count = static_cast<std::uint32_t>(slot.count);
   VkCommandBufferBeginInfo begin{};
   begin.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO;
   begin.flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT;
   require_success(vk.BeginCommandBuffer(slot.commands, &begin), "rays");
-  const VkBufferCopy up{0, 0, slot.count * sizeof(device::DeviceRay)};
-  vk.CmdCopyBuffer(slot.commands, slot.upload.handle(), slot.rays.handle(), 1, &up);
+  const VkBufferCopy up{0, 0, given};
+  vk.CmdCopyBuffer(slot.commands, slot.upload.handle(), slot.given.handle(), 1, &up);
+  const VkBufferCopy table{given, 0, beams};
+  if (beams > 0) {
+    vk.CmdCopyBuffer(slot.commands, slot.upload.handle(), slot.beams.handle(), 1, &table);
+  }
   vk.CmdFillBuffer(slot.commands, counter_.handle(), 256 * std::uint64_t{number}, 4, 0);
   vk.CmdResetQueryPool(slot.commands, queries_, 2 * number, 2);
   record_barrier(vk, slot.commands);
   vk.CmdBindPipeline(slot.commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipeline_);
   vk.CmdBindDescriptorSets(
       slot.commands, VK_PIPELINE_BIND_POINT_COMPUTE, layout_, 0, 1, &slot.set, 0, nullptr);
-  vk.CmdPushConstants(slot.commands, layout_, VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof count, &count);
+  vk.CmdPushConstants(
+      slot.commands, layout_, VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof slot.call, &slot.call);
   vk.CmdWriteTimestamp(slot.commands, VK_PIPELINE_STAGE_TOP_OF_PIPE_BIT, queries_, 2 * number);
-  const std::uint32_t all = (count + kGroup - 1) / kGroup;
+  const std::uint32_t all = (slot.call.count + kGroup - 1) / kGroup;
   vk.CmdDispatch(slot.commands, kernel_.is_persistent ? std::min(all, kResident) : all, 1, 1);
   vk.CmdWriteTimestamp(
       slot.commands, VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT, queries_, 2 * number + 1);
   record_barrier(vk, slot.commands);
-  const VkBufferCopy down{0, 0, slot.count * sizeof(device::DeviceHit)};
-  vk.CmdCopyBuffer(slot.commands, slot.hits.handle(), slot.read_back.handle(), 1, &down);
+  const std::uint64_t per_ray =
+      slot.call.wants_ranges != 0 ? sizeof(float) : sizeof(device::DeviceHit);
+  const VkBufferCopy down{0, 0, slot.call.count * per_ray};
+  vk.CmdCopyBuffer(slot.commands, slot.results.handle(), slot.read_back.handle(), 1, &down);
   record_barrier(vk, slot.commands);
   require_success(vk.EndCommandBuffer(slot.commands), "rays");
 }
 
-void RayTracer::submit(std::size_t slot, std::size_t count) {
-  slots_[slot].count = count;
-  record(slots_[slot]);
-  device_.submit(slots_[slot].commands, slots_[slot].fence);
-}
-
-std::span<const device::DeviceHit> RayTracer::collect(std::size_t number) {
+void RayTracer::wait(std::size_t number) {
   const VulkanFunctions& vk = device_.vk();
   VkDevice handle = device_.handle();
   Slot& slot = slots_[number];
@@ -274,7 +367,19 @@ std::span<const device::DeviceHit> RayTracer::collect(std::size_t number) {
   if (known == VK_SUCCESS) {
     kernel_time_ = 1e-9 * device_.tick() * static_cast<double>(ticks[1] - ticks[0]);
   }
-  return slot.read_back.as<const device::DeviceHit>(slot.count);
+  if (known != VK_SUCCESS || slot.call.count < kEnoughToTell || !(kernel_time_ > 0.0)) return;
+  constexpr double kBest = 0.1;  // s: desktops want the device back, and hosts something to do
+  const double best = kBest * static_cast<double>(slot.call.count) / kernel_time_;
+  beams_at_once_ = static_cast<std::size_t>(
+      std::clamp(best, static_cast<double>(kEnoughToTell), static_cast<double>(kMostBeams)));
+}
+
+std::span<const device::DeviceHit> RayTracer::hits(std::size_t slot) const {
+  return slots_[slot].read_back.as<const device::DeviceHit>(slots_[slot].call.count);
+}
+
+std::span<const float> RayTracer::ranges(std::size_t slot) const {
+  return slots_[slot].read_back.as<const float>(slots_[slot].call.count);
 }
 
 }  // namespace pointflight

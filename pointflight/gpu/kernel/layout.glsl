@@ -34,6 +34,47 @@ struct DeviceRay {
   float range_max;
 };
 
+/// A beam in the frame of its sensor: `SensorBeam`.
+struct DeviceBeam {
+  float direction_x;
+  float direction_y;
+  float direction_z;
+  float origin_x;
+  float origin_y;
+  float origin_z;
+  float across_x;
+  float across_y;
+  float stretch;
+  float fraction;
+  uint piece;
+  uint number;
+};
+
+/// All beams of a sensor at a time: `AimedBeams`, from a voxel and the rest. Its poses (`BeamPose`)
+/// and deviations (`BeamDeviation`) lie at words of the same buffer.
+struct DeviceAim {
+  int voxel_x;
+  int voxel_y;
+  int voxel_z;
+  float rest_x;
+  float rest_y;
+  float rest_z;
+  float range_max;
+  uint poses;
+  uint is_rolling;  // a pose at each end of a piece, else one
+  uint deviations;  // kNowhere: none
+};
+const uint kAimWords = 10u;
+const uint kPoseWords = 7u;
+
+/// What a call asks for.
+struct DeviceCall {
+  uint count;         // rays
+  uint beams;         // of each aim; 0: rays are given
+  uint has_origins;   // not all beams leave from the sensor's origin
+  uint wants_ranges;  // and no more of each hit
+};
+
 /// What it hit: `KernelHit`, or kTooMany.
 struct DeviceHit {
   float range;

@@ -19,12 +19,27 @@ layout(constant_id = 0) const uint kMostChunks = 0u;
 layout(std430, set = 0, binding = 0) restrict readonly buffer Map { MapNumbers map; };
 layout(std430, set = 0, binding = 1) restrict readonly buffer Nodes { uvec4 nodes[]; };
 layout(std430, set = 0, binding = 2) restrict readonly buffer Words { uvec2 words[]; };
-layout(std430, set = 0, binding = 3) restrict readonly buffer Rays { DeviceRay rays[]; };
-layout(std430, set = 0, binding = 4) restrict writeonly buffer Hits { DeviceHit hits[]; };
+layout(std430, set = 0, binding = 3) restrict readonly buffer Given { uint given[]; };
+layout(std430, set = 0, binding = 4) restrict writeonly buffer Results { uint results[]; };
 layout(std430, set = 0, binding = 5) restrict buffer Counter { uint taken; };
-layout(push_constant) uniform Call { uint count; };
+layout(std430, set = 0, binding = 6) restrict readonly buffer Beams { DeviceBeam beams[]; };
+layout(push_constant) uniform Call { DeviceCall call; };
 
+#include "aim.glsl"
 #include "trace.glsl"
+
+/// Ends the way of ray `i`.
+void finish(uint i) {
+  DeviceHit hit = end_way();
+  uint place = place_of(i);
+  if (call.wants_ranges != 0u) {
+    results[place] = floatBitsToUint(hit.range);
+    return;
+  }
+  results[3u * place] = floatBitsToUint(hit.range);
+  results[3u * place + 1u] = floatBitsToUint(hit.cosine);
+  results[3u * place + 2u] = hit.surfel;
+}
 
 #if PERSISTENT
 // Lanes that are through take the next rays once a quarter of the subgroup is, and leaves wait
@@ -32,7 +47,7 @@ layout(push_constant) uniform Call { uint count; };
 void main() {
   uint few = max(1u, gl_SubgroupSize / 4u);
   uint many = max(1u, gl_SubgroupSize / 2u);
-  uint share = count / (gl_NumWorkGroups.x * gl_NumSubgroups * 4u);
+  uint share = call.count / (gl_NumWorkGroups.x * gl_NumSubgroups * 4u);
   uint chunk = min(256u, max(gl_SubgroupSize, share));
   bool is_flying = false;
   uint slot = 0u;
@@ -43,7 +58,7 @@ void main() {
   s.next = kDone;
   for (;;) {
     if (is_flying && s.next == kDone) {
-      hits[slot] = end_way();
+      finish(slot);
       is_flying = false;
     }
     uvec4 idle = subgroupBallot(!is_flying);
@@ -53,8 +68,8 @@ void main() {
         uint first = 0u;
         if (subgroupElect()) first = atomicAdd(taken, chunk);
         next = subgroupBroadcastFirst(first);
-        stop = min(next + chunk, count);
-        if (next >= count) {
+        stop = min(next + chunk, call.count);
+        if (next >= call.count) {
           is_exhausted = true;
           next = stop;
         }
@@ -64,7 +79,7 @@ void main() {
       uint ray = next + subgroupBallotExclusiveBitCount(idle);
       if (!is_flying && ray < stop) {
         slot = ray;
-        start_way(rays[ray]);
+        start_way(ray_of(ray));
         is_flying = true;
       }
       next = min(next + idles, stop);
@@ -86,12 +101,12 @@ void main() {
 #else
 void main() {
   uint ray = gl_GlobalInvocationID.x;
-  if (ray >= count) return;
-  start_way(rays[ray]);
+  if (ray >= call.count) return;
+  start_way(ray_of(ray));
   while (s.next != kDone) {
     while (s.next == kInner) step_node();
     if (s.next != kDone) step_leaf();
   }
-  hits[ray] = end_way();
+  finish(ray);
 }
 #endif

@@ -13,8 +13,7 @@ struct Lidar::Aimed {
   std::shared_ptr<const ScanBeams::Ordered> ordered;
   bool snapshot = false;
   Pose middle;                    ///< T_world_sensor in the middle of the scan.
-  std::vector<Ray> rays;          ///< Their axes.
-  std::vector<Vector3f> across;   ///< `WideBeams::across`; none if beams are lines.
+  AimedBeams in_world;            ///< Their axes.
   std::vector<Duration> offsets;  ///< Their times, if bodies move meanwhile.
 
   [[nodiscard]] const std::vector<Beam>& beams() const { return ordered->beams; }

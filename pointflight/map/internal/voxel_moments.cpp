@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "pointflight/core/hash.hpp"
 #include "pointflight/core/floor.hpp"
+#include "pointflight/core/hash.hpp"
 
 namespace pointflight {
 namespace {

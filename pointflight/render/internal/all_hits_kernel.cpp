@@ -13,7 +13,7 @@ HWY_BEFORE_NAMESPACE();
 namespace pointflight::HWY_NAMESPACE {
 
 static std::uint64_t follow(const KernelMap& map,
-                            const Ray* rays,
+                            const MapRay* rays,
                             const std::uint32_t* order,
                             std::size_t count,
                             const std::function<void(const RayHits&)>& visit) {
@@ -46,7 +46,7 @@ HWY_EXPORT(follow);
 }  // namespace
 
 std::uint64_t find_all_hits(const KernelMap& map,
-                            std::span<const Ray> rays,
+                            std::span<const MapRay> rays,
                             std::span<const std::uint32_t> order,
                             const std::function<void(const RayHits&)>& visit) {
   return HWY_DYNAMIC_DISPATCH(follow)(map, rays.data(), order.data(), order.size(), visit);

@@ -28,7 +28,7 @@ struct RayHits {
 /// hits more surfels than fit in its list, the farther half is dropped and the ray ends there;
 /// returns how often.
 std::uint64_t find_all_hits(const KernelMap& map,
-                            std::span<const Ray> rays,
+                            std::span<const MapRay> rays,
                             std::span<const std::uint32_t> order,
                             const std::function<void(const RayHits&)>& visit);
 

@@ -66,18 +66,19 @@ struct BeamGroups {
 
 /// Copies eight beams to a group. False if they are too far apart to go together: more than
 /// `widest` from their mean direction, rad.
-POINTFLIGHT_INLINE bool take_beams(
-    const KernelMap& map, const Ray* rays, const std::uint32_t* beams, float widest, Group& group) {
+POINTFLIGHT_INLINE bool take_beams(const MapRay* rays,
+                                   const std::uint32_t* beams,
+                                   float widest,
+                                   Group& group) {
   for (std::size_t i = 0; i < 8; ++i) {
-    const Ray& ray = rays[beams[i]];
-    group.dx[i] = ray.direction_world.x();
-    group.dy[i] = ray.direction_world.y();
-    group.dz[i] = ray.direction_world.z();
+    const MapRay& ray = rays[beams[i]];
+    group.dx[i] = ray.direction[0];
+    group.dy[i] = ray.direction[1];
+    group.dz[i] = ray.direction[2];
     group.end[i] = ray.range_max;
     for (int k = 0; k < 3; ++k) {
-      const GridOrigin origin = grid_origin(ray.origin_world[k] - map.origin[k], map.resolution);
-      group.voxel[k][i] = origin.voxel;
-      group.rest[k][i] = origin.rest;
+      group.voxel[k][i] = ray.voxel[k];
+      group.rest[k][i] = ray.rest[k];
     }
   }
   const F8 dx = load(group.dx);

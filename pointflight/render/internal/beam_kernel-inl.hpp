@@ -16,8 +16,8 @@
 #include <memory>
 
 #include "pointflight/map/internal/children-inl.hpp"
-#include "pointflight/render/internal/grid_origin.hpp"
 #include "pointflight/render/internal/hit_rule-inl.hpp"
+#include "pointflight/render/internal/map_ray.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace pointflight::HWY_NAMESPACE {
@@ -62,7 +62,7 @@ POINTFLIGHT_INLINE void start_beam(float range_max, BeamState& s) {
 }
 
 POINTFLIGHT_INLINE void start_ray(const KernelMap& map,
-                                  const Ray& ray,
+                                  const MapRay& ray,
                                   std::uint32_t index,
                                   RayState& s) {
   s.start[3] = 0.0f;
@@ -73,10 +73,11 @@ POINTFLIGHT_INLINE void start_ray(const KernelMap& map,
   s.steps = most_steps(map);
   s.depth = 0;
   for (int axis = 0; axis < 3; ++axis) {
-    const double origin = ray.origin_world[axis] - map.origin[axis];
-    s.origin[axis] = grid_origin(origin, map.resolution);
-    s.start[axis] = static_cast<float>(origin);
-    const float d = ray.direction_world[axis];
+    const GridOrigin from = ray.origin(axis);
+    s.origin[axis] = from;
+    s.start[axis] = static_cast<float>(static_cast<double>(from.voxel) * map.resolution +
+                                       static_cast<double>(from.rest));
+    const float d = ray.direction[axis];
     s.direction[axis] = d;
     // a zero would make 0 * inf; a tiny slope reaches as far
     s.inverse[axis] = 1.0f / (std::abs(d) > 1e-12f ? d : std::copysign(1e-12f, d));
@@ -250,7 +251,7 @@ POINTFLIGHT_INLINE bool advance(const KernelMap& map,
 /// many lists overflowed.
 template <HitMode kMode, class Finish>
 POINTFLIGHT_INLINE std::uint64_t follow_singly(const KernelMap& map,
-                                               const Ray* rays,
+                                               const MapRay* rays,
                                                const std::uint32_t* order,
                                                std::size_t count,
                                                const Finish& finish) {

@@ -47,7 +47,7 @@ KernelMap kernel_map_of(const SurfelMap& map) {
 }
 
 std::uint64_t trace_beams(const KernelMap& map,
-                          std::span<const Ray> rays,
+                          std::span<const MapRay> rays,
                           std::span<const std::uint32_t> order,
                           std::span<KernelHit> hits,
                           BeamGrouping grouping) {

@@ -8,7 +8,7 @@
 
 #include "pointflight/map/surfel_map.hpp"
 #include "pointflight/map/surfel_scale.hpp"
-#include "pointflight/render/renderer.hpp"
+#include "pointflight/render/internal/map_ray.hpp"
 
 namespace pointflight {
 
@@ -60,7 +60,7 @@ KernelMap kernel_map_of(const SurfelMap& map);
 /// in `order` go together. Returns how many beams hit more surfels than fit in their list
 /// (docs/architecture.md, "Hit rule").
 std::uint64_t trace_beams(const KernelMap& map,
-                          std::span<const Ray> rays,
+                          std::span<const MapRay> rays,
                           std::span<const std::uint32_t> order,
                           std::span<KernelHit> hits,
                           BeamGrouping grouping = BeamGrouping::kAutomatic);

@@ -9,6 +9,7 @@
 #include "pointflight/render/internal/body_renderer.hpp"
 #include "pointflight/render/internal/cone_kernel.hpp"
 #include "pointflight/render/internal/direction_order.hpp"
+#include "pointflight/render/internal/expanded_job.hpp"
 #include "pointflight/render/internal/sub_ray_renderer.hpp"
 
 namespace pointflight {
@@ -24,10 +25,11 @@ const SurfelMap& map_of(const Scene& scene) {
 
 /// The order in which a batch's rays are traced; into `room` if it has none of its own.
 std::span<const std::uint32_t> order_of(const RayBatch& batch,
+                                        std::span<const MapRay> rays,
                                         std::vector<std::uint32_t>& room,
                                         const Executor& executor) {
-  if (batch.order.size() == batch.rays.size()) return batch.order;
-  room = direction_order(batch.rays, executor);
+  if (batch.order.size() == rays.size()) return batch.order;
+  room = direction_order(rays, executor);
   return room;
 }
 
@@ -77,40 +79,74 @@ BeamRenderer::BeamRenderer(const Scene& scene, BeamGrouping grouping)
     : map_(scene.map), kernel_map_(kernel_map_of(map_of(scene))), grouping_(grouping) {}
 
 void BeamRenderer::render_one(const RenderJob& job, const Executor& executor) const {
-  const RayBatch& batch = job.batch;
+  if (!job.batch.bodies.empty() && (job.batch.aimed != nullptr || !job.ranges.empty())) {
+    render_among_bodies(job, executor);
+    return;
+  }
+  const std::vector<MapRay> rays = map_rays(kernel_map_, job.batch, executor);
+  trace(job, rays, executor);
+  render_bodies(job.batch, job.hits, executor);
+}
+
+/// The map by the beams themselves, bodies by the rays that are made of them.
+void BeamRenderer::render_among_bodies(const RenderJob& job, const Executor& executor) const {
+  const ExpandedJob expanded(job, executor);
+  RenderJob map_alone = job;
+  map_alone.hits = expanded.job().hits;
+  map_alone.ranges = {};
+  trace(map_alone, map_rays(kernel_map_, job.batch, executor), executor);
+  render_bodies(expanded.job().batch, expanded.job().hits, executor);
+  expanded.finish();
+}
+
+/// What rays hit of the map.
+void BeamRenderer::trace(const RenderJob& job,
+                         std::span<const MapRay> rays,
+                         const Executor& executor) const {
   std::vector<std::uint32_t> room;
-  const std::span<const std::uint32_t> order = order_of(batch, room, executor);
-  std::vector<KernelHit> found(batch.rays.size());
+  const std::span<const std::uint32_t> order = order_of(job.batch, rays, room, executor);
+  std::vector<KernelHit> found(rays.size());
   executor.parallel_for(order.size(), kChunk, [&](std::size_t begin, std::size_t end) {
     const std::span part = order.subspan(begin, end - begin);
-    const std::uint64_t overflows = trace_beams(kernel_map_, batch.rays, part, found, grouping_);
+    const std::uint64_t overflows = trace_beams(kernel_map_, rays, part, found, grouping_);
     if (overflows > 0) overflows_ += overflows;
-    for (const std::uint32_t i : part) job.hits[i] = hit_of(found[i]);
+    if (job.ranges.empty()) {
+      for (const std::uint32_t i : part) job.hits[i] = hit_of(found[i]);
+    } else {
+      for (const std::uint32_t i : part) job.ranges[i] = found[i].range;
+    }
   });
-  render_bodies(batch, job.hits, executor);
 }
 
 /// Through the map as cones; those that bodies may touch by sub-rays.
 void BeamRenderer::render_wide(const RenderJob& job, const Executor& executor) const {
   const WideBeams& wide = *job.wide;
   const float widest = kSubRayRadius * std::max(wide.sigma_across, wide.sigma_up);
-  if (wide.sub_rays != 0 || widest > kWidestCone) {
-    Renderer::render_wide(job, executor);
+  const bool are_lines = wide.sub_rays != 0 || widest > kWidestCone;
+  const bool wants_rays = are_lines || !job.batch.bodies.empty();
+  const ExpandedJob expanded(job, executor, wants_rays ? Expand::kAll : Expand::kAcross);
+  if (are_lines) {
+    Renderer::render_wide(expanded.job(), executor);
     return;
   }
-  const RayBatch& batch = job.batch;
+  const std::vector<MapRay> rays = map_rays(kernel_map_, job.batch, executor);
   std::vector<std::uint32_t> room;
-  const std::span<const std::uint32_t> order = order_of(batch, room, executor);
+  const std::span<const std::uint32_t> order = order_of(job.batch, rays, room, executor);
   executor.parallel_for(order.size(), kChunk, [&](std::size_t begin, std::size_t end) {
-    trace_cones(*map_, kernel_map_, batch.rays, order.subspan(begin, end - begin), wide);
+    const std::span part = order.subspan(begin, end - begin);
+    trace_cones(*map_, kernel_map_, rays, part, *expanded.job().wide);
   });
-  const std::vector<std::uint32_t> near = rays_near_bodies(batch, widest, executor);
-  const std::vector<std::uint32_t> mixed = hide_behind_bodies(job, near, executor);
+  const std::vector<std::uint32_t> near = rays_near_bodies(expanded.job().batch, widest, executor);
+  const std::vector<std::uint32_t> mixed = hide_behind_bodies(expanded.job(), near, executor);
   const auto render_lines = [&](const RenderJob& lines) { render_one(lines, executor); };
-  find_echoes(job, mixed, kUsualSubRays, render_lines, executor);
+  find_echoes(expanded.job(), mixed, kUsualSubRays, render_lines, executor);
 }
 
 Hit BeamRenderer::trace(const Ray& ray) const {
+  return trace(map_ray(kernel_map_, ray));
+}
+
+Hit BeamRenderer::trace(const MapRay& ray) const {
   constexpr std::array<std::uint32_t, 1> kOrder = {0};
   std::array<KernelHit, 1> found;
   overflows_ += trace_beams(kernel_map_, {&ray, 1}, kOrder, found);

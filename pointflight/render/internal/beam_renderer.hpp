@@ -18,21 +18,27 @@ class BeamRenderer : public Renderer {
   explicit BeamRenderer(const Scene& scene, BeamGrouping grouping = BeamGrouping::kAutomatic);
 
   [[nodiscard]] Hit trace(const Ray& ray) const override;
+  [[nodiscard]] Hit trace(const MapRay& ray) const;
 
   /// Beams whose list of surfels overflowed and lost its farthest entry: there the result may
   /// depend on the shape of the tree (never on threads).
   [[nodiscard]] std::uint64_t overflow_count() const { return overflows_; }
 
+  [[nodiscard]] const KernelMap& kernel_map() const { return kernel_map_; }
   [[nodiscard]] Scene scene() const { return {map_}; }
 
   /// What a kernel found, with the map's intensity.
   [[nodiscard]] Hit hit_of(const KernelHit& found) const;
 
  protected:
+  [[nodiscard]] bool makes_rays() const override { return true; }
   void render_one(const RenderJob& job, const Executor& executor) const override;
   void render_wide(const RenderJob& job, const Executor& executor) const override;
 
  private:
+  void render_among_bodies(const RenderJob& job, const Executor& executor) const;
+  void trace(const RenderJob& job, std::span<const MapRay> rays, const Executor& executor) const;
+
   std::shared_ptr<const SurfelMap> map_;
   KernelMap kernel_map_;
   BeamGrouping grouping_;

@@ -177,8 +177,8 @@ Ray in_body(const Ray& ray, const Pose& T_world_body) {
   return own;
 }
 
-bool is_nearer(float range, const Ray& ray, const Hit& hit) {
-  return range <= ray.range_max && (!hit.is_return() || range < hit.range);
+bool is_nearer(float range, float range_max, const Hit& hit) {
+  return range <= range_max && (!hit.is_return() || range < hit.range);
 }
 
 /// Where a ray hits what is exact of a body, in the body's frame.
@@ -202,7 +202,7 @@ void meet_solid(const RayBatch& batch,
     const Vector3d direction = T_body_world.rotation * ray.direction_world.cast<double>();
     const auto met =
         meet_exact(body, T_body_world * ray.origin_world, direction.normalized(), time);
-    if (!met || !is_nearer(static_cast<float>(met->range), ray, hits[i])) continue;
+    if (!met || !is_nearer(static_cast<float>(met->range), ray.range_max, hits[i])) continue;
     hits[i].range = static_cast<float>(met->range);
     hits[i].cos_incidence = static_cast<float>(std::abs(met->normal.dot(direction)));
     hits[i].intensity = body.intensity;
@@ -216,22 +216,23 @@ void meet_points(const RayBatch& batch,
                  std::span<const std::uint32_t> rays,
                  std::span<Hit> hits) {
   const SurfelMap& map = *std::get<std::shared_ptr<const SurfelMap>>(body.shape);
-  std::vector<Ray> own;
+  const KernelMap kernel_map = kernel_map_of(map);
+  std::vector<MapRay> own;
   std::vector<std::uint32_t> number;
   for (const std::uint32_t i : rays) {
     const SimTime time = batch.time_of(i);
     if (time < body.from || time >= body.until) continue;
-    own.push_back(in_body(batch.rays[i], body.T_world_body(time)));
+    own.push_back(map_ray(kernel_map, in_body(batch.rays[i], body.T_world_body(time))));
     number.push_back(i);
   }
   std::vector<std::uint32_t> order(own.size());
   std::iota(order.begin(), order.end(), 0u);
   std::vector<KernelHit> found(own.size());
   // one by one: rays of one batch lie in frames that differ by the body's motion
-  trace_beams(kernel_map_of(map), own, order, found, BeamGrouping::kSingly);
+  trace_beams(kernel_map, own, order, found, BeamGrouping::kSingly);
   for (std::size_t k = 0; k < own.size(); ++k) {
     Hit& hit = hits[number[k]];
-    if (found[k].range < 0.0f || !is_nearer(found[k].range, own[k], hit)) continue;
+    if (found[k].range < 0.0f || !is_nearer(found[k].range, own[k].range_max, hit)) continue;
     hit.range = found[k].range;
     hit.cos_incidence = found[k].cos_incidence;
     hit.intensity = map.intensity(found[k].strongest);

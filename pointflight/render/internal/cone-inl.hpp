@@ -35,7 +35,7 @@ struct ConeRoom {  // NOLINT(cppcoreguidelines-pro-type-member-init): written be
 struct ConeCall {
   const KernelMap& map;
   const SurfelMap& surfels;
-  const Ray* rays;
+  const MapRay* rays;
   const WideBeams& wide;
   const Reflectances reflectances;
   const SureEchoes sure;
@@ -204,17 +204,19 @@ static HWY_NOINLINE void hit_as_lines(const ConeCall& call,
                                       const SubRayLanes& sub_rays,
                                       SubRayHits& hits) {
   constexpr std::uint32_t kOrder[8] = {0, 1, 2, 3, 4, 5, 6, 7};
-  Ray rays[8];
+  MapRay rays[8];
   KernelHit found[8];
   for (std::size_t i = 0; i < 8; ++i) {
     rays[i] = call.rays[beam.ray];
     const auto along = [&](int k) {
       return beam.direction[k] + sub_rays.x[i] * beam.across[k] + sub_rays.y[i] * beam.up[k];
     };
-    rays[i].direction_world[beam.u] = along(0);
-    rays[i].direction_world[beam.v] = along(1);
-    rays[i].direction_world[beam.w] = beam.forward * along(2);
-    rays[i].direction_world.normalize();
+    Vector3f direction;
+    direction[beam.u] = along(0);
+    direction[beam.v] = along(1);
+    direction[beam.w] = beam.forward * along(2);
+    direction.normalize();
+    for (int k = 0; k < 3; ++k) rays[i].direction[k] = direction[k];
   }
   trace_singly({call.map, rays, found}, kOrder, 8);
   for (std::size_t i = 0; i < 8; ++i) {
@@ -309,7 +311,7 @@ static HWY_NOINLINE void finish(const ConeCall& call, ConeBeam& beam) {
 
 static void trace_wide(const KernelMap& map,
                        const SurfelMap& surfels,
-                       const Ray* rays,
+                       const MapRay* rays,
                        const std::uint32_t* order,
                        std::size_t count,
                        const WideBeams& wide) {
@@ -336,7 +338,7 @@ static void trace_wide(const KernelMap& map,
     for (std::size_t i = 0; i < of_them; ++i) {
       const std::uint32_t eight[8] = {
           some[i], some[i], some[i], some[i], some[i], some[i], some[i], some[i]};
-      take_beams(map, rays, eight, kWidestBundle, bundle.groups[0]);
+      take_beams(rays, eight, kWidestBundle, bundle.groups[0]);
       const std::uint32_t* const of_group = eight;
       run(1, &of_group, 1);
     }

@@ -49,7 +49,7 @@ bool needs_more_sub_rays(const Echoes& echoes, const EchoReceiver& receiver) {
 
 void trace_cones(const SurfelMap& surfels,
                  const KernelMap& map,
-                 std::span<const Ray> rays,
+                 std::span<const MapRay> rays,
                  std::span<const std::uint32_t> order,
                  const WideBeams& wide) {
   if (map.node_count == 0) {

@@ -18,7 +18,7 @@ inline constexpr float kWidestCone = 0.1f;
 /// than 1,000 surfels.
 void trace_cones(const SurfelMap& surfels,
                  const KernelMap& map,
-                 std::span<const Ray> rays,
+                 std::span<const MapRay> rays,
                  std::span<const std::uint32_t> order,
                  const WideBeams& wide);
 

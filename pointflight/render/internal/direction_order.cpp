@@ -101,6 +101,14 @@ std::vector<std::uint32_t> direction_order(std::span<const Ray> rays, const Exec
   return order_of(rays.size(), at, executor);
 }
 
+std::vector<std::uint32_t> direction_order(std::span<const MapRay> rays, const Executor& executor) {
+  const auto at = [&](std::size_t i) {
+    const MapRay& ray = rays[i];
+    return Vector3f(ray.direction[0], ray.direction[1], ray.direction[2]);
+  };
+  return order_of(rays.size(), at, executor);
+}
+
 std::vector<std::uint32_t> direction_order(std::span<const Vector3f> directions,
                                            const Executor& executor) {
   const auto at = [&](std::size_t i) -> const Vector3f& { return directions[i]; };

@@ -6,6 +6,7 @@
 
 #include "pointflight/core/parallel.hpp"
 #include "pointflight/geometry/types.hpp"
+#include "pointflight/render/internal/map_ray.hpp"
 
 namespace pointflight {
 
@@ -13,6 +14,9 @@ namespace pointflight {
 /// over the sphere (octahedral map) with cells of about 0.05 degrees; equal cells keep their order.
 /// Beams traced in this order find their part of the map in the cache.
 std::vector<std::uint32_t> direction_order(std::span<const Ray> rays, const Executor& executor);
+
+/// The same of rays in a map.
+std::vector<std::uint32_t> direction_order(std::span<const MapRay> rays, const Executor& executor);
 
 /// The same for directions in any frame: a turned pattern keeps its neighbours.
 std::vector<std::uint32_t> direction_order(std::span<const Vector3f> directions,

@@ -19,7 +19,7 @@ inline constexpr float kWidestBundle = 0.4f;
 /// Beams of one call, and where to write what they hit.
 struct Beams {
   const KernelMap& map;
-  const Ray* rays;
+  const MapRay* rays;
   KernelHit* hits;
 };
 
@@ -76,8 +76,7 @@ POINTFLIGHT_INLINE std::size_t fill(const Beams& beams,
     for (std::size_t i = at + kTogether; i < std::min(at + kTogether + 8, count); ++i) {
       hwy::Prefetch(beams.rays + order[i]);
     }
-    const bool close =
-        take_beams(beams.map, beams.rays, order + at, widths.group, p.groups[groups]);
+    const bool close = take_beams(beams.rays, order + at, widths.group, p.groups[groups]);
     if (close && groups > 0 && !lies_near(p.groups[groups], p.groups[0], widths.together)) break;
     if (close) {
       taken[groups++] = at;

@@ -72,6 +72,7 @@ void render_sub_rays(const RenderJob& job,
     });
     RenderJob lines{job.batch, hits, std::nullopt};
     lines.batch.rays = rays;
+    lines.batch.aimed = nullptr;
     lines.batch.order = {};
     lines.batch.time_offsets = offsets;
     render(lines);

@@ -126,13 +126,13 @@ POINTFLIGHT_INLINE bool is_dense(const Beams& beams,
   for (std::size_t i = 0; i < kLooks; ++i) {
     const std::size_t at = (count - 8) * i / (kLooks - 1) / 8 * 8;
     const float widest = beams.map.widest_group;
-    together += take_beams(beams.map, beams.rays, order + at, widest, room) ? 1 : 0;
+    together += take_beams(beams.rays, order + at, widest, room) ? 1 : 0;
   }
   return 2 * together >= kLooks;
 }
 
 static std::uint64_t trace(const KernelMap& map,
-                           const Ray* rays,
+                           const MapRay* rays,
                            const std::uint32_t* order,
                            std::size_t count,
                            BeamGrouping grouping,
