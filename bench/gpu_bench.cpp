@@ -291,7 +291,7 @@ void run(const Options& options) {
     }
   }
   if (!options.json.empty()) {
-    OutputFile file(options.json, true);
+    OutputFile file(options.json);
     file.write(json.dump(1) + "\n");
     file.commit();
   }

@@ -28,7 +28,7 @@ struct SensorBeam {
 
 /// The beams of a scan, in the order of firing: made once for all who have the same.
 struct SensorBeams {
-  std::vector<SensorBeam> beams;
+  std::vector<SensorBeam> beams;     ///< Of all.
   std::vector<std::uint32_t> order;  ///< `RayBatch::order`
   std::uint32_t pieces = 1;          ///< Equally long ones that the scan's time is divided into.
   bool has_origins = false;          ///< Not all beams leave from the sensor's origin.

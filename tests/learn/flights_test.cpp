@@ -131,7 +131,8 @@ TEST(Flights, RangesAreThoseOfTheRenderer) {
                     pose.rotation.toRotationMatrix().cast<float>() * directions()[k],
                     10.0f};
       const Hit hit = renderer->trace(ray);
-      EXPECT_EQ(flown.ranges[i * 64 + k], hit.is_return() ? hit.range / 10.0f : 1.0f);
+      // directions are turned by other roundings
+      EXPECT_NEAR(flown.ranges[i * 64 + k], hit.is_return() ? hit.range / 10.0f : 1.0f, 2e-6);
     }
   }
 }
