@@ -3,6 +3,9 @@
 #define VK_NO_PROTOTYPES
 #include <vulkan/vulkan_core.h>
 
+#include <string>
+#include <vector>
+
 namespace pointflight {
 
 // NOLINTBEGIN(cppcoreguidelines-macro-usage): a list of functions, each of which is named once
@@ -67,6 +70,10 @@ class VulkanFunctions {
   /// The process's own. Throws InputError if there is no loader or it has no instance.
   static const VulkanFunctions& get();
 
+  /// What the layer that checks how Vulkan is used has said since this was last asked: where it is
+  /// installed, and the environment has POINTFLIGHT_VULKAN_VALIDATION. For tests.
+  static std::vector<std::string> take_validation_messages();
+
   VkInstance instance = VK_NULL_HANDLE;  ///< Of Vulkan 1.1.
 #define POINTFLIGHT_DECLARE(name) PFN_vk##name name = nullptr;
   /// As the specification names them, without "vk".
@@ -77,6 +84,7 @@ class VulkanFunctions {
 
  private:
   VulkanFunctions();
+  void listen_to_validation(PFN_vkGetInstanceProcAddr load) const;
 };
 
 }  // namespace pointflight
