@@ -190,7 +190,7 @@ class Bench {
   }
 
   void on_device(Batch& batch, const Executor& executor) {
-    const DeviceBatch parts(batch.next(), beam_, queue_->beams_at_once(), executor);
+    DeviceBatch parts(batch.next(), beam_, queue_->at_once(), executor);
     DeviceQueue::Ticket ticket{&parts};
     queue_->start(ticket);
     queue_->finish(ticket);

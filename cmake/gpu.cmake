@@ -13,19 +13,23 @@ set(kernel_folder ${PROJECT_SOURCE_DIR}/pointflight/gpu/kernel)
 file(GLOB kernel_texts CONFIGURE_DEPENDS ${kernel_folder}/*.glsl)
 set(kernels)
 file(MAKE_DIRECTORY ${generated}/gpu/kernels)
-foreach(persistent 0 1)
-  foreach(exact 0 1 2)
-    set(name rays_${persistent}_${exact})
-    set(code ${generated}/gpu/kernels/${name}.inc)
-    set(compile ${POINTFLIGHT_GLSLANG} -V --quiet --target-env vulkan1.1 -DPERSISTENT=${persistent} -DEXACT_BY=${exact}
-      -I${kernel_folder} --vn ${name} -o ${code} ${kernel_folder}/rays.comp)
-    if(NOT EXISTS ${code})
-      execute_process(COMMAND ${compile} OUTPUT_QUIET)  # for linters, which build nothing
-    endif()
-    add_custom_command(OUTPUT ${code} COMMAND ${compile}
-      DEPENDS ${kernel_folder}/rays.comp ${kernel_texts} COMMENT "Compiling kernel ${name}" VERBATIM)
-    list(APPEND kernels ${code})
+# pointflight_kernel(name source definitions...): into ${generated}/gpu/kernels/${name}.inc
+function(pointflight_kernel name source)
+  set(code ${generated}/gpu/kernels/${name}.inc)
+  set(compile ${POINTFLIGHT_GLSLANG} -V --quiet --target-env vulkan1.1 ${ARGN} -I${kernel_folder} --vn ${name} -o ${code}
+    ${kernel_folder}/${source})
+  if(NOT EXISTS ${code})
+    execute_process(COMMAND ${compile} OUTPUT_QUIET)  # for linters, which build nothing
+  endif()
+  add_custom_command(OUTPUT ${code} COMMAND ${compile} DEPENDS ${kernel_folder}/${source} ${kernel_texts}
+    COMMENT "Compiling kernel ${name}" VERBATIM)
+  set(kernels ${kernels} ${code} PARENT_SCOPE)
+endfunction()
+foreach(exact 0 1 2)
+  foreach(persistent 0 1)
+    pointflight_kernel(rays_${persistent}_${exact} rays.comp -DPERSISTENT=${persistent} -DEXACT_BY=${exact})
   endforeach()
+  pointflight_kernel(wide_${exact} wide.comp -DEXACT_BY=${exact})
 endforeach()
 add_custom_target(pointflight_kernels DEPENDS ${kernels})
 

@@ -48,8 +48,8 @@ std::unique_ptr<DeviceQueue> open_queue(const SurfelMap& map) {
   }
 }
 
-/// Lines on the device; wide beams, bodies and single rays by `beam` on the processor, whose bits
-/// all have.
+/// Lines and cones on the device; bodies, sub-rays in given numbers and single rays by `beam` on
+/// the processor, whose bits all have.
 class GpuRenderer : public Renderer {
  public:
   /// Batches of fewer rays for each thread are the processor's.
@@ -58,13 +58,13 @@ class GpuRenderer : public Renderer {
 
   [[nodiscard]] std::unique_ptr<Rendering> submit(std::span<const RenderJob> jobs,
                                                   const Executor& executor) const override {
-    std::size_t lines = 0;
+    std::size_t beams = 0;
     for (const RenderJob& job : jobs) {
       require_valid(job);
-      if (!job.wide) lines += job.batch.size();
+      if (DeviceBatch::takes(job)) beams += job.batch.size();
     }
     const auto threads = static_cast<std::size_t>(executor.threads());
-    const bool is_for_device = lines > 0 && lines >= fewest_rays_ * threads;
+    const bool is_for_device = beams > 0 && beams >= fewest_rays_ * threads;
     if (is_lost_ || !is_for_device) return beam_.submit(jobs, executor);
     return std::make_unique<OnDevice>(*this, jobs, executor);
   }
@@ -82,22 +82,24 @@ class GpuRenderer : public Renderer {
   /// Scans: their hits take up to some 100 MB.
   static constexpr std::size_t kJobsAtOnce = 32;
 
-  /// Jobs of which some are lines.
+  /// Jobs of which some are the device's.
   class OnDevice : public Rendering {
    public:
     OnDevice(const GpuRenderer& own, std::span<const RenderJob> jobs, const Executor& executor)
         : own_(own),
           executor_(executor),
-          batch_(jobs, own.beam_, own.queue_->beams_at_once(), executor),
+          batch_(jobs, own.beam_, own.queue_->at_once(), executor),
           ticket_{&batch_} {
-      std::vector<RenderJob> wide;
-      for (const RenderJob& job : jobs) (job.wide ? wide : lines_).push_back(job);
+      std::vector<RenderJob> others;
+      for (const RenderJob& job : jobs) {
+        (DeviceBatch::takes(job) ? taken_ : others).push_back(job);
+      }
       try {
         own.queue_->start(ticket_);
       } catch (const GpuError& error) {
         own.lose(error);
       }
-      own.beam_.render(wide, executor);  // meanwhile
+      own.beam_.render(others, executor);  // meanwhile
     }
     ~OnDevice() override { own_.queue_->forget(ticket_); }
     OnDevice(const OnDevice&) = delete;
@@ -109,14 +111,14 @@ class GpuRenderer : public Renderer {
         batch_.finish();
       } catch (const GpuError& error) {
         own_.lose(error);
-        own_.beam_.render(lines_, executor_);
+        own_.beam_.render(taken_, executor_);
       }
     }
 
    private:
     const GpuRenderer& own_;
     const Executor& executor_;
-    std::vector<RenderJob> lines_;
+    std::vector<RenderJob> taken_;
     DeviceBatch batch_;
     DeviceQueue::Ticket ticket_;
   };

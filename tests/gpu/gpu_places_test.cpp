@@ -73,6 +73,63 @@ LidarSettings settings_of(const std::string& sensor) {
   return settings;
 }
 
+bool are_same(const Echoes& a, const Echoes& b) {
+  if (a.count != b.count || a.all_hit != b.all_hit) return false;
+  for (std::uint32_t i = 0; i < a.count; ++i) {
+    const Echo& p = a.all[i];
+    const Echo& q = b.all[i];
+    if (p.range != q.range || p.reflectivity != q.reflectivity || p.intensity != q.intensity ||
+        p.label != q.label || p.parts != q.parts || p.depth != q.depth ||
+        p.origin.cos_incidence != q.origin.cos_incidence || p.origin.surfel != q.origin.surfel ||
+        p.origin.sub_ray != q.origin.sub_ray) {
+      return false;
+    }
+  }
+  return true;
+}
+
+TEST(GpuPlaces, Slow_WideBeamsHaveTheProcessorsEchoes) {
+  SKIP_WITHOUT_DEVICE();
+  const Place places[] = {{"maps/forest_tls.pcd", 0.1}, {"maps/garage.pcd", 0.1}};
+  SKIP_WITHOUT(testing::shared_data(places[0].cloud));
+  const Executor executor(2);
+  std::size_t beams = 0;
+  std::size_t echoes = 0;
+  for (const Place& place : places) {
+    const auto map = imported(testing::shared_data(place.cloud), place.resolution);
+    const auto beam = make_renderer("beam", Scene{map});
+    const auto gpu = make_gpu_renderer(Scene{map});
+    const PoseTrack track = flight_through(*map);
+    const std::vector<Body> bodies = bodies_around(track);
+    for (const char* sensor : {"mid360", "vlp16", "avia"}) {
+      SCOPED_TRACE(fmt::format("{} {}", place.cloud, sensor));
+      const Lidar lidar(load_lidar(sensor), 0, nullptr, Surroundings{});
+      for (std::uint64_t k = 0; k < 3; ++k) {
+        ScanRequest request;
+        request.index = k;
+        request.start = SimTime{} + static_cast<std::int64_t>(k) * lidar.period();
+        request.snapshot = k % 2 == 1;
+        request.seed = 3;
+        if (k < 2) request.bodies = bodies;
+        const auto of_beam = lidar.aim(request, track, *beam, executor);
+        const auto of_gpu = lidar.aim(request, track, *gpu, executor);
+        const RenderJob a = of_beam->job();
+        const RenderJob b = of_gpu->job();
+        ASSERT_TRUE(a.wide && b.wide);
+        beam->render({&a, 1}, executor);
+        gpu->render({&b, 1}, executor);
+        for (std::size_t i = 0; i < a.wide->echoes.size(); ++i) {
+          ASSERT_TRUE(are_same(a.wide->echoes[i], b.wide->echoes[i])) << k << ' ' << i;
+          echoes += a.wide->echoes[i].count;
+        }
+        beams += a.batch.size();
+      }
+    }
+  }
+  EXPECT_GT(beams, 400'000u);
+  EXPECT_GT(echoes, beams / 4);
+}
+
 TEST(GpuPlaces, Slow_AMillionRaysHaveTheProcessorsBits) {
   SKIP_WITHOUT_DEVICE();
   const Place places[] = {

@@ -44,6 +44,9 @@ struct KernelAsCpp {
   DeviceCall call;
   const uint* given;
   const DeviceBeam* beams;
+  const uint* tables;
+  const uint* codes;
+  float list[kMostTouched * kTouchedNumbers];
 
   static float abs(float x) { return std::fabs(x); }
   static float sqrt(float x) { return std::sqrt(x); }
@@ -60,6 +63,15 @@ struct KernelAsCpp {
 #include "pointflight/gpu/kernel/aim.glsl"
 #include "pointflight/gpu/kernel/exact.glsl"
 #include "pointflight/gpu/kernel/trace.glsl"
+  float touched(int row, uint number) const {
+    return list[static_cast<uint>(row) * kTouchedNumbers + number];
+  }
+  void set_touched(int row, uint number, float value) {
+    list[static_cast<uint>(row) * kTouchedNumbers + number] = value;
+  }
+#include "pointflight/gpu/kernel/cone.glsl"
+#include "pointflight/gpu/kernel/cone_end.glsl"
+#include "pointflight/gpu/kernel/cone_way.glsl"
 #undef EXACT_BY
 #undef precise
 
@@ -73,6 +85,21 @@ struct KernelAsCpp {
       }
     }
     return end_way();
+  }
+
+  /// Wide beam `i` of the call.
+  WideResult trace_wide(uint i) {
+    aim_across(i);
+    start_cone(aimed_ray(i), across_x, across_y, across_z, beams[beam_of(i)].number);
+    see_eight();
+    while (c.next != kDone) {
+      if (c.next == kInner) {
+        step_cone_node();
+      } else {
+        step_cone_leaf();
+      }
+    }
+    return end_cone();
   }
 };
 

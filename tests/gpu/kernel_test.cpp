@@ -10,6 +10,7 @@
 #include "pointflight/map/import/map_builder.hpp"
 #include "pointflight/map/map_file.hpp"
 #include "pointflight/render/internal/beam_kernel.hpp"
+#include "tests/gpu/aimed_call.hpp"
 #include "tests/gpu/kernel_as_cpp.hpp"
 #include "tests/support.hpp"
 
@@ -83,28 +84,11 @@ TEST(GpuKernel, RaysOfBeamsHaveTheProcessorsBits) {
     RayBatch batch;
     batch.aimed = &aim;
     const std::vector<MapRay> expected = map_rays(map, batch, Executor(1));
-    const MapPosition from = map_position(map, aim);
-    std::vector<std::uint32_t> given(device::kAimWords);
-    const auto append = [&](const auto& all) {
-      const std::size_t begin = given.size();
-      given.resize(begin + all.size() * sizeof all[0] / 4);
-      std::memcpy(given.data() + begin, all.data(), all.size() * sizeof all[0]);
-      return static_cast<std::uint32_t>(begin);
-    };
-    const std::uint32_t poses = append(aim.poses);
-    const device::DeviceAim own{from.axis[0].voxel,
-                                from.axis[1].voxel,
-                                from.axis[2].voxel,
-                                from.axis[0].rest,
-                                from.axis[1].rest,
-                                from.axis[2].rest,
-                                aim.range_max,
-                                poses,
-                                aim.poses.size() > 1 ? 1u : 0u,
-                                aim.deviations.empty() ? device::kNowhere : append(aim.deviations)};
-    std::memcpy(given.data(), &own, sizeof own);
+    const std::vector<std::uint32_t> given = testing::given_of(map, aim);
     device::KernelAsCpp kernel{};
-    kernel.call = {kBeams, kBeams, 1, 0};
+    kernel.call.count = kBeams;
+    kernel.call.beams = kBeams;
+    kernel.call.has_origins = 1;
     kernel.given = given.data();
     kernel.beams = reinterpret_cast<const device::DeviceBeam*>(trial.beams->beams.data());
     for (std::uint32_t i = 0; i < kBeams; ++i) {

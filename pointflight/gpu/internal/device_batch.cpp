@@ -4,7 +4,7 @@
 #include <cstring>
 
 #include "pointflight/core/cpu_account.hpp"
-#include "pointflight/gpu/internal/kernel_choice.hpp"
+#include "pointflight/gpu/internal/wide_tables.hpp"
 #include "pointflight/render/internal/body_renderer.hpp"
 #include "pointflight/render/internal/direction_order.hpp"
 
@@ -44,12 +44,16 @@ CpuAccount* account_of(const RenderJob& job) {
 
 DeviceBatch::DeviceBatch(std::span<const RenderJob> jobs,
                          const BeamRenderer& beam,
-                         std::size_t beams_at_once,
+                         const AtOnce& at_once,
                          const Executor& executor)
-    : beam_(beam), beams_at_once_(beams_at_once), executor_(executor) {
+    : beam_(beam), at_once_(at_once), executor_(executor) {
   lines_.reserve(jobs.size());  // parts refer to them
   for (const RenderJob& job : jobs) {
-    if (job.wide || job.batch.size() == 0) continue;
+    if (!takes(job) || job.batch.size() == 0) continue;
+    if (job.wide) {
+      add_wide(job);
+      continue;
+    }
     lines_.push_back(job);
     if (!job.batch.bodies.empty()) {
       const ChargeTo charge(account_of(job));
@@ -65,13 +69,45 @@ DeviceBatch::DeviceBatch(std::span<const RenderJob> jobs,
   }
 }
 
+bool DeviceBatch::takes(const RenderJob& job) {
+  return !job.wide || (job.batch.aimed != nullptr && BeamRenderer::are_cones(*job.wide) &&
+                       job.batch.size() <= kMost);
+}
+
+void DeviceBatch::add_wide(const RenderJob& job) {
+  wide_.push_back(std::make_unique<WideJob>(job));
+  WideJob* const own = wide_.back().get();
+  const WideBeams& wide = *own->job.wide;
+  const AimedBeams& aim = *own->job.batch.aimed;
+  const Reflectances r = wide.receiver->reflectances();
+  auto* last = parts_.empty() ? nullptr : std::get_if<WideAimPart>(&parts_.back());
+  const auto fits = [&](const WidePart& part) {
+    const Reflectances& q = part.reflectances;
+    return part.aimed.beams == aim.beams && part.sigma_across == wide.sigma_across &&
+           part.sigma_up == wide.sigma_up && q.per_intensity == r.per_intensity &&
+           q.same == r.same && q.usual == r.usual && q.least == r.least &&
+           (last->jobs.size() + 1) * job.batch.size() <= at_once_.wide;
+  };
+  if (last == nullptr || !fits(last->wide)) {
+    WidePart part{{aim.beams, {}, false},
+                  wide.sigma_across,
+                  wide.sigma_up,
+                  r,
+                  wide_tables(*beam_.scene().map, r)};
+    parts_.emplace_back(WideAimPart{std::move(part), {}});
+    last = &std::get<WideAimPart>(parts_.back());
+  }
+  last->wide.aimed.aims.push_back(&aim);
+  last->jobs.push_back(own);
+}
+
 void DeviceBatch::add_aims(const RenderJob& job) {
   const AimedBeams& aim = *job.batch.aimed;
   const bool wants_ranges = !job.ranges.empty();
   auto* last = parts_.empty() ? nullptr : std::get_if<AimPart>(&parts_.back());
   const bool fits = last != nullptr && last->aimed.beams == aim.beams &&
                     last->aimed.wants_ranges == wants_ranges &&
-                    (last->jobs.size() + 1) * job.batch.size() <= beams_at_once_;
+                    (last->jobs.size() + 1) * job.batch.size() <= at_once_.lines;
   if (!fits) {
     parts_.emplace_back(AimPart{{aim.beams, {}, wants_ranges}, {}});
     last = &std::get<AimPart>(parts_.back());
@@ -105,11 +141,16 @@ void DeviceBatch::add_rays(const RenderJob& job) {
 }
 
 const SensorBeams* DeviceBatch::beams_of(std::size_t part) const {
-  const auto* aims = std::get_if<AimPart>(&parts_[part]);
-  return aims != nullptr ? aims->aimed.beams.get() : nullptr;
+  if (const auto* aims = std::get_if<AimPart>(&parts_[part])) return aims->aimed.beams.get();
+  const auto* wide = std::get_if<WideAimPart>(&parts_[part]);
+  return wide != nullptr ? wide->wide.aimed.beams.get() : nullptr;
 }
 
 void DeviceBatch::finish() const {
+  executor_.parallel_for(wide_.size(), 1, [&](std::size_t k, std::size_t) {
+    const ChargeTo charge(account_of(wide_[k]->job));
+    beam_.finish_cones(wide_[k]->job, wide_[k]->left, executor_);
+  });
   for (const auto& job : among_bodies_) {
     const ChargeTo charge(account_of(job->job()));
     render_bodies(job->job().batch, job->job().hits, executor_);
@@ -120,6 +161,10 @@ void DeviceBatch::finish() const {
 void DeviceBatch::send(std::size_t part, std::size_t slot, RayTracer& tracer) const {
   if (const auto* aims = std::get_if<AimPart>(&parts_[part])) {
     tracer.submit(slot, beam_.kernel_map(), aims->aimed);
+    return;
+  }
+  if (const auto* wide = std::get_if<WideAimPart>(&parts_[part])) {
+    tracer.submit(slot, beam_.kernel_map(), wide->wide);
     return;
   }
   const auto& rays = std::get<std::vector<RayPart>>(parts_[part]);
@@ -149,7 +194,7 @@ void DeviceBatch::write(const RenderJob& job, std::size_t ray, const device::Dev
   }
 }
 
-void DeviceBatch::take(std::size_t part, std::size_t slot, const RayTracer& tracer) const {
+void DeviceBatch::take(std::size_t part, std::size_t slot, const RayTracer& tracer) {
   std::visit([&](const auto& own) { take(own, slot, tracer); }, parts_[part]);
 }
 
@@ -192,6 +237,60 @@ void DeviceBatch::take(const AimPart& part, std::size_t slot, const RayTracer& t
       at += some;
     }
   });
+}
+
+void DeviceBatch::take(const WideAimPart& part, std::size_t slot, const RayTracer& tracer) const {
+  const std::size_t beams = part.wide.aimed.beams->beams.size();
+  const std::span results = tracer.wide_results(slot);
+  const std::size_t count = beams * part.jobs.size();
+  executor_.parallel_for_under_lock(count, kPackChunk, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t at = begin; at < end;) {
+      WideJob& own = *part.jobs[at / beams];
+      const ChargeTo charge(account_of(own.job));
+      const std::size_t first = at - at % beams;
+      const std::size_t until = std::min(end, first + beams);
+      std::vector<std::uint32_t> left;
+      for (; at < until; ++at) {
+        if (write_wide(own.job, at - first, results[at], slot, tracer)) continue;
+        left.push_back(static_cast<std::uint32_t>(at - first));
+      }
+      const std::lock_guard lock(own.mutex);
+      own.left.insert(own.left.end(), left.begin(), left.end());
+    }
+  });
+}
+
+/// False if the processor is to trace the beam.
+bool DeviceBatch::write_wide(const RenderJob& job,
+                             std::size_t beam,
+                             const device::WideResult& result,
+                             std::size_t slot,
+                             const RayTracer& tracer) const {
+  const WideBeams& wide = *job.wide;
+  Echoes& echoes = wide.echoes[beam];
+  switch (result.kind) {
+    case device::kNoEcho:
+      echoes.count = 0;
+      echoes.all_hit = false;
+      return true;
+    case device::kOneEchoOfAll:
+      echoes.count = 1;
+      echoes.all_hit = true;
+      echoes.all[0] = {
+          .range = result.range,
+          .reflectivity = result.reflectivity,
+          .intensity = result.intensity,
+          .label = kMapLabel,
+          .parts = 8,
+          .depth = result.depth,
+          .origin = {result.cosine, result.surfel, static_cast<std::uint16_t>(result.sub_ray)}};
+      return is_sure_of(wide, echoes.all[0]);
+    case device::kMoreSubRays:
+      return find_second_level_echoes(
+          *beam_.scene().map, wide, tracer.second_level(slot, result), echoes);
+    default:
+      return false;
+  }
 }
 
 }  // namespace pointflight

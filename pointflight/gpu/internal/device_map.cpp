@@ -5,6 +5,7 @@
 
 #include "pointflight/gpu/internal/ray_tracer.hpp"
 #include "pointflight/render/internal/beam_kernel.hpp"
+#include "pointflight/render/internal/cone_kernel.hpp"
 
 namespace pointflight {
 namespace {
@@ -107,6 +108,17 @@ device::MapNumbers numbers_of(const SurfelMap& map) {
   std::copy(std::begin(kernel.scale.inverse_ratio),
             std::end(kernel.scale.inverse_ratio),
             std::begin(n.inverse_ratio));
+  std::copy(std::begin(kernel.scale.ratio), std::end(kernel.scale.ratio), std::begin(n.ratio));
+  n.support = kernel.support;
+  const ConeConstants cone = cone_constants(kernel);
+  n.cone_radius = cone.radius;
+  n.solid_support = cone.solid_support;
+  n.leaf_reach = cone.leaf_reach;
+  n.soft_scale = cone.weight_scale;
+  n.soft_tau = cone.tau;
+  n.depth_steps_per_metre = cone.depth_steps_per_metre;
+  n.metres_per_depth_step = cone.metres_per_depth_step;
+  n.has_intensity = map.has_intensity() ? 1 : 0;
   for (std::uint32_t code = 0; code < 32; ++code) {
     n.inverse_spread[code] = 1.0f / std::sqrt(variance2_of(code) * n.r_squared);
   }
@@ -122,9 +134,10 @@ DeviceMap::DeviceMap(GpuDevice& device, const SurfelMap& map) {
   }
   const device::MapNumbers numbers = numbers_of(map);
   Uploader upload(device);
-  buffers_ = {upload.made_of(&numbers, sizeof numbers, 0),
-              upload.made_of(map.nodes().data(), map.nodes().size_bytes(), 0),
-              upload.made_of(map.words().data(), map.words().size_bytes(), kBeyond)};
+  numbers_ = upload.made_of(&numbers, sizeof numbers, 0);
+  nodes_ = upload.made_of(map.nodes().data(), map.nodes().size_bytes(), 0);
+  words_ = upload.made_of(map.words().data(), map.words().size_bytes(), kBeyond);
+  codes_ = upload.made_of(map.intensity_codes().data(), map.intensity_codes().size_bytes(), 4);
 }
 
 }  // namespace pointflight

@@ -14,9 +14,9 @@ void DeviceQueue::require_device() const {
   if (is_lost_) throw GpuError(device_->info().name, VK_ERROR_DEVICE_LOST);
 }
 
-std::size_t DeviceQueue::beams_at_once() const {
+DeviceBatch::AtOnce DeviceQueue::at_once() const {
   const std::lock_guard lock(mutex_);
-  return tracer_.beams_at_once();
+  return {tracer_.beams_at_once(), tracer_.wide_at_once()};
 }
 
 double DeviceQueue::kernel_time() const {

@@ -18,7 +18,7 @@ class DeviceQueue {
 
   /// How far a batch has come.
   struct Ticket {
-    const DeviceBatch* batch = nullptr;
+    DeviceBatch* batch = nullptr;
     std::size_t sent = 0;
     std::size_t taken = 0;
   };
@@ -28,8 +28,8 @@ class DeviceQueue {
   void finish(Ticket& ticket);
   /// Nothing of it is taken any more.
   void forget(const Ticket& ticket) noexcept;
-  /// `RayTracer::beams_at_once`
-  [[nodiscard]] std::size_t beams_at_once() const;
+  /// How many beams are best sent together.
+  [[nodiscard]] DeviceBatch::AtOnce at_once() const;
   /// How long kernels have taken in all, s.
   [[nodiscard]] double kernel_time() const;
 

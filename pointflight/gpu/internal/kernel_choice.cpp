@@ -9,6 +9,7 @@
 #include "pointflight/core/random.hpp"
 #include "pointflight/geometry/rotation.hpp"
 #include "pointflight/geometry/shape_scene.hpp"
+#include "pointflight/gpu/internal/device_batch.hpp"
 #include "pointflight/map/import/map_builder.hpp"
 #include "pointflight/map/map_file.hpp"
 #include "pointflight/render/internal/beam_kernel.hpp"
@@ -143,34 +144,108 @@ std::size_t count_equal_hits(const KernelMap& map,
 
 }  // namespace
 
-std::size_t count_equal(GpuDevice& device, const RayKernel& kernel, std::size_t rays) {
-  constexpr std::size_t kAims = 8;
-  const auto map = trial_scene();
-  const KernelMap kernel_map = kernel_map_of(*map);
-  const DeviceMap there(device, *map);
-  RayTracer tracer(device, there, kernel);
-  const std::size_t beams = rays / 2 / kAims;
-  const std::size_t given = rays - beams * kAims;
-  const std::vector<MapRay> all = map_rays(kernel_map, trial_rays(given));
-  std::copy(all.begin(), all.end(), tracer.rays(0, given).begin());
-  tracer.submit(0, given);
-  tracer.wait(0);
-  std::size_t equal = count_equal_hits(kernel_map, all, tracer.hits(0));
-  if (beams == 0) return equal;
-  const TrialAims trial = trial_aims(beams, kAims);
+namespace {
+
+/// All surfaces alike; what comes back is reported for certain.
+class TrialReceiver : public EchoReceiver {
+ public:
+  [[nodiscard]] double reflectivity(const Hit& hit) const override {
+    return 0.3 * static_cast<double>(hit.cos_incidence);
+  }
+  [[nodiscard]] Reflectances reflectances() const override {
+    return {.per_intensity = 0.0f, .same = 0.3f, .usual = nullptr, .least = 0.01f};
+  }
+  [[nodiscard]] bool is_marginal(const Echo& /*echo*/,
+                                 double /*less*/,
+                                 double /*more*/) const override {
+    return false;
+  }
+  [[nodiscard]] bool takes_strongest() const override { return true; }
+};
+
+bool are_same(const Echoes& a, const Echoes& b) {
+  if (a.count != b.count || a.all_hit != b.all_hit) return false;
+  for (std::uint32_t i = 0; i < a.count; ++i) {
+    const Echo& p = a.all[i];
+    const Echo& q = b.all[i];
+    if (p.range != q.range || p.reflectivity != q.reflectivity || p.depth != q.depth ||
+        p.parts != q.parts || p.origin.surfel != q.origin.surfel ||
+        p.origin.cos_incidence != q.origin.cos_incidence) {
+      return false;
+    }
+  }
+  return true;
+}
+
+/// How many of the trial's beams have the same echoes by both.
+std::size_t count_equal_echoes(RayTracer& tracer, const TrialAims& trial) {
+  const BeamRenderer beam(Scene{trial_scene()});
+  const TrialReceiver receiver;
+  const Executor executor(1);
+  std::size_t equal = 0;
+  for (const AimedBeams& aim : trial.aims) {
+    std::vector<Echoes> of_device(trial.beams->beams.size());
+    std::vector<Echoes> of_processor(of_device.size());
+    RenderJob job;
+    job.batch.aimed = &aim;
+    job.batch.order = trial.beams->order;
+    job.wide = WideBeams{.across = {},
+                         .sigma_across = 0.002f,
+                         .sigma_up = 0.001f,
+                         .merge = 0.75f,
+                         .sub_rays = 0,
+                         .receiver = &receiver,
+                         .echoes = of_processor};
+    beam.render({&job, 1}, executor);
+    job.wide->echoes = of_device;
+    DeviceBatch batch({&job, 1}, beam, {RayTracer::kMostRays, tracer.wide_at_once()}, executor);
+    for (std::size_t part = 0; part < batch.parts(); ++part) {
+      batch.send(part, 0, tracer);
+      tracer.wait(0);
+      batch.take(part, 0, tracer);
+    }
+    batch.finish();
+    for (std::size_t i = 0; i < of_device.size(); ++i) {
+      equal += are_same(of_device[i], of_processor[i]) ? 1 : 0;
+    }
+  }
+  return equal;
+}
+
+/// The same of rays that the device makes of beams.
+std::size_t count_equal_beams(RayTracer& tracer, const KernelMap& map, const TrialAims& trial) {
   AimedPart part{trial.beams, {}, false};
   std::vector<MapRay> made;
   for (const AimedBeams& aim : trial.aims) {
     part.aims.push_back(&aim);
     RayBatch batch;
     batch.aimed = &aim;
-    const std::vector<MapRay> own = map_rays(kernel_map, batch, Executor(1));
+    const std::vector<MapRay> own = map_rays(map, batch, Executor(1));
     made.insert(made.end(), own.begin(), own.end());
   }
-  tracer.submit(1, kernel_map, part);
+  tracer.submit(1, map, part);
   tracer.wait(1);
-  equal += count_equal_hits(kernel_map, made, tracer.hits(1));
-  return equal;
+  return count_equal_hits(map, made, tracer.hits(1));
+}
+
+}  // namespace
+
+std::size_t count_equal(GpuDevice& device, const RayKernel& kernel, std::size_t rays) {
+  constexpr std::size_t kAims = 8;
+  const auto map = trial_scene();
+  const KernelMap kernel_map = kernel_map_of(*map);
+  const DeviceMap there(device, *map);
+  RayTracer tracer(device, there, kernel);
+  const std::size_t beams = rays / 4 / kAims;  // lines, and as many wide
+  const std::size_t given = rays - 2 * beams * kAims;
+  const std::vector<MapRay> all = map_rays(kernel_map, trial_rays(given));
+  std::copy(all.begin(), all.end(), tracer.rays(0, given).begin());
+  tracer.submit(0, given);
+  tracer.wait(0);
+  const std::size_t equal = count_equal_hits(kernel_map, all, tracer.hits(0));
+  if (beams == 0) return equal;
+  const TrialAims trial = trial_aims(beams, kAims);
+  return equal + count_equal_beams(tracer, kernel_map, trial) + count_equal_echoes(tracer, trial);
 }
 
 std::optional<RayKernel> exact_kernel(GpuDevice& device) {

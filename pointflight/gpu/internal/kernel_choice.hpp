@@ -23,8 +23,8 @@ struct TrialAims {
 };
 TrialAims trial_aims(std::size_t beams, std::size_t aims);
 
-/// How many of so many rays through the trial's room have the processor's bits by a kernel: half of
-/// them are made of beams on the device. Throws GpuError.
+/// How many of so many rays through the trial's room have the processor's bits by a kernel: a
+/// quarter of them are made of beams on the device, and a quarter are wide beams. Throws GpuError.
 std::size_t count_equal(GpuDevice& device, const RayKernel& kernel, std::size_t rays);
 
 /// The first of `kernels_for` that has the processor's bits of a scene of its own, as it was found

@@ -109,6 +109,32 @@ DeviceRay aimed_ray(uint i) {
   return ray;
 }
 
+/// What is horizontal across a beam of the call, in the world: `make_across`.
+float across_x;
+float across_y;
+float across_z;
+void aim_across(uint i) {
+  uint aim = (i / call.beams) * kAimWords;
+  DeviceBeam beam = beams[beam_of(i)];
+  bool is_rolling = given[aim + 8u] != 0u;
+  uint pose = given[aim + 7u] + (is_rolling ? beam.piece * kPoseWords : 0u);
+  float qx = pose_number(pose, is_rolling, beam.fraction);
+  float qy = pose_number(pose + 1u, is_rolling, beam.fraction);
+  float qz = pose_number(pose + 2u, is_rolling, beam.fraction);
+  float qw = pose_number(pose + 3u, is_rolling, beam.fraction);
+  precise float square = ((qx * qx + qy * qy) + qz * qz) + qw * qw;
+  float zero = 0.0f;
+  TURN(x, y, z, beam.across_x, beam.across_y, zero)
+  precise float length2 = (x * x + y * y) + z * z;
+  float to_unit = inverse_root_near_one(length2);
+  precise float unit_x = x * to_unit;
+  precise float unit_y = y * to_unit;
+  precise float unit_z = z * to_unit;
+  across_x = unit_x;
+  across_y = unit_y;
+  across_z = unit_z;
+}
+
 #undef TURN
 
 /// Ray `i` of a call that brings its rays.

@@ -18,6 +18,17 @@ struct MapNumbers {
   float thickness[4];
   float inverse_ratio[8];
   float inverse_spread[32];  // 1 / s2 of each code
+  // what wide beams want besides
+  float ratio[8];
+  float support;                // M
+  float cone_radius;            // of beams, sigmas
+  float solid_support;          // of it, what counts as the surfel between sub-rays
+  float leaf_reach;             // M and a little
+  float soft_scale;             // weights of sub-rays
+  float soft_tau;               // of them
+  float depth_steps_per_metre;  // of the window
+  float metres_per_depth_step;
+  uint has_intensity;
 };
 
 /// A ray from a voxel of the map's grid and the rest, m (`GridOrigin`).
@@ -73,6 +84,14 @@ struct DeviceCall {
   uint beams;         // of each aim; 0: rays are given
   uint has_origins;   // not all beams leave from the sensor's origin
   uint wants_ranges;  // and no more of each hit
+  // of wide beams
+  uint threads;          // invocations
+  uint most_more;        // beams whose second level there is room for
+  float sigma_across;    // rad
+  float sigma_up;        // rad
+  float per_intensity;   // `Reflectances`
+  float same;
+  float least;
 };
 
 /// What it hit: `KernelHit`, or kTooMany.
@@ -81,6 +100,38 @@ struct DeviceHit {
   float cosine;
   uint surfel;
 };
+
+/// What came of a wide beam.
+struct WideResult {
+  uint kind;
+  float range;  // of one echo: `Echo`
+  float reflectivity;
+  float intensity;
+  float depth;
+  float cosine;
+  uint surfel;   // of kMoreSubRays: which 32 hits
+  uint sub_ray;  // of kMoreSubRays: 1: a surfel lies before what they hit; and twice the direction
+};
+const uint kNoEcho = 0u;
+const uint kOneEchoOfAll = 1u;    // all of the beam hit it
+const uint kMoreSubRays = 2u;     // 32 hits of the second level
+const uint kLeftToProcessor = 3u;
+
+const int kMostTouched = 96;        // surfels in the list of a wide beam
+const uint kTouchedNumbers = 13u;
+const int kMostRows = 64;           // of a sub-ray
+const uint kSecondLevel = 32u;      // sub-rays
+
+// tables of wide beams, by words
+const uint kAtTurns = 0u;      // cosine and sine of 64
+const uint kAtEight = 128u;    // x and y of the first level
+const uint kAtShares = 144u;   // of the light
+const uint kAtPerXx = 152u;    // 1 / sum of x^2
+const uint kAtStrips = 153u;   // eight directions
+const uint kAtSecond = 169u;   // x and y of 32, for each of these
+const uint kAtLevels = 681u;   // intensity of each code
+const uint kAtUsual = 937u;    // 4096 reflectivities
+const uint kTableWords = 5033u;
 
 const int kMostHits = 32;      // in one ray's list
 const int kMostEntries = 64;   // in its stack

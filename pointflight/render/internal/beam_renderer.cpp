@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <limits>
+#include <memory>
 #include <vector>
 
 #include "pointflight/core/argument.hpp"
@@ -15,8 +16,9 @@
 namespace pointflight {
 namespace {
 
-constexpr std::size_t kChunk = 1024;  // rays
-constexpr float kApart = 0.3f;        // m between what a beam ends at and a body behind it
+constexpr std::size_t kChunk = 1024;   // rays
+constexpr std::size_t kFewBeams = 64;  // of those that a device left
+constexpr float kApart = 0.3f;         // m between what a beam ends at and a body behind it
 
 const SurfelMap& map_of(const Scene& scene) {
   require_argument(scene.map != nullptr, "BeamRenderer: the scene has no map");
@@ -118,17 +120,19 @@ void BeamRenderer::trace(const RenderJob& job,
   });
 }
 
+bool BeamRenderer::are_cones(const WideBeams& wide) {
+  const float widest = kSubRayRadius * std::max(wide.sigma_across, wide.sigma_up);
+  return wide.sub_rays == 0 && widest <= kWidestCone;
+}
+
 /// Through the map as cones; those that bodies may touch by sub-rays.
 void BeamRenderer::render_wide(const RenderJob& job, const Executor& executor) const {
-  const WideBeams& wide = *job.wide;
-  const float widest = kSubRayRadius * std::max(wide.sigma_across, wide.sigma_up);
-  const bool are_lines = wide.sub_rays != 0 || widest > kWidestCone;
-  const bool wants_rays = are_lines || !job.batch.bodies.empty();
-  const ExpandedJob expanded(job, executor, wants_rays ? Expand::kAll : Expand::kAcross);
-  if (are_lines) {
-    Renderer::render_wide(expanded.job(), executor);
+  if (!are_cones(*job.wide)) {
+    Renderer::render_wide(ExpandedJob(job, executor).job(), executor);
     return;
   }
+  const bool wants_rays = !job.batch.bodies.empty();
+  const ExpandedJob expanded(job, executor, wants_rays ? Expand::kAll : Expand::kAcross);
   const std::vector<MapRay> rays = map_rays(kernel_map_, job.batch, executor);
   std::vector<std::uint32_t> room;
   const std::span<const std::uint32_t> order = order_of(job.batch, rays, room, executor);
@@ -136,10 +140,38 @@ void BeamRenderer::render_wide(const RenderJob& job, const Executor& executor) c
     const std::span part = order.subspan(begin, end - begin);
     trace_cones(*map_, kernel_map_, rays, part, *expanded.job().wide);
   });
-  const std::vector<std::uint32_t> near = rays_near_bodies(expanded.job().batch, widest, executor);
-  const std::vector<std::uint32_t> mixed = hide_behind_bodies(expanded.job(), near, executor);
+  if (wants_rays) hide_echoes(expanded.job(), executor);
+}
+
+/// Behind bodies: of a job whose rays are there.
+void BeamRenderer::hide_echoes(const RenderJob& job, const Executor& executor) const {
+  const WideBeams& wide = *job.wide;
+  const float widest = kSubRayRadius * std::max(wide.sigma_across, wide.sigma_up);
+  const std::vector<std::uint32_t> near = rays_near_bodies(job.batch, widest, executor);
+  const std::vector<std::uint32_t> mixed = hide_behind_bodies(job, near, executor);
   const auto render_lines = [&](const RenderJob& lines) { render_one(lines, executor); };
-  find_echoes(expanded.job(), mixed, kUsualSubRays, render_lines, executor);
+  find_echoes(job, mixed, kUsualSubRays, render_lines, executor);
+}
+
+void BeamRenderer::finish_cones(const RenderJob& job,
+                                std::span<const std::uint32_t> beams,
+                                const Executor& executor) const {
+  if (!beams.empty()) {
+    // by their numbers, which turn their sub-rays
+    const auto rays = std::make_unique_for_overwrite<MapRay[]>(job.batch.size());
+    const auto across = std::make_unique_for_overwrite<Vector3f[]>(job.batch.size());
+    WideBeams wide = *job.wide;
+    wide.across = {across.get(), job.batch.size()};
+    executor.parallel_for(beams.size(), kFewBeams, [&](std::size_t begin, std::size_t end) {
+      const std::span part = beams.subspan(begin, end - begin);
+      for (const std::uint32_t i : part) {
+        rays[i] = map_ray(kernel_map_, job.batch, i);
+        make_across(*job.batch.aimed, i, {&across[i], 1});
+      }
+      trace_cones(*map_, kernel_map_, {rays.get(), job.batch.size()}, part, wide);
+    });
+  }
+  if (!job.batch.bodies.empty()) hide_echoes(ExpandedJob(job, executor).job(), executor);
 }
 
 Hit BeamRenderer::trace(const Ray& ray) const {

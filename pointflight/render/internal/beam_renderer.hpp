@@ -30,12 +30,20 @@ class BeamRenderer : public Renderer {
   /// What a kernel found, with the map's intensity.
   [[nodiscard]] Hit hit_of(const KernelHit& found) const;
 
+  /// True if wide beams are traced as cones.
+  [[nodiscard]] static bool are_cones(const WideBeams& wide);
+  /// Of a job of aimed cones, those that another device has left; and bodies in front of all.
+  void finish_cones(const RenderJob& job,
+                    std::span<const std::uint32_t> beams,
+                    const Executor& executor) const;
+
  protected:
   [[nodiscard]] bool makes_rays() const override { return true; }
   void render_one(const RenderJob& job, const Executor& executor) const override;
   void render_wide(const RenderJob& job, const Executor& executor) const override;
 
  private:
+  void hide_echoes(const RenderJob& job, const Executor& executor) const;
   void render_among_bodies(const RenderJob& job, const Executor& executor) const;
   void trace(const RenderJob& job, std::span<const MapRay> rays, const Executor& executor) const;
 

@@ -22,6 +22,10 @@ namespace pointflight::HWY_NAMESPACE {
 
 /// A beam's way is looked at when so much of its axis is covered since the last look.
 inline constexpr float kCoverToLook = 0.6f * kWeightSteps;
+/// A beam ends so many windows behind the farthest beginning of what its eight sub-rays hit:
+/// earlier looks, which knew less, can only have put the end farther away, so that the last one
+/// counts.
+inline constexpr float kWindowsBehind = 1.5f;
 /// In front of what sub-rays hit is what is nearer by so much, m.
 inline constexpr float kBefore = 0.3f;
 
@@ -46,18 +50,18 @@ struct ConeCall {
 /// The eight sub-rays of the first level, up to the beam's end. True if all have hit something:
 /// nothing behind the farthest counts, and the beam ends there.
 POINTFLIGHT_INLINE bool look(const ConeCall& call, ConeBeam& beam) {
-  hit_sub_rays(call.map,
-               call.room.bundle,
-               beam.list,
-               see(beam, call.eight),
-               beam.end,
-               call.room.rows,
-               beam.eight);
+  const F8 first = hit_sub_rays(call.map,
+                                call.room.bundle,
+                                beam.list,
+                                see(beam, call.eight),
+                                beam.end,
+                                call.room.rows,
+                                beam.eight);
   beam.looked = beam.list.count;
   beam.cover = 0.0f;
-  const float farthest = greatest(load(beam.eight.range));
+  const float farthest = greatest(first);
   if (farthest == kNever) return false;
-  end_at(std::min(beam.end, farthest + call.map.window), beam);
+  end_at(std::min(beam.end, farthest + kWindowsBehind * call.map.window), beam);
   forget_behind(call.room.bundle, beam);
   beam.looked = beam.list.count;
   return true;
@@ -233,7 +237,8 @@ static HWY_NOINLINE void take_level(const ConeCall& call, const ConeBeam& beam, 
   ConeStrips& strips = call.room.strips;
   // as lines they are dear: eight must do
   const bool has_strips = !beam.failed && beam.list.count >= kFewestForStrips;
-  const std::size_t direction = has_strips ? direction_of_strips(call.eight, beam.eight) : 0;
+  // whether or not there are strips: how many surfels a list has behind what counts is chance
+  const std::size_t direction = direction_of_strips(call.eight, beam.eight);
   const std::span<const SubRayLanes> sub_rays =
       beam.failed ? std::span(&call.eight, 1) : std::span(sub_rays_of_level(level, direction));
   parts.eights = sub_rays.size();
@@ -266,15 +271,17 @@ POINTFLIGHT_INLINE bool is_settled(const ConeCall& call, const ConeBeam& beam) {
 
 /// True if what eight sub-rays are off by may decide whether an echo is reported: they are on the
 /// rim and in the middle, where reflectivities may differ from what lies between.
-POINTFLIGHT_INLINE bool is_marginal(const ConeCall& call, const Echo& echo) {
+POINTFLIGHT_INLINE bool is_marginal(const SureEchoes& known,
+                                    const EchoReceiver& receiver,
+                                    const Echo& echo) {
   constexpr double kOff = 0.15;
-  const std::span<const float> sure = call.sure.reflectivities;
+  const std::span<const float> sure = known.reflectivities;
   if (sure.empty()) return false;
-  const float step = echo.range * call.sure.steps_per_m;
+  const float step = echo.range * known.steps_per_m;
   const auto last = static_cast<float>(sure.size() - 1);
   const auto at = static_cast<std::size_t>(std::clamp(step, 0.0f, last));
   if (echo.reflectivity >= sure[at]) return false;
-  return call.wide.receiver->is_marginal(echo, 1.0 - kOff, 1.0 + kOff);
+  return receiver.is_marginal(echo, 1.0 - kOff, 1.0 + kOff);
 }
 
 /// The echoes of a beam at the end of its way.
@@ -293,7 +300,7 @@ static HWY_NOINLINE void finish(const ConeCall& call, ConeBeam& beam) {
     echoes.count = echoes.all_hit ? 1 : 0;
     if (echoes.count == 0) return;
     echoes.all[0] = echo_of_eight(call.surfels, call.reflectances, call.eight, beam.eight);
-    if (!is_marginal(call, echoes.all[0])) return;
+    if (!is_marginal(call.sure, *call.wide.receiver, echoes.all[0])) return;
   }
   BeamParts& parts = call.room.parts;
   for (std::size_t level = 1; level < kSubRayLevels; ++level) {
@@ -307,6 +314,20 @@ static HWY_NOINLINE void finish(const ConeCall& call, ConeBeam& beam) {
             call.room.bundle, beam, call.eight, splat(nearest_behind(parts, -1.0f)), kBefore);
     if (!has_missed && !needs_more_sub_rays(echoes, *call.wide.receiver)) return;
   }
+}
+
+static bool is_sure(const WideBeams& wide, const Echo& echo) {
+  return !is_marginal(wide.receiver->sure_echoes(), *wide.receiver, echo);
+}
+
+static ConeConstants constants_of(const KernelMap& map) {
+  return {kConeRadius,
+          kSolidShare * map.support,
+          1.01f * map.support,
+          map.weight_scale * kWeightSteps / kWeightOne,
+          static_cast<float>(map.tau) * (kWeightSteps / kWeightOne),
+          kDepthSteps / map.window,
+          map.window / kDepthSteps};
 }
 
 static void trace_wide(const KernelMap& map,

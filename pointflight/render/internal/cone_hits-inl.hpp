@@ -168,23 +168,25 @@ POINTFLIGHT_INLINE void returns_of(const KernelMap& map,
   store(strongest, hits.word);
 }
 
-/// What eight sub-rays hit of a list up to `limit`, m.
-POINTFLIGHT_INLINE void hit_sub_rays(const KernelMap& map,
-                                     const ConeBundle& b,
-                                     const ConeList& list,
-                                     const SeenSubRays& seen,
-                                     float limit,
-                                     SubRayRows& rows,
-                                     SubRayHits& hits) {
+/// What eight sub-rays hit of a list up to `limit`, m. Returns where the surfaces begin, which more
+/// surfels can but bring nearer.
+POINTFLIGHT_INLINE F8 hit_sub_rays(const KernelMap& map,
+                                   const ConeBundle& b,
+                                   const ConeList& list,
+                                   const SeenSubRays& seen,
+                                   float limit,
+                                   SubRayRows& rows,
+                                   SubRayHits& hits) {
   fill_rows(map, b, list, seen, limit, rows);
   const F8 first = surfaces_of(map, rows);
   if (bits(first < splat(kNever)) == 0) {
     store(splat(kNever), hits.range);
     store(splat(0.0f), hits.cosine);
     store(splat_int(0), hits.word);
-    return;
+    return first;
   }
   returns_of(map, rows, first, hits);
+  return first;
 }
 
 /// True if a surfel that the beam touches lies in front of what its sub-rays hit, by more than

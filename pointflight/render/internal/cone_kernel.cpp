@@ -7,13 +7,16 @@
 #define HWY_TARGET_INCLUDE "pointflight/render/internal/cone_kernel.cpp"
 #include <hwy/foreach_target.h>
 // after foreach_target
-#include "pointflight/render/internal/cone-inl.hpp"
+#include "pointflight/render/internal/cone_rest-inl.hpp"
 
 #if HWY_ONCE
 namespace pointflight {
 namespace {
 
 HWY_EXPORT(trace_wide);
+HWY_EXPORT(constants_of);
+HWY_EXPORT(second_level_echoes);
+HWY_EXPORT(is_sure);
 
 constexpr std::size_t kFew = 8;  // sub-rays
 
@@ -35,6 +38,21 @@ double energy_that_counts(const Echoes& echoes, const EchoReceiver& receiver) {
 }
 
 }  // namespace
+
+ConeConstants cone_constants(const KernelMap& map) {
+  return HWY_DYNAMIC_DISPATCH(constants_of)(map);
+}
+
+bool find_second_level_echoes(const SurfelMap& surfels,
+                              const WideBeams& wide,
+                              const SecondLevel& hits,
+                              Echoes& echoes) {
+  return HWY_DYNAMIC_DISPATCH(second_level_echoes)(surfels, wide, hits, echoes);
+}
+
+bool is_sure_of(const WideBeams& wide, const Echo& echo) {
+  return HWY_DYNAMIC_DISPATCH(is_sure)(wide, echo);
+}
 
 bool needs_more_sub_rays(const Echoes& echoes, const EchoReceiver& receiver) {
   const double counts = energy_that_counts(echoes, receiver);

@@ -100,6 +100,7 @@ struct ConeBeam {
   float across[3];     ///< One sigma, rad: axes of the cross-section, turned,
   float up[3];         ///< in u, v, w.
   float length;        ///< Of it to depth 1.
+  float shortest;      ///< Of any ray within the beam, to depth 1.
   float numbers[kBeamNumbers];
   float end;           ///< Nothing beyond counts, m.
   float far;           ///< Of what the list holds, m.
@@ -175,6 +176,9 @@ POINTFLIGHT_INLINE void set_up_frame(const float (&direction)[3],
   beam.numbers[kWideU] = kConeRadius * std::sqrt(uu);
   beam.numbers[kWideV] = kConeRadius * std::sqrt(vv);
   beam.numbers[kPerLength] = beam.direction[2];
+  const float least_u = std::max(0.0f, std::abs(beam.numbers[kAtU]) - beam.numbers[kWideU]);
+  const float least_v = std::max(0.0f, std::abs(beam.numbers[kAtV]) - beam.numbers[kWideV]);
+  beam.shortest = std::sqrt(1.0f + (least_u * least_u + least_v * least_v));
 }
 
 /// True if two beams look along the same axis of the map.
@@ -185,7 +189,7 @@ POINTFLIGHT_INLINE bool look_alike(const ConeBeam& one, const ConeBeam& other) {
 /// Nothing beyond `end` (m) counts any more.
 POINTFLIGHT_INLINE void end_at(float end, ConeBeam& beam) {
   beam.end = end;
-  beam.numbers[kDeepest] = end / beam.length;
+  beam.numbers[kDeepest] = end / beam.shortest;
 }
 
 /// The axes of eight beams' cross-sections, turned as their sub-rays are, into `b.beams`; how far
