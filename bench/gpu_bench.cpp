@@ -18,6 +18,8 @@
 #include "pointflight/gpu/gpu_list.hpp"
 #include "pointflight/gpu/internal/device_queue.hpp"
 #include "pointflight/gpu/internal/kernel_choice.hpp"
+#include "pointflight/lidar/footprint.hpp"
+#include "pointflight/lidar/return_model.hpp"
 #include "pointflight/lidar/scan_beams.hpp"
 
 namespace pointflight {
@@ -50,18 +52,28 @@ struct Pattern {
   std::string name;
   std::shared_ptr<const SensorBeams> beams;
   float range_max;
+  std::shared_ptr<const ReturnModel> returns;  ///< Of wide beams; null: they are lines.
+  std::shared_ptr<const Footprint> footprint;
 };
 
+/// "mid360", "mid360+wide" as it is shipped, "64x16".
 Pattern pattern_of(const std::string& name) {
   const bool is_image = name == "64x16";
-  LidarSettings settings = load_lidar(is_image ? "marsim_grid" : name);
+  const std::size_t plus = name.find('+');
+  LidarSettings settings = load_lidar(is_image ? "marsim_grid" : name.substr(0, plus));
   if (is_image) {
     settings.grid.columns = 64;
     settings.grid.rows = 16;
     settings.range_max = 30.0;
   }
   const auto ordered = ScanBeams(settings).of(0, Executor());
-  return {name, ordered->in_sensor, static_cast<float>(settings.range_max)};
+  Pattern pattern{
+      name, ordered->in_sensor, static_cast<float>(settings.range_max), nullptr, nullptr};
+  if (plus == std::string::npos) return pattern;
+  pattern.returns = std::make_shared<const ReturnModel>(settings, Surroundings{});
+  pattern.footprint = std::make_shared<const Footprint>(settings.optics);
+  pattern.range_max = static_cast<float>(pattern.returns->reach());
+  return pattern;
 }
 
 /// As many scans from anywhere in the map, 2.5 to 7 m above its lowest point, tilted up to 11
@@ -94,7 +106,10 @@ class Batch {
   Batch(const SurfelMap& map, const Pattern& pattern, std::size_t scans, bool wants_ranges) {
     const std::size_t beams = pattern.beams->beams.size();
     rays_ = scans * beams;
-    if (wants_ranges) {
+    const bool is_wide = pattern.returns != nullptr;
+    if (is_wide) {
+      echoes_.resize(rays_);
+    } else if (wants_ranges) {
       ranges_.resize(rays_);
     } else {
       hits_.resize(rays_);
@@ -106,7 +121,10 @@ class Batch {
         RenderJob& job = jobs_.back()[i];
         job.batch.aimed = &aims_.back()[i];
         job.batch.order = pattern.beams->order;
-        if (wants_ranges) {
+        if (is_wide) {
+          job.wide = pattern.footprint->beams(
+              {}, *pattern.returns, std::span(echoes_).subspan(i * beams, beams));
+        } else if (wants_ranges) {
           job.ranges = std::span(ranges_).subspan(i * beams, beams);
         } else {
           job.hits = std::span(hits_).subspan(i * beams, beams);
@@ -116,7 +134,15 @@ class Batch {
   }
   [[nodiscard]] std::span<const RenderJob> next() { return jobs_[number_++ % kSets]; }
   [[nodiscard]] std::size_t rays() const { return rays_; }
-  [[nodiscard]] const std::vector<float>& ranges() const { return ranges_; }
+  /// Of each ray, or of each beam's first echo.
+  [[nodiscard]] std::vector<float> ranges() const {
+    if (echoes_.empty()) return ranges_;
+    std::vector<float> all;
+    for (const Echoes& echoes : echoes_) {
+      all.push_back(echoes.count > 0 ? echoes.all[0].range : -1.0f);
+    }
+    return all;
+  }
   void start_again() { number_ = 0; }
 
  private:
@@ -124,6 +150,7 @@ class Batch {
   std::vector<std::vector<RenderJob>> jobs_;
   std::vector<float> ranges_;
   std::vector<Hit> hits_;
+  std::vector<Echoes> echoes_;
   std::size_t rays_ = 0;
   std::size_t number_ = 0;
 };
@@ -134,7 +161,8 @@ struct Options {
   std::string json;
   std::vector<double> surfels{2e6, 20e6, 100e6};
   std::vector<std::size_t> scans{1, 16, 256, 1024, 4096};
-  std::vector<std::string> patterns{"mid360", "os1_128", "marsim_grid", "64x16"};
+  std::vector<std::string> patterns{
+      "mid360", "os1_128", "marsim_grid", "64x16", "mid360+wide", "os1_128+wide"};
   double seconds = 0.5;
 };
 
@@ -174,7 +202,9 @@ class Bench {
     const double every =
         of_processor(pattern, std::max<std::size_t>(1, std::size_t{1} << 20) / beams + 1, all);
     for (const std::size_t scans : options_.scans) {
-      if (scans * beams <= kMostRays) row(pattern, scans, one, every);
+      // echoes take 150 bytes a beam
+      const std::size_t most = pattern.returns ? kMostRays / 16 : kMostRays;
+      if (scans * beams <= most) row(pattern, scans, one, every);
     }
   }
 
@@ -194,6 +224,7 @@ class Bench {
     DeviceQueue::Ticket ticket{&parts};
     queue_->start(ticket);
     queue_->finish(ticket);
+    parts.finish();
   }
 
   /// True if a scan of the first set has the processor's bits.
@@ -218,7 +249,7 @@ class Bench {
     const double kernel = (queue_->kernel_time() - before) / runs;
     const auto rays = static_cast<double>(batch.rays());
     double everything = 0.0;
-    if (batch.rays() <= (std::size_t{1} << 25)) {
+    if (!pattern.returns && batch.rays() <= (std::size_t{1} << 25)) {
       Batch whole(*map_, pattern, scans, false);
       everything = rays / median_time(options_.seconds, 20, [&] { on_device(whole, executor); });
     }
@@ -307,7 +338,8 @@ int main(int argc, char** argv) {
   app.add_option("--gpu", options.gpu, "index, or part of the name");
   app.add_option("--surfels", options.surfels, "of the maps")->delimiter(',');
   app.add_option("--scans", options.scans, "in a batch")->delimiter(',');
-  app.add_option("--patterns", options.patterns, "LiDARs, or 64x16")->delimiter(',');
+  app.add_option("--patterns", options.patterns, "LiDARs, with +wide as they are shipped, or 64x16")
+      ->delimiter(',');
   app.add_option("--seconds", options.seconds, "for each figure");
   app.add_option("--json", options.json, "the figures");
   CLI11_PARSE(app, argc, argv);

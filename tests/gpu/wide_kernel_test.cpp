@@ -170,6 +170,18 @@ TEST(GpuWideKernel, TrialSceneHasTheProcessorsEchoes) {
   }
 }
 
+TEST(GpuWideKernel, AMadeForestHasTheProcessorsEchoes) {
+  // sparse: twigs and ground of few points, which beams touch at their fringes
+  ForestOptions forest;
+  forest.size_x = 24.0;
+  forest.size_y = 20.0;
+  const auto map = testing::map_of(make_forest(forest), 0.1, 3.0, 0.01);
+  for (int k = 0; k < testing::repeats(20); ++k) {
+    const PoseTrack track = through({12.0 + 0.03 * k, 10.0, 4.0}, {0.1, 0.05, 0.0});
+    expect_equal(map, "mid360", track, Surroundings{});
+  }
+}
+
 TEST(GpuWideKernel, RealPlacesHaveTheProcessorsEchoes) {
   const std::string cloud = testing::shared_data("maps/forest_tls.pcd");
   SKIP_WITHOUT(cloud);

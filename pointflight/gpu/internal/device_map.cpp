@@ -39,7 +39,7 @@ class Uploader {
     }
   }
   ~Uploader() {
-    device_.vk().DeviceWaitIdle(device_.handle());
+    device_.wait_until_idle();
     device_.vk().DestroyFence(device_.handle(), fence_, nullptr);
     device_.vk().DestroyCommandPool(device_.handle(), pool_, nullptr);
   }

@@ -129,6 +129,11 @@ std::uint32_t GpuDevice::memory_type(std::uint32_t allowed,
   return found;
 }
 
+void GpuDevice::wait_until_idle() noexcept {
+  const std::lock_guard lock(queue_mutex_);
+  vk_.DeviceWaitIdle(device_);  // a lost one is idle
+}
+
 void GpuDevice::submit(VkCommandBuffer commands, VkFence fence) {
   VkSubmitInfo info{};
   info.sType = VK_STRUCTURE_TYPE_SUBMIT_INFO;

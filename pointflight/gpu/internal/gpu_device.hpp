@@ -54,6 +54,8 @@ class GpuDevice {
   [[nodiscard]] std::uint32_t memory_type(std::uint32_t allowed,
                                           VkMemoryPropertyFlags required,
                                           VkMemoryPropertyFlags preferred) const;
+  /// Waits until nothing is on its way.
+  void wait_until_idle() noexcept;
   /// Starts a command buffer; `fence` says when it is through.
   void submit(VkCommandBuffer commands, VkFence fence);
 

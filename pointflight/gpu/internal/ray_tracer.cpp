@@ -52,7 +52,7 @@ RayTracer::~RayTracer() {
 void RayTracer::release() noexcept {
   const VulkanFunctions& vk = device_.vk();
   VkDevice handle = device_.handle();
-  vk.DeviceWaitIdle(handle);
+  device_.wait_until_idle();
   for (Slot& slot : slots_) vk.DestroyFence(handle, slot.fence, nullptr);
   vk.DestroyQueryPool(handle, queries_, nullptr);
   vk.DestroyCommandPool(handle, pool_, nullptr);
@@ -120,7 +120,7 @@ void RayTracer::make_room(Slot& slot, const Needs& needs) {
   if (slot.beams.bytes() < std::max<std::uint64_t>(needs.beams, 1)) slot.has_beams.reset();
   grow(slot.beams, needs.beams, Use::kDevice);
   if (lists_.bytes() < std::max<std::uint64_t>(needs.lists, 1)) {
-    device_.vk().DeviceWaitIdle(device_.handle());  // others have the old one on their way
+    device_.wait_until_idle();  // others have the old one on their way
     grow(lists_, needs.lists, Use::kDevice);
     for (Slot& other : slots_) {
       if (other.given.bytes() > 0) bind(other);

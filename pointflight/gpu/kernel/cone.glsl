@@ -46,14 +46,6 @@ struct ConeState {
   float start_u;  // from the map's origin, m
   float start_v;
   float start_w;
-  float u_more;  // slopes of the pyramid's sides, and their inverses
-  float u_less;
-  float v_more;
-  float v_less;
-  float u_more_inverse;
-  float u_less_inverse;
-  float v_more_inverse;
-  float v_less_inverse;
   float end;
   float deepest;
   float cover;
@@ -181,15 +173,6 @@ void start_cone(DeviceRay ray, float across_x, float across_y, float across_z, u
   c.start_u = pick(start_x, start_y, start_z, c.u);
   c.start_v = pick(start_x, start_y, start_z, c.v);
   c.start_w = pick(start_x, start_y, start_z, c.w);
-  // a little wider: floats round
-  c.u_more = at_u + 1.01f * wide_u + 1e-6f;
-  c.u_less = at_u - 1.01f * wide_u - 1e-6f;
-  c.v_more = at_v + 1.01f * wide_v + 1e-6f;
-  c.v_less = at_v - 1.01f * wide_v - 1e-6f;
-  c.u_more_inverse = inverse_of(c.u_more);
-  c.u_less_inverse = inverse_of(c.u_less);
-  c.v_more_inverse = inverse_of(c.v_more);
-  c.v_less_inverse = inverse_of(c.v_less);
   set_end(ray.range_max);
   c.cover = 0.0f;
   c.farthest = 0.0f;

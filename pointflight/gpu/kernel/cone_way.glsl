@@ -88,34 +88,19 @@ void step_cone_node() {
     float high_v = ov + scale * box_byte(hv0, hv1, lane) + room;
     float low_w = ow + scale * box_byte(lw0, lw1, lane) - room;
     float high_w = ow + scale * box_byte(hw0, hw1, lane) + room;
-    float enter = max(0.0f, is_forward ? low_w : -high_w);
-    float leave = min(c.deepest * 1.0001f, is_forward ? high_w : -low_w);
-    // more w >= low, less w <= high
-    float low = low_u * c.u_more_inverse;
-    float high = high_u * c.u_less_inverse;
-    if (c.u_more >= 0.0f) {
-      enter = max(enter, low);
-    } else {
-      leave = min(leave, low);
+    float middle_w = 0.5f * (is_forward ? low_w + high_w : -low_w - high_w);
+    float half_w = 0.5f * (high_w - low_w);
+    float enter = max(0.0f, middle_w - half_w);
+    float leave = middle_w + half_w;
+    // the rectangle by which surfels are chosen (`touch`), of the box: no surfel is missed for it
+    float beside_u = abs(0.5f * (low_u + high_u) - c.at_u * middle_w);
+    float beside_v = abs(0.5f * (low_v + high_v) - c.at_v * middle_w);
+    float reach_u = 0.5f * (high_u - low_u) + abs(c.at_u) * half_w + c.wide_u * leave;
+    float reach_v = 0.5f * (high_v - low_v) + abs(c.at_v) * half_w + c.wide_v * leave;
+    if (leave < 0.0f || enter > c.deepest * 1.0001f || beside_u > reach_u || beside_v > reach_v) {
+      continue;
     }
-    if (c.u_less >= 0.0f) {
-      leave = min(leave, high);
-    } else {
-      enter = max(enter, high);
-    }
-    low = low_v * c.v_more_inverse;
-    high = high_v * c.v_less_inverse;
-    if (c.v_more >= 0.0f) {
-      enter = max(enter, low);
-    } else {
-      leave = min(leave, low);
-    }
-    if (c.v_less >= 0.0f) {
-      leave = min(leave, high);
-    } else {
-      enter = max(enter, high);
-    }
-    if (enter <= leave) push_cone((floatBitsToUint(enter) & 0xfffffff8u) | lane);
+    push_cone((floatBitsToUint(enter) & 0xfffffff8u) | lane);
   }
   pop_cone();
 }
