@@ -52,7 +52,7 @@ Flights::Flights(std::shared_ptr<const SurfelMap> map,
                  const FlightsOptions& options,
                  RangePattern pattern)
     : map_(std::move(map)),
-      renderer_(make_renderer("beam", Scene{map_})),
+      renderer_(make_renderer(options.renderer, Scene{map_})),
       batch_(under_geometric_control(vehicle), count, options.timing),
       options_(options),
       pattern_(std::move(pattern)),

@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "pointflight/core/parallel.hpp"
@@ -32,6 +33,7 @@ struct FlightsOptions {
   std::shared_ptr<const Obstacles> obstacles;  ///< Or null.
   double obstacle_speed = 0.0;                 ///< Of the fastest of them, m/s.
   WindSettings wind;                           ///< Gusts; the mean is each vehicle's own.
+  std::string renderer = "beam";               ///< Of ranges, by its name in `RendererKind::table`.
 };
 
 /// Where and how a vehicle begins anew.

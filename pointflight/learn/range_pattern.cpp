@@ -13,8 +13,9 @@
 namespace pointflight {
 namespace {
 
-constexpr std::size_t kRaysAtOnce = 1 << 16;  // of whole vehicles
-constexpr std::uint32_t kPieces = 8;          // of a period, in which a vehicle turns evenly
+constexpr std::size_t kRaysAtOnce = 1 << 16;     // of whole vehicles
+constexpr std::size_t kRaysOfDevices = 1 << 22;  // the same, of renderers that want many
+constexpr std::uint32_t kPieces = 8;             // of a period, in which a vehicle turns evenly
 
 /// What moves around a vehicle, for as long as its rays are under way.
 struct Around {
@@ -104,7 +105,8 @@ void RangePattern::measure(const Renderer& renderer,
   const std::size_t beams = beams_->beams.size();
   if (beams == 0) return;
   require_argument(!returns_ || draws_of, "RangePattern: a sensor's reports need draws");
-  const std::size_t at_once = std::max<std::size_t>(1, kRaysAtOnce / beams);
+  const std::size_t rays = renderer.jobs_at_once() > 0 ? kRaysOfDevices : kRaysAtOnce;
+  const std::size_t at_once = std::max<std::size_t>(1, rays / beams);
   const std::size_t most = std::min(at_once, vehicles.size());
   const bool wants_hits = bodies_of || returns_;
   std::vector<AimedBeams> all_aimed(most);

@@ -224,7 +224,8 @@ std::shared_ptr<FlightsObject> make_flights(const MapObject& map,
                                             std::size_t pooled,
                                             const std::string& sensor,
                                             const Scenario& scenario,
-                                            std::size_t team) {
+                                            std::size_t team,
+                                            const std::string& renderer) {
   if (count < 1 || count > 1'000'000) throw py::value_error("count: 1 to 1000000");
   require_shape(directions, "directions", {-1, 3});
   require_shape(shares, "shares", {-1});
@@ -239,6 +240,7 @@ std::shared_ptr<FlightsObject> make_flights(const MapObject& map,
   options.timing.steps_per_control = steps_per_control;
   options.speed_max = speed_max;
   options.team = team;
+  options.renderer = renderer;
   options.wind = scenario.air.wind;
   options.obstacles = obstacles_of(scenario, map.map);
   for (const ObstacleSettings& settings : scenario.obstacles) {
@@ -270,7 +272,8 @@ void add_flights(py::module_& module) {
            py::arg("pooled"),
            py::arg("sensor"),
            py::arg("scenario"),
-           py::arg("team"))
+           py::arg("team"),
+           py::arg("renderer"))
       .def("place", &Object::place, py::arg("which"), py::arg("starts"), py::arg("seeds"))
       .def("set_rotor", &Object::set_rotor, py::arg("which"), py::arg("rotor"), py::arg("shares"))
       .def("clearance_of_obstacles",

@@ -523,6 +523,7 @@ class _Flights(metaclass=_Meta):
         sensor: str,
         scenario: _Scenario,
         team: int,
+        renderer: str,
     ) -> None: ...
     def place(
         self, which: NDArray[np.uint32], starts: NDArray[np.float64], seeds: NDArray[np.uint64]

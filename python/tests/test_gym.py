@@ -90,6 +90,24 @@ class GymTest(unittest.TestCase):
         for many, one in zip(_flat(runs[0]), _flat(runs[2])):
             self.assertTrue(same(np.asarray(many)[:1], one))
 
+    def test_a_gpu_has_the_same_bits(self) -> None:
+        lidar = Lidar(4, 16, range_max=6.0, rolling=True)
+        try:
+            VectorEnv(room(), 1, task=goal(), lidar=lidar, renderer="gpu")
+        except ValueError as error:
+            self.skipTest(str(error))
+        random = np.random.default_rng(1)
+        actions = random.uniform(-1, 1, (10, 9, 4))
+        runs = []
+        for renderer in ("beam", "gpu", "auto"):
+            env = VectorEnv(room(), 9, task=goal(), lidar=lidar, renderer=renderer)
+            log = [env.reset(seed=11)[0]]
+            for step in actions:
+                log.append(env.step(step)[:4])
+            runs.append(log)
+        for other in runs[1:]:
+            self.assertTrue(all(same(a, b) for a, b in zip(_flat(runs[0]), _flat(other))))
+
     def test_seeds(self) -> None:
         env = some(goal, count=3)
         first, _ = env.reset(seed=[5, 9, 6])
@@ -329,6 +347,7 @@ class GymTest(unittest.TestCase):
             lambda: VectorEnv(room(), 2, task="win"),
             lambda: VectorEnv(room(), 2, action="teleport", task=goal()),
             lambda: VectorEnv([], 2),
+            lambda: VectorEnv(room(), 2, renderer="pencil", task=goal()),
             lambda: VectorEnv(room(), 2, lidar=Lidar(0, 5), task=goal()),
             lambda: VectorEnv(room(), 2, task=goal(), physics_step=0.007),
             lambda: some(Goal).reset(),  # 20 m do not fit into the room

@@ -77,6 +77,7 @@ class VectorEnv(_Base):  # type: ignore[misc]
         steps_per_control: int = 1,
         autoreset: str = "next_step",
         copy: bool = True,
+        renderer: str = "beam",
         render_mode: Optional[str] = None,
     ) -> None:
         """map: one, or several: environments are dealt out to them in blocks. task: a name of `TASKS`, or one of your
@@ -84,7 +85,8 @@ class VectorEnv(_Base):  # type: ignore[misc]
         place, see and hit each other and end together, and so are the next ones (1, 2, 4 or 8; without it, the
         task's). action_period: s between actions. physics_step: s; `steps_per_control` of them are flown with the same
         rotor commands (docs/learning.md: what coarser ones cost). autoreset: "next_step", "same_step" or "disabled".
-        copy: False: observations are read-only views that the next step changes.
+        copy: False: observations are read-only views that the next step changes. renderer: of the ranges: "gpu" has the
+        same bits on a GPU, all environments of a map at a time; "auto": where there is one.
         """
         if num_envs < 1:
             raise ValueError(f"num_envs: 1 or more, not {num_envs}")
@@ -120,7 +122,7 @@ class VectorEnv(_Base):  # type: ignore[misc]
                 steps_per_control, greatest, directions, shares, 1.0 if lidar is None else lidar.range_max,
                 1 if lidar is None else lidar.pool[0] * lidar.pool[1],
                 "" if lidar is None or lidar.sensor is None else lidar.sensor,
-                self.conditions.scenario_in(place.info().name)._handle, self.team,
+                self.conditions.scenario_in(place.info().name)._handle, self.team, renderer,
             )
             for place, block in zip(self.maps, self._blocks)
         ]  # fmt: skip
