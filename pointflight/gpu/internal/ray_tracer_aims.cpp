@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <cstring>
 
+#include "pointflight/gpu/internal/device_aim.hpp"
 #include "pointflight/gpu/internal/ray_tracer.hpp"
 
 namespace pointflight {
@@ -45,25 +46,14 @@ RayTracer::Needs RayTracer::take_aims(Slot& slot,
   std::size_t at = part.aims.size() * device::kAimWords;
   const auto append = [&](const auto& all) {
     const std::size_t begin = at;
-    std::memcpy(given + at, all.data(), all.size() * sizeof all[0]);
+    if (!all.empty()) std::memcpy(given + at, all.data(), all.size() * sizeof all[0]);
     at += all.size() * sizeof all[0] / 4;
     return static_cast<std::uint32_t>(begin);
   };
   for (std::size_t i = 0; i < part.aims.size(); ++i) {
     const AimedBeams& aim = *part.aims[i];
-    const MapPosition from = map_position(map, aim);
     const std::uint32_t poses = append(aim.poses);
-    const bool is_rolling = aim.poses.size() > 1;
-    aims[i] = {from.axis[0].voxel,
-               from.axis[1].voxel,
-               from.axis[2].voxel,
-               from.axis[0].rest,
-               from.axis[1].rest,
-               from.axis[2].rest,
-               aim.range_max,
-               poses,
-               is_rolling ? 1u : 0u,
-               aim.deviations.empty() ? device::kNowhere : append(aim.deviations)};
+    aims[i] = device_aim(map, aim, poses, append(aim.deviations));
   }
   if (!tables.empty()) std::memcpy(given + words, tables.data(), tables.size_bytes());
   slot.call = {};

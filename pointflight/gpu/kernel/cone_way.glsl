@@ -1,24 +1,5 @@
 // The way of a wide beam down the hierarchy, and which surfels it touches. After cone.glsl.
 
-void take_cone_child(uvec4 second, uint lane) {
-  uint shift = 8u * (lane & 3u);
-  uint before = (1u << shift) - 1u;
-  uint own = ((lane >= 4u ? second.w : second.z) >> shift) & 255u;
-  uint meta0 = lane >= 4u ? second.z : second.z & before;
-  uint meta1 = lane >= 4u ? second.w & before : 0u;
-  if (own == 0x80u) {
-    c.index = second.x + uint(bitCount(meta0 & 0x80808080u) + bitCount(meta1 & 0x80808080u));
-    c.next = kInner;
-    return;
-  }
-  uint c0 = meta0 & 0x7f7f7f7fu;
-  uint c1 = meta1 & 0x7f7f7f7fu;
-  uint n = c0 + (((c0 + 0x7f7f7f7fu) >> 7) & 0x01010101u) + c1 +
-           (((c1 + 0x7f7f7f7fu) >> 7) & 0x01010101u);
-  c.index = second.y + ((n * 0x01010101u) >> 24);
-  c.next = own;
-}
-
 /// Takes the nearest child that waits before the end, if any; looks if it lies far enough.
 void pop_cone() {
   c.next = kDone;
@@ -27,7 +8,10 @@ void pop_cone() {
     uvec2 entry = cone_stack[c.depth];
     float depth = uintBitsToFloat(entry.x & 0xfffffff8u);
     if (depth > c.look_behind) look();
-    if (depth <= c.deepest * 1.0001f) take_cone_child(nodes[5u * entry.y + 1u], entry.x & 7u);
+    if (depth > c.deepest * 1.0001f) continue;
+    uvec2 child = child_in(nodes[5u * entry.y + 1u], entry.x & 7u);
+    c.index = child.x;
+    c.next = child.y;
   }
 }
 

@@ -144,26 +144,30 @@ DeviceHit end_way() {
 
 // ---- the way down
 
-/// Takes the child in a lane of a node: inner ones are consecutive, and so are the words of leaves.
-/// `second`: 16 to 31 of the node's bytes.
-void take_child(uvec4 second, uint lane) {
+/// The child in a lane of a node: where it is, and kInner or how many surfels a leaf has. Inner ones
+/// are consecutive, and so are the words of leaves. `second`: 16 to 31 of the node's bytes.
+uvec2 child_in(uvec4 second, uint lane) {
   uint shift = 8u * (lane & 3u);
   uint before = (1u << shift) - 1u;
   uint own = ((lane >= 4u ? second.w : second.z) >> shift) & 255u;
   uint meta0 = lane >= 4u ? second.z : second.z & before;  // of the lanes before
   uint meta1 = lane >= 4u ? second.w & before : 0u;
   if (own == 0x80u) {
-    s.index = second.x + uint(bitCount(meta0 & 0x80808080u) + bitCount(meta1 & 0x80808080u));
-    s.next = kInner;
-    return;
+    uint inner = uint(bitCount(meta0 & 0x80808080u) + bitCount(meta1 & 0x80808080u));
+    return uvec2(second.x + inner, kInner);
   }
   // a leaf of n surfels has n + 1 words
   uint c0 = meta0 & 0x7f7f7f7fu;
   uint c1 = meta1 & 0x7f7f7f7fu;
   uint n = c0 + (((c0 + 0x7f7f7f7fu) >> 7) & 0x01010101u) + c1 +
            (((c1 + 0x7f7f7f7fu) >> 7) & 0x01010101u);
-  s.index = second.y + ((n * 0x01010101u) >> 24);
-  s.next = own;
+  return uvec2(second.y + ((n * 0x01010101u) >> 24), own);
+}
+
+void take_child(uvec4 second, uint lane) {
+  uvec2 child = child_in(second, lane);
+  s.index = child.x;
+  s.next = child.y;
 }
 
 /// Takes the nearest child that waits before the end, if any.
