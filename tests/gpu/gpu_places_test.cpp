@@ -101,7 +101,7 @@ TEST(GpuPlaces, Slow_WideBeamsHaveTheProcessorsEchoes) {
     const auto gpu = make_gpu_renderer(Scene{map});
     const PoseTrack track = flight_through(*map);
     const std::vector<Body> bodies = bodies_around(track);
-    for (const char* sensor : {"mid360", "vlp16", "avia"}) {
+    for (const char* sensor : {"mid360", "os1_128", "avia"}) {
       SCOPED_TRACE(fmt::format("{} {}", place.cloud, sensor));
       const Lidar lidar(load_lidar(sensor), 0, nullptr, Surroundings{});
       for (std::uint64_t k = 0; k < 3; ++k) {

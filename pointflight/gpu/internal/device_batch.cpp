@@ -286,6 +286,7 @@ bool DeviceBatch::write_wide(const RenderJob& job,
           .origin = {result.cosine, result.surfel, static_cast<std::uint16_t>(result.sub_ray)}};
       return is_sure_of(wide, echoes.all[0]);
     case device::kMoreSubRays:
+      if (!tracer.has_second_level(slot, result)) return false;
       return find_second_level_echoes(
           *beam_.scene().map, wide, tracer.second_level(slot, result), echoes);
     default:

@@ -211,6 +211,10 @@ void RayTracer::record(Slot& slot) {
   copy(slot.upload, sent.given, slot.tables, sent.tables, 0);
   copy(slot.upload, sent.given + sent.tables, slot.beams, sent.beams, 0);
   vk.CmdFillBuffer(slot.commands, counter_.handle(), 256 * std::uint64_t{number}, 4, 0);
+  // what a kernel does not come to write is the processor's
+  if (slot.call.threads > 0) {
+    vk.CmdFillBuffer(slot.commands, slot.results.handle(), 0, sent.results, device::kNowhere);
+  }
   vk.CmdResetQueryPool(slot.commands, queries_, 2 * number, 2);
   record_barrier(vk, slot.commands);
   const bool is_wide = slot.call.threads > 0;
@@ -225,17 +229,13 @@ void RayTracer::record(Slot& slot) {
                            &slot.set,
                            0,
                            nullptr);
-  vk.CmdPushConstants(slot.commands,
-                      pipelines_.layout(),
-                      VK_SHADER_STAGE_COMPUTE_BIT,
-                      0,
-                      sizeof slot.call,
-                      &slot.call);
   vk.CmdWriteTimestamp(slot.commands, VK_PIPELINE_STAGE_TOP_OF_PIPE_BIT, queries_, 2 * number);
-  const std::uint32_t all =
-      ((is_wide ? slot.call.threads : slot.call.count) + kGroupSize - 1) / kGroupSize;
-  const bool stays = kernel_.is_persistent && !is_wide;
-  vk.CmdDispatch(slot.commands, stays ? std::min(all, kResident) : all, 1, 1);
+  if (is_wide) {
+    dispatch_wide(slot);
+  } else {
+    const std::uint32_t all = (slot.call.count + kGroupSize - 1) / kGroupSize;
+    dispatch(slot, slot.call, kernel_.is_persistent ? std::min(all, kResident) : all);
+  }
   vk.CmdWriteTimestamp(
       slot.commands, VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT, queries_, 2 * number + 1);
   record_barrier(vk, slot.commands);
@@ -243,6 +243,27 @@ void RayTracer::record(Slot& slot) {
   copy(slot.more, 0, slot.read_back, sent.more, sent.results);
   record_barrier(vk, slot.commands);
   require_success(vk.EndCommandBuffer(slot.commands), "rays");
+}
+
+void RayTracer::dispatch(const Slot& slot,
+                         const device::DeviceCall& call,
+                         std::uint32_t groups) const {
+  const VulkanFunctions& vk = device_.vk();
+  vk.CmdPushConstants(
+      slot.commands, pipelines_.layout(), VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof call, &call);
+  vk.CmdDispatch(slot.commands, groups, 1, 1);
+}
+
+/// Devices take beam after beam in each invocation; processors, whose loops must be short, one in
+/// each of several dispatches.
+void RayTracer::dispatch_wide(const Slot& slot) const {
+  device::DeviceCall call = slot.call;
+  const std::uint32_t step = device_.info().is_processor ? call.threads : call.count;
+  for (call.first = 0; call.first < call.count; call.first += step) {
+    call.until = std::min(call.count, call.first + step);
+    if (call.first > 0) record_barrier(device_.vk(), slot.commands);  // they share lists
+    dispatch(slot, call, call.threads / kGroupSize);
+  }
 }
 
 void RayTracer::wait(std::size_t number) {

@@ -87,7 +87,9 @@ class RayTracer {
   [[nodiscard]] std::span<const float> ranges(std::size_t slot) const;
   /// The same of wide beams.
   [[nodiscard]] std::span<const device::WideResult> wide_results(std::size_t slot) const;
-  /// What the second level's sub-rays hit of one of them, which is of kMoreSubRays.
+  /// False if one of them, which is of kMoreSubRays, says what cannot be.
+  [[nodiscard]] bool has_second_level(std::size_t slot, const device::WideResult& result) const;
+  /// What the second level's sub-rays hit of it.
   [[nodiscard]] SecondLevel second_level(std::size_t slot, const device::WideResult& result) const;
   /// How long the kernel of the last `wait` took, s.
   [[nodiscard]] double kernel_time() const { return kernel_time_; }
@@ -127,6 +129,8 @@ class RayTracer {
   [[nodiscard]] std::uint32_t wide_threads(std::size_t beams) const;
   void send(Slot& slot, const Needs& needs);
   void record(Slot& slot);
+  void dispatch(const Slot& slot, const device::DeviceCall& call, std::uint32_t groups) const;
+  void dispatch_wide(const Slot& slot) const;
   void release() noexcept;
 
   GpuDevice& device_;

@@ -5,6 +5,7 @@
 
 #include "pointflight/gpu/internal/device_aim.hpp"
 #include "pointflight/gpu/internal/ray_tracer.hpp"
+#include "pointflight/render/internal/sub_rays.hpp"
 
 namespace pointflight {
 namespace {
@@ -120,6 +121,10 @@ std::size_t RayTracer::wide_at_once() const {
 
 std::span<const device::WideResult> RayTracer::wide_results(std::size_t slot) const {
   return slots_[slot].read_back.as<const device::WideResult>(slots_[slot].call.count);
+}
+
+bool RayTracer::has_second_level(std::size_t slot, const device::WideResult& result) const {
+  return result.surfel < slots_[slot].call.most_more && result.sub_ray / 2 < kStripDirections;
 }
 
 SecondLevel RayTracer::second_level(std::size_t slot, const device::WideResult& result) const {

@@ -86,6 +86,8 @@ struct DeviceCall {
   uint wants_ranges;  // and no more of each hit
   // of wide beams
   uint threads;          // invocations
+  uint first;            // beams of this dispatch: from here
+  uint until;            // to here
   uint most_more;        // beams whose second level there is room for
   float sigma_across;    // rad
   float sigma_up;        // rad

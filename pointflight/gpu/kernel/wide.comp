@@ -59,7 +59,7 @@ WideResult take_second_level() {
 }
 
 void main() {
-  for (uint i = gl_GlobalInvocationID.x; i < call.count; i += call.threads) {
+  for (uint i = call.first + gl_GlobalInvocationID.x; i < call.until; i += call.threads) {
     aim_across(i);
     start_cone(aimed_ray(i), across_x, across_y, across_z, beams[beam_of(i)].number);
     see_eight();
