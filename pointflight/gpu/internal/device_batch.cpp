@@ -146,10 +146,12 @@ const SensorBeams* DeviceBatch::beams_of(std::size_t part) const {
   return wide != nullptr ? wide->wide.aimed.beams.get() : nullptr;
 }
 
-void DeviceBatch::finish() const {
+void DeviceBatch::finish() {
   executor_.parallel_for(wide_.size(), 1, [&](std::size_t k, std::size_t) {
     const ChargeTo charge(account_of(wide_[k]->job));
-    beam_.finish_cones(wide_[k]->job, wide_[k]->left, executor_);
+    std::vector<std::uint32_t>& left = wide_[k]->left;
+    std::sort(left.begin(), left.end());  // whichever thread noted them first
+    beam_.finish_cones(wide_[k]->job, left, executor_);
   });
   for (const auto& job : among_bodies_) {
     const ChargeTo charge(account_of(job->job()));

@@ -42,7 +42,7 @@ class DeviceBatch {
   /// Writes what was hit, when it is no longer on its way.
   void take(std::size_t part, std::size_t slot, const RayTracer& tracer);
   /// What the device left, and bodies, when all parts are taken.
-  void finish() const;
+  void finish();
 
  private:
   /// Rays of a job in some order, from the first on.
