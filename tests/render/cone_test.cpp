@@ -276,27 +276,37 @@ TEST(Cones, BodiesCoverThemAndShareThem) {
   }
 }
 
-TEST(Cones, OfTooManySurfelsEightRaysAreTaken) {
-  // a cloud of dust so fine that one wide beam passes thousands of surfels
-  std::vector<Vector3d> points;
+/// A cloud of dust so fine that one wide beam passes thousands of surfels.
+std::shared_ptr<const SurfelMap> dust(std::uint64_t points) {
+  std::vector<Vector3d> all;
   const RandomStream random(9, StreamId::kTest, 0);
-  for (std::uint64_t i = 0; i < 120000; ++i) {
+  for (std::uint64_t i = 0; i < points; ++i) {
     const auto [x, y] = random.uniform2(2 * i);
     const auto [z, unused] = random.uniform2(2 * i + 1);
     static_cast<void>(unused);
-    points.emplace_back(4.0 + 4.0 * x, 4.0 * y - 2.0, 4.0 * z - 2.0);
+    all.emplace_back(4.0 + 4.0 * x, 4.0 * y - 2.0, 4.0 * z - 2.0);
   }
-  const auto map = map_of(points, 0.05);
-  const auto renderer = make_renderer("beam", Scene{map});
+  return map_of(all, 0.05);
+}
+
+/// Sixteen beams through it, `at_once` in a call.
+std::vector<Echoes> through_dust(const SurfelMap& map, float sigma, std::size_t at_once) {
   const EvenSurfaces receiver;
   WideScan scan({0, 0, 0}, 0.0, 0.0, 4, 4);
   std::vector<Echoes> echoes(scan.rays.size());
   WideBeams wide = scan.beams(receiver, 0, echoes);
-  wide.sigma_across = wide.sigma_up = 0.04f;
+  wide.sigma_across = wide.sigma_up = sigma;
   const std::vector<std::uint32_t> order =
       direction_order(std::span<const Ray>(scan.rays), Executor(1));
-  const KernelMap kernel_map = kernel_map_of(*map);
-  trace_cones(*map, kernel_map, map_rays(kernel_map, scan.rays), order, wide);
+  const KernelMap kernel_map = kernel_map_of(map);
+  const std::vector<MapRay> rays = map_rays(kernel_map, scan.rays);
+  for (std::size_t from = 0; from < order.size(); from += at_once) {
+    trace_cones(map, kernel_map, rays, std::span(order).subspan(from, at_once), wide);
+  }
+  return echoes;
+}
+
+void expect_echoes_of_dust(const std::vector<Echoes>& echoes) {
   std::size_t seen = 0;
   for (const Echoes& e : echoes) {
     for (const Echo& echo : e.span()) {
@@ -307,6 +317,20 @@ TEST(Cones, OfTooManySurfelsEightRaysAreTaken) {
     seen += e.count;
   }
   EXPECT_GT(seen, 8u);
+}
+
+TEST(Cones, OfTooManySurfelsEightRaysAreTaken) {
+  expect_echoes_of_dust(through_dust(*dust(480000), 0.09f, 16));
+}
+
+TEST(Cones, CrowdedBeamsAreTheSameTogetherAndAlone) {
+  const auto map = dust(120000);
+  for (const float sigma : {0.01f, 0.02f, 0.04f}) {
+    const std::vector<Echoes> together = through_dust(*map, sigma, 16);
+    const std::vector<Echoes> alone = through_dust(*map, sigma, 1);
+    for (std::size_t i = 0; i < together.size(); ++i) expect_same(together[i], alone[i], "in dust");
+    expect_echoes_of_dust(together);
+  }
 }
 
 TEST(Cones, AnEmptyMapGivesNoEchoes) {

@@ -142,11 +142,11 @@ POINTFLIGHT_INLINE float spread_of(const KernelMap& map, const BeamGroups& p) {
 
 /// The four planes around all groups, which lie within [low_u, high_u] x [low_v, high_v].
 POINTFLIGHT_INLINE void set_up_planes(BeamGroups& p,
-                                      const Vector3f& mean,
                                       const Vector3f& u,
-                                      const Vector3f& v) {
+                                      const Vector3f& v,
+                                      const Vector3f& w) {
   const Vector3f normals[4] = {
-      u - p.low_u * mean, p.high_u * mean - u, v - p.low_v * mean, p.high_v * mean - v};
+      u - p.low_u * w, p.high_u * w - u, v - p.low_v * w, p.high_v * w - v};
   p.norm = 0.0f;
   for (int k = 0; k < 4; ++k) {
     p.norm = std::max(p.norm, normals[k].norm() * 1.001f);
@@ -169,12 +169,10 @@ POINTFLIGHT_INLINE void set_up_apex(const KernelMap& map, BeamGroups& p) {
   p.one_origin = p.spread == 0.0f;
 }
 
-/// Sets up the frustum around the first `count` groups.
-POINTFLIGHT_INLINE void set_up(const KernelMap& map, BeamGroups& p, std::size_t count) {
+/// Origins and ends of the first `count` groups. Returns the sum of their mean directions.
+POINTFLIGHT_INLINE Vector3f set_up_groups(const KernelMap& map, BeamGroups& p, std::size_t count) {
   p.count = count;
   set_up_apex(map, p);
-
-  // the frame: w along the mean direction, u and v across it
   Vector3f mean = Vector3f::Zero();
   for (std::size_t g = 0; g < kGroups; ++g) {
     // what is not there hits nothing
@@ -182,17 +180,21 @@ POINTFLIGHT_INLINE void set_up(const KernelMap& map, BeamGroups& p, std::size_t 
     for (int k = 0; k < 3 && g < count; ++k) mean[k] += p.groups[g].mean[k];
   }
   p.end = greatest(load(p.group_end));
-  mean.normalize();
-  const Vector3f helper = std::abs(mean.z()) < 0.9f ? Vector3f::UnitZ() : Vector3f::UnitX();
-  const Vector3f u = mean.cross(helper).normalized();
-  const Vector3f v = mean.cross(u);
+  return mean;
+}
+
+/// Sets up the frustum around the groups in a frame along whose w all beams go forwards.
+POINTFLIGHT_INLINE void set_up_frustum(BeamGroups& p,
+                                       const Vector3f& u,
+                                       const Vector3f& v,
+                                       const Vector3f& w) {
   for (int k = 0; k < 3; ++k) {
     p.u[k] = u[k];
     p.v[k] = v[k];
-    p.w[k] = mean[k];
+    p.w[k] = w[k];
   }
   int main_axis = 0;
-  mean.cwiseAbs().maxCoeff(&main_axis);
+  w.cwiseAbs().maxCoeff(&main_axis);
 
   // where each group's beams cross the plane at distance 1 along w, and how fast they go along the
   // main axis
@@ -200,11 +202,11 @@ POINTFLIGHT_INLINE void set_up(const KernelMap& map, BeamGroups& p, std::size_t 
   alignas(32) float low[2][8];  // by group
   alignas(32) float high[2][8];
   for (std::size_t g = 0; g < kGroups; ++g) {
-    const Group& group = p.groups[g < count ? g : 0];
+    const Group& group = p.groups[g < p.count ? g : 0];
     const F8 dx = load(group.dx);
     const F8 dy = load(group.dy);
     const F8 dz = load(group.dz);
-    const F8 ahead = dx * splat(mean.x()) + dy * splat(mean.y()) + dz * splat(mean.z());
+    const F8 ahead = dx * splat(w.x()) + dy * splat(w.y()) + dz * splat(w.z());
     const F8 per_ahead = splat(1.0f) / ahead;
     const F8 at_u = (dx * splat(u.x()) + dy * splat(u.y()) + dz * splat(u.z())) * per_ahead;
     const F8 at_v = (dx * splat(v.x()) + dy * splat(v.y()) + dz * splat(v.z())) * per_ahead;
@@ -229,14 +231,22 @@ POINTFLIGHT_INLINE void set_up(const KernelMap& map, BeamGroups& p, std::size_t 
   p.high_u = greatest(load(high[0])) + room;
   p.low_v = least(load(low[1])) - room;
   p.high_v = greatest(load(high[1])) + room;
-  set_up_planes(p, mean, u, v);
+  set_up_planes(p, u, v, w);
 
-  // along the axis that the mean direction is closest to, all beams go forward: a bound of t
+  // along the axis that w is closest to, all beams go forward: a bound of t
   p.main_axis = main_axis;
-  const bool forward = mean[main_axis] > 0.0f;
+  const bool forward = w[main_axis] > 0.0f;
   p.main_side = static_cast<std::uint32_t>(main_axis) + (forward ? 0u : 3u);
   p.main_step = (forward ? 1.0f : -1.0f) / (greatest(steepest) * 1.0001f);
   p.main_offset = (forward ? p.spread : -p.spread) * 1.001f;
+}
+
+/// Sets up the frustum around the first `count` groups: w along the mean direction.
+POINTFLIGHT_INLINE void set_up(const KernelMap& map, BeamGroups& p, std::size_t count) {
+  const Vector3f w = set_up_groups(map, p, count).normalized();
+  const Vector3f helper = std::abs(w.z()) < 0.9f ? Vector3f::UnitZ() : Vector3f::UnitX();
+  const Vector3f u = w.cross(helper).normalized();
+  set_up_frustum(p, u, w.cross(u), w);
 }
 
 }  // namespace pointflight::HWY_NAMESPACE

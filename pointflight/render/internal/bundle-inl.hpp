@@ -30,7 +30,8 @@ struct BundleWay : BeamGroups {
   alignas(32) float at_u[kGroups][8], at_v[kGroups][8];  ///< Of each beam: d.u / d.w, d.v / d.w.
   alignas(32) float group_low[2][8], group_high[2][8];   ///< Around each group, in u and in v.
   float across[3][3];                                    ///< |u|, |v|, |w| by axis.
-  float room_u, room_v;                                  ///< By which boxes are widened, rad.
+  float room_u, room_v;                                  ///< By which boxes are widened, rad,
+  float deeper_u, deeper_v;                              ///< and by half their depth times these.
   std::uint32_t visits;                                  ///< Of nodes and leaves.
   std::size_t depth;
   BundleEntry stack[kStack];
@@ -44,10 +45,9 @@ struct Bundle : BundleWay {
 /// Room for rounding, rad: 0.4 mm at 100 m.
 inline constexpr float kBundleRoom = 4e-6f;
 
-/// Sets up the way of the first `count` groups, whose beams are no wider than lines.
-POINTFLIGHT_INLINE void set_up_way(const KernelMap& map, BundleWay& b, std::size_t count) {
-  set_up(map, b, count);
-  for (std::size_t g = 0; g < count; ++g) {
+/// Sets up the way of groups whose frustum is set up, and whose beams are no wider than lines.
+POINTFLIGHT_INLINE void set_up_way(BundleWay& b) {
+  for (std::size_t g = 0; g < b.count; ++g) {
     const Group& group = b.groups[g];
     const F8 dx = load(group.dx);
     const F8 dy = load(group.dy);
@@ -68,13 +68,14 @@ POINTFLIGHT_INLINE void set_up_way(const KernelMap& map, BundleWay& b, std::size
     b.across[1][axis] = std::abs(b.v[axis]);
     b.across[2][axis] = std::abs(b.w[axis]);
   }
-  b.room_u = kBundleRoom;
-  b.room_v = kBundleRoom;
+  b.room_u = b.room_v = kBundleRoom;
+  b.deeper_u = b.deeper_v = 0.0f;
   b.visits = 0;
   b.depth = 0;
 }
 
-/// Makes all beams wider by so much to each side in u and v, rad.
+/// Makes all beams wider by so much to each side in u and v, rad. A box is entered by its far end,
+/// where they are widest.
 POINTFLIGHT_INLINE void widen(BundleWay& b, float wider_u, float wider_v) {
   b.low_u -= wider_u;
   b.high_u += wider_u;
@@ -82,11 +83,14 @@ POINTFLIGHT_INLINE void widen(BundleWay& b, float wider_u, float wider_v) {
   b.high_v += wider_v;
   b.room_u += wider_u;
   b.room_v += wider_v;
+  b.deeper_u += 2.0f * wider_u;
+  b.deeper_v += 2.0f * wider_v;
 }
 
 /// Sets up a bundle of the first `count` groups.
 POINTFLIGHT_INLINE void set_up_bundle(const KernelMap& map, Bundle& b, std::size_t count) {
-  set_up_way(map, b, count);
+  set_up(map, b, count);
+  set_up_way(b);
   for (std::size_t n = 0; n < 8 * count; ++n) {
     start_beam(b.groups[n / 8].end[n % 8], b.beams[n]);
   }
@@ -123,6 +127,8 @@ POINTFLIGHT_INLINE SeenBoxes see(const BundleWay& b, const Bvh8Node& node) {
     half_v = half_v + half * splat(b.across[1][k]);
     half_w = half_w + half * splat(b.across[2][k]);
   }
+  half_u = half_u + half_w * splat(b.deeper_u);
+  half_v = half_v + half_w * splat(b.deeper_v);
   SeenBoxes seen;  // NOLINT(cppcoreguidelines-pro-type-member-init): all is written
   seen.begin = w - half_w;
   // around the apex a box lies in any direction

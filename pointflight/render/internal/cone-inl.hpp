@@ -10,7 +10,6 @@
 #define POINTFLIGHT_RENDER_CONE_INL_HPP
 #endif
 
-#include <memory>
 #include <span>
 
 #include "pointflight/render/internal/cone_echoes-inl.hpp"
@@ -67,8 +66,8 @@ POINTFLIGHT_INLINE bool look(const ConeCall& call, ConeBeam& beam) {
   return true;
 }
 
-/// Looks at beams of `which` that are due before `t` (m). Returns those whose way goes on to there:
-/// some that have ended may be among them.
+/// Looks at beams of `which` that are due before depth `t` (m). Returns those whose way goes on to
+/// there: some that have ended may be among them.
 POINTFLIGHT_INLINE std::uint64_t look_at_due(const ConeCall& call, std::uint64_t which, float t) {
   ConeBundle& b = call.room.bundle;
   if (t <= b.first_look) return which;
@@ -84,7 +83,7 @@ POINTFLIGHT_INLINE std::uint64_t look_at_due(const ConeCall& call, std::uint64_t
       ConeBeam& beam = b.beams[8 * g + i];
       b.look_behind[g][i] = kNever;
       if (!look(call, beam)) continue;
-      b.groups[g].end[i] = beam.end;
+      b.groups[g].end[i] = beam.numbers[kDeepest];
       shorter |= 1u << g;
     }
     next = min(next, load(b.look_behind[g]));
@@ -108,28 +107,24 @@ struct NearBeams {  // NOLINT(cppcoreguidelines-pro-type-member-init): written b
   std::size_t count;
 };
 
-/// Those of the bundle's pairs that touch, which are of the beams `from` to `to`, into these beams'
-/// lists. The beams look along one axis of the map.
+/// Those of the bundle's pairs that touch into their beams' lists.
 POINTFLIGHT_INLINE void touch_pairs(const ConeCall& call,
                                     const ConeLeaf& leaf,
-                                    const NearBeams& near_by,
-                                    std::size_t from,
-                                    std::size_t to) {
+                                    const NearBeams& near_by) {
   ConeBundle& b = call.room.bundle;
-  const ConeBeam& axes = b.beams[near_by.numbers[from]];
+  const ConeBeam& axes = b.beams[0];
   for (std::size_t at = 0; at < b.pairs.count; at += 8) touch_eight(call.map, leaf, axes, at, b);
   std::size_t at = 0;
-  for (; from < to; ++from) {
-    const std::size_t n = near_by.numbers[from];
+  for (std::size_t k = 0; k < near_by.count; ++k) {
+    const std::size_t n = near_by.numbers[k];
     ConeBeam& beam = b.beams[n];
-    const auto count = static_cast<std::size_t>(std::popcount(near_by.lanes[from]));
+    const auto count = static_cast<std::size_t>(std::popcount(near_by.lanes[k]));
     take_touched(b.pairs, at, count, beam);
     at += count;
     const float look_behind = beam.cover >= kCoverToLook ? beam.far + call.map.window : kNever;
     b.look_behind[n >> 3][n & 7] = look_behind;
     b.first_look = std::min(b.first_look, look_behind);
   }
-  b.pairs.count = 0;
 }
 
 /// A leaf's surfels into the lists of the beams that touch them.
@@ -163,22 +158,17 @@ POINTFLIGHT_INLINE void visit_leaf(const ConeCall& call, const BundleEntry& entr
   }
   const bool is_full = b.used + 2 * kTogether > std::size(b.pool);
   b.pairs.count = 0;
-  std::size_t from = 0;
   for (std::size_t k = 0; k < near_by.count; ++k) {
     const std::size_t n = near_by.numbers[k];
     ConeBeam& beam = b.beams[n];
-    if (beam.list.count + 8 > kMostSurfels || is_full) {
+    if (beam.list.count + 8 > b.most || is_full) {
       beam.failed = true;
       near_by.lanes[k] = 0;
-    }
-    if (!look_alike(beam, b.beams[near_by.numbers[from]])) {
-      touch_pairs(call, leaf, near_by, from, k);
-      from = k;
     }
     if constexpr (!kOneOrigin) set_corner(n);
     add_pairs(beam, see(leaf, beam, corner), near_by.lanes[k], b.pairs);
   }
-  if (near_by.count > 0) touch_pairs(call, leaf, near_by, from, near_by.count);
+  touch_pairs(call, leaf, near_by);
 }
 
 /// The way of a bundle through the tree; `beams` has a bit for each that goes.
@@ -202,7 +192,7 @@ POINTFLIGHT_INLINE void walk(const ConeCall& call, std::uint64_t beams) {
   }
 }
 
-/// Sub-rays of a beam with more surfels than its list holds, as lines.
+/// Sub-rays of a beam with more surfels than its list has room for though it goes alone, as lines.
 static HWY_NOINLINE void hit_as_lines(const ConeCall& call,
                                       const ConeBeam& beam,
                                       const SubRayLanes& sub_rays,
@@ -328,57 +318,6 @@ static ConeConstants constants_of(const KernelMap& map) {
           static_cast<float>(map.tau) * (kWeightSteps / kWeightOne),
           kDepthSteps / map.window,
           map.window / kDepthSteps};
-}
-
-static void trace_wide(const KernelMap& map,
-                       const SurfelMap& surfels,
-                       const MapRay* rays,
-                       const std::uint32_t* order,
-                       std::size_t count,
-                       const WideBeams& wide) {
-  // some MB, too large for stacks; filled as it is needed
-  thread_local const auto room = std::make_unique_for_overwrite<ConeRoom>();
-  ConeBundle& bundle = room->bundle;
-  const ConeCall call{map,
-                      surfels,
-                      rays,
-                      wide,
-                      wide.receiver->reflectances(),
-                      wide.receiver->sure_echoes(),
-                      first_sub_rays(),
-                      *room};
-  const Beams beams{map, rays, nullptr};
-  const Widths widths{kWidestBundle, kWidestBundle};
-  const auto run =
-      [&](std::size_t groups, const std::uint32_t* const* of_groups, std::uint64_t which) {
-        set_up_cones(map, wide, bundle, groups, of_groups);
-        walk(call, which);
-        for (; which != 0; which &= which - 1) finish(call, bundle.beams[std::countr_zero(which)]);
-      };
-  const auto run_alone = [&](const std::uint32_t* some, std::size_t of_them) {
-    for (std::size_t i = 0; i < of_them; ++i) {
-      const std::uint32_t eight[8] = {
-          some[i], some[i], some[i], some[i], some[i], some[i], some[i], some[i]};
-      take_beams(rays, eight, kWidestBundle, bundle.groups[0]);
-      const std::uint32_t* const of_group = eight;
-      run(1, &of_group, 1);
-    }
-  };
-  std::size_t at = 0;
-  Waiting waiting;
-  std::size_t taken[kGroups];
-  while (at + 8 <= count) {
-    const std::size_t groups = fill(beams, order, count, widths, at, bundle, taken, waiting);
-    if (groups > 0) {
-      const std::uint32_t* of_groups[kGroups];
-      for (std::size_t g = 0; g < groups; ++g) of_groups[g] = order + taken[g];
-      const std::uint64_t all = ~std::uint64_t{0} >> (64 - 8 * groups);
-      run(groups, of_groups, all);
-    }
-    run_alone(waiting.beams, waiting.count);
-    waiting.count = 0;
-  }
-  run_alone(order + at, count - at);
 }
 
 }  // namespace pointflight::HWY_NAMESPACE

@@ -18,9 +18,9 @@ namespace pointflight::HWY_NAMESPACE {
 /// does not hit hold kNever and weight 0. The last row is written over by the next.
 struct SubRayRows {  // NOLINT(cppcoreguidelines-pro-type-member-init): written before it is read
   std::size_t count;
-  alignas(32) float t[kMostSurfels + 1][8];
-  alignas(32) float weight[kMostSurfels + 1][8];
-  ConeSurfel surfel[kMostSurfels + 1];
+  alignas(32) float t[kMostAlone + 1][8];
+  alignas(32) float weight[kMostAlone + 1][8];
+  ConeSurfel surfel[kMostAlone + 1];
   F8 nearest, farthest;  ///< Of all t that are hit.
   F8 total;              ///< Of the weights.
 };

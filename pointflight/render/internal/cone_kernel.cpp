@@ -7,6 +7,7 @@
 #define HWY_TARGET_INCLUDE "pointflight/render/internal/cone_kernel.cpp"
 #include <hwy/foreach_target.h>
 // after foreach_target
+#include "pointflight/render/internal/cone_call-inl.hpp"
 #include "pointflight/render/internal/cone_rest-inl.hpp"
 
 #if HWY_ONCE

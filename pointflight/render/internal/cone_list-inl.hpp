@@ -18,8 +18,10 @@ namespace pointflight::HWY_NAMESPACE {
 
 /// How far from its axis a beam is looked at, sigmas: just beyond the outermost sub-ray.
 inline constexpr float kConeRadius = kSubRayRadius + 0.01f;
-/// Surfels in the list of one beam.
-inline constexpr std::size_t kMostSurfels = 1000;
+/// Surfels in the list of a beam that goes together with others.
+inline constexpr std::size_t kMostTogether = 1000;
+/// Surfels in the list of a beam that goes alone.
+inline constexpr std::size_t kMostAlone = 8000;
 
 /// Surfels of a leaf as a beam sees them, a lane each. Of a sub-ray (u, v) beside the axis
 /// (`ConeBeam`) m^2 is quadratic in u and v, if directions within the beam are taken as parallel,
@@ -28,7 +30,7 @@ struct ConeBlock {
   alignas(32) float m2[6][8];       ///< Of 1, u, v, u^2, u v, v^2.
   alignas(32) float inverse[3][8];  ///< Of 1, u, v; 1/m.
   alignas(32) float cosine[8];      ///< |e0 . d|, in whole steps.
-  alignas(32) float nearest[8];     ///< The inverse depth of the nearest ray that touches it, 1/m.
+  alignas(32) float nearest[8];     ///< No ray touches it at a greater inverse depth, 1/m.
   alignas(32) float solid[8];       ///< 1: the beam touches more than its fringe; else 0.
   alignas(32) float word[8];        ///< Its number in the map, as bits.
 };
@@ -36,7 +38,7 @@ struct ConeBlock {
 /// The surfels that a beam touches.
 struct ConeList {
   std::size_t count;
-  float at[kMostSurfels + 8];  ///< Each one's lane in the pool, counted in floats, as bits.
+  float* at;  ///< Each one's lane in the pool, counted in floats, as bits.
 };
 
 /// One of them: a lane of a block.
@@ -103,23 +105,27 @@ struct ConeBeam {
   float shortest;      ///< Of any ray within the beam, to depth 1.
   float numbers[kBeamNumbers];
   float end;           ///< Nothing beyond counts, m.
-  float far;           ///< Of what the list holds, m.
+  float far;           ///< Depth of what the list holds, m.
   float cover;         ///< Of the axis, since the last look.
   std::size_t looked;  ///< Surfels that the last look knew.
   std::uint32_t ray;
-  bool failed;  ///< More surfels than the list holds.
+  bool failed;  ///< More surfels than the list has room for.
   ConeList list;
 };
 
+/// Wide beams on their way down together. They all look along one axis of the map, and their frame
+/// is the bundle's; the ends of groups are depths in it.
 struct ConeBundle : BundleWay {
-  float wide_u, wide_v;  ///< Half the widest beam, in the bundle's u and v, rad.
-  alignas(32) float look_behind[kGroups][8];  ///< Time to look when a way has come so far, m.
+  alignas(32) float look_behind[kGroups][8];  ///< Time to look when a way has come so deep, m.
   float first_look;                           ///< None of these is less.
   ConeBeam beams[kTogether];
   ConePairs pairs;
+  std::size_t most;  ///< Surfels in a list.
+  float lists[kTogether * (kMostTogether + 8)];
   std::size_t used;  ///< Of the pool.
-  ConeBlock pool[kTogether * kMostSurfels];
+  ConeBlock pool[kTogether * kMostTogether];
 };
+static_assert(kMostAlone + 8 <= kTogether * (kMostTogether + 8));
 
 POINTFLIGHT_INLINE ConeSurfel surfel_at(const ConeBundle& b, const ConeList& list, std::size_t i) {
   return {&b.pool[0].m2[0][0] + std::bit_cast<std::uint32_t>(list.at[i])};
@@ -142,18 +148,33 @@ POINTFLIGHT_INLINE BeamSection section_of(const ConeBeam& beam) {
           (beam.up[1] - at_v * beam.up[2]) * beam.length};
 }
 
+/// A direction of the map: along an axis, forwards or backwards.
+struct MapAxis {
+  int axis;
+  float forward;  ///< 1 or -1.
+
+  bool operator==(const MapAxis&) const = default;
+};
+
+/// The one that a direction is closest to.
+POINTFLIGHT_INLINE MapAxis axis_of(const float (&direction)[3]) {
+  const float x = std::abs(direction[0]);
+  const float y = std::abs(direction[1]);
+  const float z = std::abs(direction[2]);
+  const int axis = z >= x && z >= y ? 2 : y >= x ? 1 : 0;
+  return {axis, direction[axis] < 0.0f ? -1.0f : 1.0f};
+}
+
 /// The frame of a beam and its cross-section in it.
 POINTFLIGHT_INLINE void set_up_frame(const float (&direction)[3],
                                      const float (&across)[3],
                                      const float (&up)[3],
                                      ConeBeam& beam) {
-  const float x = std::abs(direction[0]);
-  const float y = std::abs(direction[1]);
-  const float z = std::abs(direction[2]);
-  beam.w = z >= x && z >= y ? 2 : y >= x ? 1 : 0;
+  const MapAxis axis = axis_of(direction);
+  beam.w = axis.axis;
   beam.u = (beam.w + 1) % 3;
   beam.v = (beam.w + 2) % 3;
-  beam.forward = direction[beam.w] < 0.0f ? -1.0f : 1.0f;
+  beam.forward = axis.forward;
   const auto turned = [&](const float(&from)[3], float(&to)[3]) {
     to[0] = from[beam.u];
     to[1] = from[beam.v];
@@ -181,19 +202,14 @@ POINTFLIGHT_INLINE void set_up_frame(const float (&direction)[3],
   beam.shortest = std::sqrt(1.0f + (least_u * least_u + least_v * least_v));
 }
 
-/// True if two beams look along the same axis of the map.
-POINTFLIGHT_INLINE bool look_alike(const ConeBeam& one, const ConeBeam& other) {
-  return one.w == other.w && one.forward == other.forward;
-}
-
 /// Nothing beyond `end` (m) counts any more.
 POINTFLIGHT_INLINE void end_at(float end, ConeBeam& beam) {
   beam.end = end;
   beam.numbers[kDeepest] = end / beam.shortest;
 }
 
-/// The axes of eight beams' cross-sections, turned as their sub-rays are, into `b.beams`; how far
-/// they reach in u and v is noted.
+/// The frames of eight beams and the axes of their cross-sections, turned as their sub-rays are,
+/// into `b.beams`.
 POINTFLIGHT_INLINE void set_up_sections(const WideBeams& wide,
                                         ConeBundle& b,
                                         std::size_t g,
@@ -235,52 +251,56 @@ POINTFLIGHT_INLINE void set_up_sections(const WideBeams& wide,
     const float second[3] = {axes[1][0][i], axes[1][1][i], axes[1][2][i]};
     set_up_frame(direction, first, second, beam);
   }
-  // how far the section reaches in u: |(a - (d.u / d.w) w) . axes| / d.w
-  const auto along = [](const float(&of)[3][8], const float* axis) {
-    return load(of[0]) * splat(axis[0]) + load(of[1]) * splat(axis[1]) +
-           load(of[2]) * splat(axis[2]);
-  };
-  const F8 ahead = dx * splat(b.w[0]) + dy * splat(b.w[1]) + dz * splat(b.w[2]);
-  const F8 per_ahead = splat(1.0f) / ahead;
-  const F8 first_w = along(axes[0], b.w);
-  const F8 second_w = along(axes[1], b.w);
-  const auto reach = [&](const float* axis, const float* at) {
-    const F8 first = along(axes[0], axis) - load(at) * first_w;
-    const F8 second = along(axes[1], axis) - load(at) * second_w;
-    return greatest(sqrt(first * first + second * second) * per_ahead);
-  };
-  b.wide_u = std::max(b.wide_u, kConeRadius * reach(b.u, b.at_u[g]));
-  b.wide_v = std::max(b.wide_v, kConeRadius * reach(b.v, b.at_v[g]));
 }
 
-/// Sets up a bundle of the first `count` groups; `rays[g]` are those of group g.
+/// Sets up a bundle of the first `count` groups; `rays[g]` are those of group g, which look along
+/// one axis of the map. A list has room for `most` surfels.
+///
+/// In the frame of its beams a bundle enters all boxes that hold surfels which the rectangle of
+/// `may_touch` admits: the interval of u / w that a box spans, wider by the beam at its far end, is
+/// what that rectangle asks for of the surfel's own box, and grows with the box. So which surfels a
+/// beam touches does not depend on the beams that it goes with.
 POINTFLIGHT_INLINE void set_up_cones(const KernelMap& map,
                                      const WideBeams& wide,
                                      ConeBundle& b,
                                      std::size_t count,
-                                     const std::uint32_t* const* rays) {
+                                     const std::uint32_t* const* rays,
+                                     std::size_t most) {
   for (std::size_t g = 0; g < count; ++g) {
     for (std::size_t i = 0; i < 8; ++i) hwy::Prefetch(&wide.across[rays[g][i]]);
   }
-  set_up_way(map, b, count);
+  set_up_groups(map, b, count);
+  for (std::size_t g = 0; g < count; ++g) set_up_sections(wide, b, g, rays[g]);
+  const ConeBeam& first = b.beams[0];
+  set_up_frustum(
+      b, Vector3f::Unit(first.u), Vector3f::Unit(first.v), first.forward * Vector3f::Unit(first.w));
+  set_up_way(b);
   b.used = 0;
+  b.most = most;
   b.first_look = kNever;
-  b.wide_u = b.wide_v = 0.0f;
+  float wide_u = 0.0f;
+  float wide_v = 0.0f;
   for (std::size_t g = 0; g < count; ++g) {
-    set_up_sections(wide, b, g, rays[g]);
     store(splat(kNever), b.look_behind[g]);
     for (std::size_t i = 0; i < 8; ++i) {
-      ConeBeam& beam = b.beams[8 * g + i];
+      const std::size_t n = 8 * g + i;
+      ConeBeam& beam = b.beams[n];
+      wide_u = std::max(wide_u, beam.numbers[kWideU]);
+      wide_v = std::max(wide_v, beam.numbers[kWideV]);
       end_at(b.groups[g].end[i], beam);
+      b.groups[g].end[i] = beam.numbers[kDeepest];
       beam.far = 0.0f;
       beam.cover = 0.0f;
       beam.looked = 0;
-      beam.list.count = 0;
+      // one that goes alone is the first, and has all the room
+      beam.list = {0, b.lists + n * (kMostTogether + 8)};
       beam.ray = rays[g][i];
       beam.failed = false;
     }
+    b.group_end[g] = greatest(load(b.groups[g].end));
   }
-  widen(b, b.wide_u, b.wide_v);
+  b.end = greatest(load(b.group_end));
+  widen(b, wide_u, wide_v);
 }
 
 }  // namespace pointflight::HWY_NAMESPACE

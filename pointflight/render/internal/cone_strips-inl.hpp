@@ -21,8 +21,9 @@ inline constexpr std::size_t kFewestForStrips = 32;
 /// Where the surfels of a list lie along one direction across the beam, by their numbers there.
 struct ConeStrips {  // NOLINT(cppcoreguidelines-pro-type-member-init): written before it is read
   float along_u, along_v;  ///< The direction: what to multiply u and v by, sigmas of the beam.
-  alignas(32) float low[kMostSurfels + 8], high[kMostSurfels + 8];
-  ConeList part;  ///< Those of one strip.
+  alignas(32) float low[kMostAlone + 8], high[kMostAlone + 8];
+  float places[kMostAlone + 8];
+  ConeList part;  ///< Those of one strip, at `places`.
 };
 
 /// The direction, of `strip_directions`, along which the depth of what eight sub-rays hit changes
@@ -95,11 +96,10 @@ POINTFLIGHT_INLINE void take_strip(const ConeList& list,
   for (std::size_t i = 0; i < list.count; i += 8) {
     const std::uint32_t in =
         bits((from <= load(strips.high + i)) & (load(strips.low + i) <= to)) & lanes_there(list, i);
-    store_unaligned(permuted(load_unaligned(list.at + i), chosen_lanes(in)),
-                    strips.part.at + count);
+    store_unaligned(permuted(load_unaligned(list.at + i), chosen_lanes(in)), strips.places + count);
     count += static_cast<std::size_t>(std::popcount(in));
   }
-  strips.part.count = count;
+  strips.part = {count, strips.places};
 }
 
 }  // namespace pointflight::HWY_NAMESPACE

@@ -123,7 +123,10 @@ POINTFLIGHT_INLINE void touch_eight(const KernelMap& map,
   const F8 longer = sqrt(mean + sqrt(max(zero, mean * mean - product)));
   const F8 room = splat(kConeRadius) * longer;
   const F8 limit = splat(map.support) + room;
-  const F8 nearest = inverse + number(kWideU) * abs(inverse_u) + number(kWideV) * abs(inverse_v);
+  // in the beam, and within the surfel's box: its plane goes on outside, where a way may have ended
+  const F8 in_beam = inverse + number(kWideU) * abs(inverse_u) + number(kWideV) * abs(inverse_v);
+  const F8 begin = seen_depth - look_up8(leaf.reach[axes.w], lane);
+  const F8 nearest = min(in_beam, one / max(begin, splat(1e-6f)));
   const std::uint32_t there = pairs.count - at >= 8 ? 0xffu : (1u << (pairs.count - at)) - 1u;
   const M8 touched = (m2 < limit * limit) & (one <= nearest * number(kDeepest)) & lanes_of(there);
   // no branch: what touches nothing is written over by the next
@@ -172,7 +175,7 @@ POINTFLIGHT_INLINE void take_touched(const ConePairs& pairs,
   const F8 zero = splat(0.0f);
   beam.cover += sum_whole(select(mine, load_unaligned(pairs.weight + at), zero));
   const float reached = greatest(select(mine, load_unaligned(pairs.reached + at), zero));
-  beam.far = std::max(beam.far, reached * beam.length);
+  beam.far = std::max(beam.far, reached);
 }
 
 }  // namespace pointflight::HWY_NAMESPACE
