@@ -12,14 +12,24 @@ void add_renderer_flags(CLI::App& app, RendererFlags& flags, const std::string& 
   auto* renderer = app.add_option("--renderer", flags.renderer, help);
   renderer->check(CLI::IsMember(renderer_names()));
   if (!flags.renderer.empty()) renderer->capture_default_str();
-  app.add_option(
-      "--gpu", flags.gpu, "Which one renderer gpu takes: its index or a part of its name");
+  app.add_option("--gpu",
+                 flags.gpu,
+                 "Which one renderers on a GPU take: its index or a part of its name; approximate: "
+                 "one with other bits than the processor's will do");
 }
+
+namespace {
+
+bool may_use_gpu(const std::string& renderer) {
+  return renderer == "gpu" || renderer == "gpu-paper" || renderer == "auto";
+}
+
+}  // namespace
 
 void choose_renderer(const RendererFlags& flags) {
   if (flags.gpu.empty()) return;
-  if (!flags.renderer.empty() && flags.renderer != "gpu") {
-    throw InputError("--gpu has no effect without --renderer gpu");
+  if (!flags.renderer.empty() && !may_use_gpu(flags.renderer)) {
+    throw InputError("--gpu has no effect without --renderer gpu, gpu-paper or auto");
   }
   choose_gpu(flags.gpu);
 }
@@ -34,11 +44,11 @@ void RendererPart::prepare(Scenario& scenario, double /*rate*/) {
   for (VehicleSetup& vehicle : scenario.vehicles) {
     for (LidarMount& mount : vehicle.lidars) {
       if (!flags_.renderer.empty()) mount.renderer = flags_.renderer;
-      has_gpu = has_gpu || mount.renderer->name == "gpu";
+      has_gpu = has_gpu || may_use_gpu(mount.renderer->name);
     }
   }
   if (!flags_.gpu.empty() && !has_gpu) {
-    throw InputError("--gpu has no effect: no LiDAR has renderer gpu");
+    throw InputError("--gpu has no effect: no LiDAR has renderer gpu, gpu-paper or auto");
   }
 }
 

@@ -11,16 +11,16 @@
 #include <functional>
 #include <nlohmann/json.hpp>
 
+#include "bench/gpu_batches.hpp"
 #include "bench/tiled_map.hpp"
 #include "pointflight/core/output_file.hpp"
 #include "pointflight/core/random.hpp"
 #include "pointflight/geometry/rotation.hpp"
 #include "pointflight/gpu/gpu_list.hpp"
+#include "pointflight/gpu/gpu_renderer.hpp"
 #include "pointflight/gpu/internal/device_queue.hpp"
 #include "pointflight/gpu/internal/kernel_choice.hpp"
-#include "pointflight/lidar/footprint.hpp"
-#include "pointflight/lidar/return_model.hpp"
-#include "pointflight/lidar/scan_beams.hpp"
+#include "pointflight/lidar/lidar.hpp"
 
 namespace pointflight {
 namespace {
@@ -46,114 +46,6 @@ double median_time(double seconds, int most, const std::function<void()>& action
       times.begin(), times.begin() + static_cast<std::ptrdiff_t>(times.size() / 2), times.end());
   return times[times.size() / 2];
 }
-
-/// Beams that all leave from one pose.
-struct Pattern {
-  std::string name;
-  std::shared_ptr<const SensorBeams> beams;
-  float range_max;
-  std::shared_ptr<const ReturnModel> returns;  ///< Of wide beams; null: they are lines.
-  std::shared_ptr<const Footprint> footprint;
-};
-
-/// "mid360", "mid360+wide" as it is shipped, "64x16".
-Pattern pattern_of(const std::string& name) {
-  const bool is_image = name == "64x16";
-  const std::size_t plus = name.find('+');
-  LidarSettings settings = load_lidar(is_image ? "marsim_grid" : name.substr(0, plus));
-  if (is_image) {
-    settings.grid.columns = 64;
-    settings.grid.rows = 16;
-    settings.range_max = 30.0;
-  }
-  const auto ordered = ScanBeams(settings).of(0, Executor());
-  Pattern pattern{
-      name, ordered->in_sensor, static_cast<float>(settings.range_max), nullptr, nullptr};
-  if (plus == std::string::npos) return pattern;
-  pattern.returns = std::make_shared<const ReturnModel>(settings, Surroundings{});
-  pattern.footprint = std::make_shared<const Footprint>(settings.optics);
-  pattern.range_max = static_cast<float>(pattern.returns->reach());
-  return pattern;
-}
-
-/// As many scans from anywhere in the map, 2.5 to 7 m above its lowest point, tilted up to 11
-/// degrees.
-std::vector<AimedBeams> aims_of(const SurfelMap& map,
-                                const Pattern& pattern,
-                                std::size_t count,
-                                std::uint64_t set) {
-  const RandomStream random(1, StreamId::kTest, 0);
-  const Aabb& box = map.bounds_world();
-  std::vector<AimedBeams> aims;
-  for (std::uint64_t i = 0; i < count; ++i) {
-    const std::uint64_t at = set << 32 | 6 * i;
-    const Pose pose{quaternion_from_rpy(random.uniform(at, -0.2, 0.2),
-                                        random.uniform(at + 1, -0.2, 0.2),
-                                        random.uniform(at + 2, -3.1, 3.1)),
-                    {random.uniform(at + 3, box.min.x(), box.max.x()),
-                     random.uniform(at + 4, box.min.y(), box.max.y()),
-                     box.min.z() + random.uniform(at + 5, 2.5, 7.0)}};
-    aims.push_back(aim_beams(pattern.beams, {&pose, 1}, pattern.range_max));
-  }
-  return aims;
-}
-
-/// Scans of a pattern as jobs, other poses each time.
-class Batch {
- public:
-  static constexpr std::uint64_t kSets = 3;
-
-  Batch(const SurfelMap& map, const Pattern& pattern, std::size_t scans, bool wants_ranges) {
-    const std::size_t beams = pattern.beams->beams.size();
-    rays_ = scans * beams;
-    const bool is_wide = pattern.returns != nullptr;
-    if (is_wide) {
-      echoes_.resize(rays_);
-    } else if (wants_ranges) {
-      ranges_.resize(rays_);
-    } else {
-      hits_.resize(rays_);
-    }
-    for (std::uint64_t set = 0; set < kSets; ++set) {
-      aims_.push_back(aims_of(map, pattern, scans, set));
-      jobs_.emplace_back(scans);
-      for (std::size_t i = 0; i < scans; ++i) {
-        RenderJob& job = jobs_.back()[i];
-        job.batch.aimed = &aims_.back()[i];
-        job.batch.order = pattern.beams->order;
-        if (is_wide) {
-          job.wide = pattern.footprint->beams(
-              {}, *pattern.returns, std::span(echoes_).subspan(i * beams, beams));
-        } else if (wants_ranges) {
-          job.ranges = std::span(ranges_).subspan(i * beams, beams);
-        } else {
-          job.hits = std::span(hits_).subspan(i * beams, beams);
-        }
-      }
-    }
-  }
-  [[nodiscard]] std::span<const RenderJob> next() { return jobs_[number_++ % kSets]; }
-  [[nodiscard]] std::size_t rays() const { return rays_; }
-  /// Of each ray, or of each beam's first echo.
-  [[nodiscard]] std::vector<float> ranges() const {
-    if (echoes_.empty()) return ranges_;
-    std::vector<float> all;
-    for (const Echoes& echoes : echoes_) {
-      all.push_back(echoes.count > 0 ? echoes.all[0].range : -1.0f);
-    }
-    return all;
-  }
-  void start_again() { number_ = 0; }
-
- private:
-  std::vector<std::vector<AimedBeams>> aims_;
-  std::vector<std::vector<RenderJob>> jobs_;
-  std::vector<float> ranges_;
-  std::vector<Hit> hits_;
-  std::vector<Echoes> echoes_;
-  std::size_t rays_ = 0;
-  std::size_t number_ = 0;
-};
 
 struct Options {
   std::string map;
@@ -208,8 +100,50 @@ class Bench {
     }
   }
 
+  /// The paper's two ways, a scan at a time, beside ours: ms, with aims made by the host.
+  void compare_with_paper() {
+    if (map_->surfel_count() > kMostOfPaper) return;
+    const auto paper = make_renderer("paper", Scene{map_});
+    const auto on_gpu = make_gpu_paper_renderer(Scene{map_});
+    const auto ours = make_gpu_renderer(Scene{map_});
+    fmt::print("{:>12} | a scan, ms: {:>8} {:>8} | {:>8} | {:>8} {:>8}\n",
+               "",
+               "paper 1",
+               "paper n",
+               "gpu-paper",
+               "beam n",
+               "gpu");
+    for (const char* name : {"mid360", "marsim_grid"}) {
+      const Lidar lidar(load_lidar(name), 0);
+      const Executor one(1);
+      const Executor all;
+      const double times[] = {time_of_scan(*paper, lidar, one),
+                              time_of_scan(*paper, lidar, all),
+                              time_of_scan(*on_gpu, lidar, all),
+                              time_of_scan(beam_, lidar, all),
+                              time_of_scan(*ours, lidar, all)};
+      fmt::print("{:>12} | {:>11} {:>8.2f} {:>8.2f} | {:>9.2f} | {:>8.2f} {:>8.2f}\n",
+                 name,
+                 "",
+                 1e3 * times[0],
+                 1e3 * times[1],
+                 1e3 * times[2],
+                 1e3 * times[3],
+                 1e3 * times[4]);
+      std::fflush(stdout);
+      rows_.push_back({{"surfels", map_->surfel_count()},
+                       {"pattern", name},
+                       {"paper_1_s", times[0]},
+                       {"paper_all_s", times[1]},
+                       {"gpu_paper_s", times[2]},
+                       {"beam_all_s", times[3]},
+                       {"gpu_s", times[4]}});
+    }
+  }
+
  private:
   static constexpr std::size_t kMostRays = 100'000'000;
+  static constexpr std::size_t kMostOfPaper = 30'000'000;  // surfels: the paper's points take 60 B
 
   /// Rays a second, millions.
   double of_processor(const Pattern& pattern, std::size_t scans, const Executor& executor) {
@@ -284,6 +218,28 @@ class Bench {
                      {"unequal", unequal}});
   }
 
+  /// What one scan of a renderer takes, s: the median, from a few poses.
+  double time_of_scan(const Renderer& renderer, const Lidar& lidar, const Executor& executor) {
+    const Aabb& box = map_->bounds_world();
+    std::vector<Hit> hits;
+    std::uint32_t number = 0;
+    return median_time(options_.seconds, 20, [&] {
+      const RandomStream random(5, StreamId::kTest, number++ % 3);
+      ScanRequest request;
+      request.snapshot = true;
+      const Pose pose{quaternion_from_rpy(0.0, 0.0, random.uniform(0, -3.1, 3.1)),
+                      {random.uniform(1, box.min.x(), box.max.x()),
+                       random.uniform(2, box.min.y(), box.max.y()),
+                       box.min.z() + 3.0}};
+      const auto exposure = lidar.aim(request, PoseTrack(pose), renderer, executor);
+      RenderJob job = exposure->job();
+      hits.resize(job.batch.size());
+      job.hits = hits;
+      job.wide.reset();
+      renderer.render({&job, 1}, executor);
+    });
+  }
+
   const Options& options_;
   std::shared_ptr<const SurfelMap> map_;
   BeamRenderer beam_;
@@ -292,6 +248,7 @@ class Bench {
 };
 
 void run(const Options& options) {
+  if (!options.gpu.empty()) choose_gpu(options.gpu);
   const GpuInfo info = find_gpu(options.gpu);
   const auto device = GpuDevice::open(info);
   const auto kernel = exact_kernel(*device);
@@ -320,6 +277,7 @@ void run(const Options& options) {
     try {
       Bench bench(options, tiled(*base, across, along), json["rows"]);
       for (const Pattern& pattern : patterns) bench.measure(pattern);
+      bench.compare_with_paper();
     } catch (const GpuError& error) {
       fmt::print("{:.1f} M surfels: {}\n", 1e-6 * surfels, error.what());
     }

@@ -5,11 +5,16 @@
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
+#include <algorithm>
 #include <chrono>
 #include <fstream>
+#include <memory>
 
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/core/random.hpp"
+#include "pointflight/render/internal/beam_renderer.hpp"
+#include "pointflight/render/internal/body_renderer.hpp"
+#include "pointflight/render/internal/expanded_job.hpp"
 #include "pointflight/sim/simulation.hpp"
 
 namespace pointflight {
@@ -23,6 +28,40 @@ struct Flags {
   std::vector<int> threads = {1, 2};
   int obstacles = 50;
   double seconds = 5.0;
+  bool without_map = false;  ///< What the map gives back costs nothing.
+};
+
+/// A device that takes no time: beams find something at 8 m. What it leaves to the processor is
+/// what `gpu` leaves: bodies, noise, detection, points.
+class Instant : public Renderer {
+ public:
+  explicit Instant(const Scene& scene) : beam_(scene) {}
+  [[nodiscard]] std::size_t jobs_at_once() const override { return 32; }
+
+ protected:
+  static constexpr float kRange = 8.0f;  // m
+
+  [[nodiscard]] bool makes_rays() const override { return true; }
+  void render_one(const RenderJob& job, const Executor& executor) const override {
+    const ExpandedJob expanded(job, executor);
+    for (Hit& hit : expanded.job().hits) hit = {kRange, 0.7f, 0.0f, kMapLabel, 0};
+    render_bodies(expanded.job().batch, expanded.job().hits, executor);
+    expanded.finish();
+  }
+  void render_wide(const RenderJob& job, const Executor& executor) const override {
+    Echoes one;
+    one.count = 1;
+    one.all_hit = true;
+    one.all[0].range = kRange;
+    one.all[0].reflectivity = 0.3f;
+    one.all[0].parts = 8;
+    one.all[0].origin = {0.7f, 0, 0};
+    std::fill(job.wide->echoes.begin(), job.wide->echoes.end(), one);
+    beam_.finish_cones(job, {}, executor);
+  }
+
+ private:
+  BeamRenderer beam_;
 };
 
 /// Takes everything and keeps nothing.
@@ -48,6 +87,7 @@ Scenario scenario_for(const Flags& flags, const SurfelMap& map, int vehicles) {
     setup.start = p;
     setup.lidars.front().model = flags.lidar;
     if (flags.line) setup.lidars.front().sub_rays = 1;
+    if (flags.without_map) setup.lidars.front().renderer = "instant";
     setup.mission.waypoints = {goal, p};
     s.vehicles.push_back(setup);
   }
@@ -145,7 +185,18 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   app.add_option("--obstacles", flags.obstacles, "Balls that move")->capture_default_str();
   app.add_option("--seconds", flags.seconds, "Flown")->capture_default_str();
+  app.add_flag("--without-map",
+               flags.without_map,
+               "The map is rendered at no cost: what a processor has to do beside a GPU");
   CLI11_PARSE(app, argc, argv);
+  pointflight::RendererKind::table().add({.name = "instant",
+                                          .help = "nothing",
+                                          .make =
+                                              [](const pointflight::Scene& scene) {
+                                                return std::make_unique<pointflight::Instant>(
+                                                    scene);
+                                              },
+                                          .one_pose = false});
   try {
     pointflight::run(flags);
   } catch (const pointflight::InputError& error) {

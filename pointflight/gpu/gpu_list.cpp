@@ -62,11 +62,20 @@ std::string in_words(const std::vector<GpuInfo>& gpus) {
 /// What was chosen, by any thread.
 struct Choice {
   std::mutex mutex;
-  std::string text;
+  GpuChoice gpu;
 };
-Choice& choice() {
+Choice& last_choice() {
   static Choice all;
   return all;
+}
+
+GpuChoice read_choice(const std::string& text) {
+  const std::string approximate = "approximate";
+  if (text == approximate) return {"", true};
+  if (text.ends_with("," + approximate)) {
+    return {text.substr(0, text.size() - approximate.size() - 1), true};
+  }
+  return {text, false};
 }
 
 }  // namespace
@@ -111,15 +120,16 @@ GpuInfo find_gpu(const std::string& index_or_name) {
   throw InputError(fmt::format("no GPU '{}'; there are: {}", index_or_name, in_words(gpus)));
 }
 
-void choose_gpu(const std::string& index_or_name) {
-  find_gpu(index_or_name);
-  const std::lock_guard lock(choice().mutex);
-  choice().text = index_or_name;
+void choose_gpu(const std::string& choice) {
+  const GpuChoice gpu = read_choice(choice);
+  find_gpu(gpu.index_or_name);
+  const std::lock_guard lock(last_choice().mutex);
+  last_choice().gpu = gpu;
 }
 
-std::string chosen_gpu() {
-  const std::lock_guard lock(choice().mutex);
-  return choice().text;
+GpuChoice chosen_gpu() {
+  const std::lock_guard lock(last_choice().mutex);
+  return last_choice().gpu;
 }
 
 }  // namespace pointflight

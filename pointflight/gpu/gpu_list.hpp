@@ -27,9 +27,15 @@ std::vector<GpuInfo> list_gpus();
 /// first. Throws InputError that lists them.
 GpuInfo find_gpu(const std::string& index_or_name);
 
-/// From now on renderers "gpu" that are made use this one, as `find_gpu` finds it.
-void choose_gpu(const std::string& index_or_name);
-/// As it was chosen; "" at first.
-std::string chosen_gpu();
+/// Which one renderers on a GPU use that are made from now on.
+struct GpuChoice {
+  std::string index_or_name;        ///< As `find_gpu` takes it.
+  bool may_be_approximate = false;  ///< One that has not this processor's bits will do.
+};
+/// "INDEX", "NAME", "approximate" or both with a comma between them. Throws InputError if there is
+/// no such device.
+void choose_gpu(const std::string& choice);
+/// What was chosen.
+GpuChoice chosen_gpu();
 
 }  // namespace pointflight

@@ -3,49 +3,23 @@
 #include <fmt/format.h>
 
 #include <atomic>
-#include <mutex>
 #include <optional>
 #include <utility>
 #include <vector>
 
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/gpu/internal/device_queue.hpp"
-#include "pointflight/gpu/internal/kernel_choice.hpp"
+#include "pointflight/gpu/internal/exact_gpu.hpp"
 #include "pointflight/render/internal/beam_renderer.hpp"
 #include "pointflight/render/internal/job_check.hpp"
 
 namespace pointflight {
 namespace {
 
-/// What `take_gpu_notices` gives, by any thread.
-struct Notices {
-  std::mutex mutex;
-  std::vector<std::string> all;
-};
-Notices& notices() {
-  static Notices own;
-  return own;
-}
-
-void add_notice(const std::string& notice) {
-  const std::lock_guard lock(notices().mutex);
-  notices().all.push_back(notice);
-}
-
 std::unique_ptr<DeviceQueue> open_queue(const SurfelMap& map) {
-  const GpuInfo info = find_gpu(chosen_gpu());
-  try {
-    auto device = GpuDevice::open(info);
-    const std::optional<RayKernel> kernel = exact_kernel(*device);
-    if (!kernel) {
-      throw InputError(fmt::format(
-          "{} does not come to this processor's bits by any way of dividing; use --renderer beam",
-          info.name));
-    }
-    return std::make_unique<DeviceQueue>(std::move(device), map, *kernel);
-  } catch (const GpuError& error) {
-    throw InputError(fmt::format("{}; use --renderer beam", error.what()));
-  }
+  return open_on_gpu("beam", [&](ExactGpu gpu) {
+    return std::make_unique<DeviceQueue>(std::move(gpu.device), map, gpu.kernel);
+  });
 }
 
 /// Lines and cones on the device; bodies, sub-rays in given numbers and single rays by `beam` on
@@ -125,7 +99,7 @@ class GpuRenderer : public Renderer {
 
   void lose(const GpuError& error) const {
     if (is_lost_.exchange(true)) return;
-    add_notice(
+    add_gpu_notice(
         fmt::format("{}: from here on the processor renders, to the same bits", error.what()));
   }
 
@@ -148,21 +122,16 @@ std::unique_ptr<Renderer> make_gpu_renderer(const Scene& scene) {
 std::unique_ptr<Renderer> make_automatic_renderer(const Scene& scene) {
   std::optional<GpuInfo> info;
   try {
-    info = find_gpu(chosen_gpu());
+    info = find_gpu(chosen_gpu().index_or_name);
   } catch (const InputError&) {  // NOLINT(bugprone-empty-catch): without one it is the processor
   }
   if (!info || info->is_processor) return std::make_unique<BeamRenderer>(scene);
   try {
     return std::make_unique<GpuRenderer>(scene, kWorthADevice);
   } catch (const InputError& error) {
-    add_notice(fmt::format("renderer auto: the processor renders ({})", error.what()));
+    add_gpu_notice(fmt::format("renderer auto: the processor renders ({})", error.what()));
     return std::make_unique<BeamRenderer>(scene);
   }
-}
-
-std::vector<std::string> take_gpu_notices() {
-  const std::lock_guard lock(notices().mutex);
-  return std::exchange(notices().all, {});
 }
 
 }  // namespace pointflight

@@ -50,8 +50,8 @@ GpuTrial::GpuTrial(const std::string& index_or_name) {
     const std::optional<RayKernel> exact = exact_kernel(*device);
     const RayKernel kernel = exact.value_or(kernels_for(*device).front());
     if (exact) exact_by_ = name_of(*exact);
-    equal_ = count_equal(*device, kernel, kSpeedRays);
     parts_ = std::make_unique<Parts>(device, kernel);
+    equal_ = count_equal(*device, parts_->there, kernel, kSpeedRays);
   });
 }
 

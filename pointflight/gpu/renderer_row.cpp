@@ -13,6 +13,10 @@ void add_gpu_renderer() {
          .help = "gpu where there is one and the batch is worth it, else beam",
          .make = make_automatic_renderer,
          .one_pose = false});
+    RendererKind::table().add({.name = "gpu-paper",
+                               .help = "as paper, to the same bits, on a GPU by Vulkan",
+                               .make = make_gpu_paper_renderer,
+                               .one_pose = true});
     return true;
   }();
   static_cast<void>(once);

@@ -22,15 +22,19 @@ GpuInfo find_gpu(const std::string& /*index_or_name*/) {
   refuse();
 }
 
-void choose_gpu(const std::string& /*index_or_name*/) {
+void choose_gpu(const std::string& /*choice*/) {
   refuse();
 }
 
-std::string chosen_gpu() {
+GpuChoice chosen_gpu() {
   return {};
 }
 
 std::unique_ptr<Renderer> make_gpu_renderer(const Scene& /*scene*/) {
+  refuse();
+}
+
+std::unique_ptr<Renderer> make_gpu_paper_renderer(const Scene& /*scene*/) {
   refuse();
 }
 

@@ -5,6 +5,7 @@
 #include <thread>
 
 #include "pointflight/gpu/gpu_renderer.hpp"
+#include "pointflight/gpu/internal/exact_gpu.hpp"
 #include "pointflight/gpu/internal/kernel_choice.hpp"
 #include "pointflight/gpu/internal/vulkan_functions.hpp"
 #include "pointflight/map/map_file.hpp"
@@ -176,6 +177,47 @@ TEST(GpuFailures, ADeviceThatDoesNotOpen) {
   make_automatic_renderer(Scene{trial_scene()})->render(jobs.all, Executor(1));
   expect_those_of_beam(jobs);
   static_cast<void>(take_gpu_notices());
+}
+
+void dispatches(VkCommandBuffer /*commands*/,
+                std::uint32_t /*x*/,
+                std::uint32_t /*y*/,
+                std::uint32_t /*z*/) {}
+
+TEST(GpuFailures, ADeviceWithOtherBitsIsRefusedUnlessTheyWillDo) {
+  SKIP_WITHOUT_DEVICE();
+  const auto device = GpuDevice::open(find_gpu(""));
+  std::optional<RayKernel> found;
+  {
+    // one that computes nothing
+    const Failing failing(&VulkanFunctions::CmdDispatch, &dispatches, 0);
+    found = find_exact_kernel(*device);
+  }
+  EXPECT_FALSE(found.has_value());
+  const std::string error =
+      error_of([&] { static_cast<void>(kernel_for_use(*device, found, false)); });
+  expect_contains(error, device->info().name);
+  expect_contains(error, "--renderer beam, or --gpu approximate");
+  static_cast<void>(take_gpu_notices());
+  static_cast<void>(kernel_for_use(*device, found, true));
+  const auto notices = take_gpu_notices();
+  ASSERT_EQ(notices.size(), 1u);
+  expect_contains(notices[0], "has not this processor's bits");
+}
+
+TEST(GpuFailures, ChoicesSayWhichOneAndWhetherItMayBeApproximate) {
+  SKIP_WITHOUT_DEVICE();
+  choose_gpu("0,approximate");
+  EXPECT_EQ(chosen_gpu().index_or_name, "0");
+  EXPECT_TRUE(chosen_gpu().may_be_approximate);
+  choose_gpu("approximate");
+  EXPECT_EQ(chosen_gpu().index_or_name, "");
+  EXPECT_TRUE(chosen_gpu().may_be_approximate);
+  expect_contains(error_of([] { choose_gpu("no such card,approximate"); }),
+                  "no GPU 'no such card'");
+  choose_gpu("0");
+  EXPECT_FALSE(chosen_gpu().may_be_approximate);
+  choose_gpu("");
 }
 
 TEST(GpuFailures, ADamagedMapIsRefused) {

@@ -33,11 +33,34 @@ TEST(GpuDevices, OneWayOfDividingHasTheProcessorsBits) {
   const auto device = GpuDevice::open(find_gpu(""));
   const auto kernel = exact_kernel(*device);
   ASSERT_TRUE(kernel.has_value());
-  EXPECT_EQ(count_equal(*device, *kernel, 100000), 100000u);
+  const DeviceMap there(*device, *trial_scene());
+  EXPECT_FALSE(there.is_split());
+  EXPECT_EQ(count_equal(*device, there, *kernel, 100000), 100000u);
   // subgroups that stay, in parts that llvmpipe takes
   if (!device->has_ballots()) return;
   const RayKernel persistent{kernel->exact, true, 8};
-  EXPECT_EQ(count_equal(*device, persistent, 100000), 100000u);
+  EXPECT_EQ(count_equal(*device, there, persistent, 100000), 100000u);
+}
+
+TEST(GpuDevices, MapsInSeveralBuffersHaveTheProcessorsBits) {
+  SKIP_WITHOUT_DEVICE();
+  const auto device = GpuDevice::open(find_gpu(""));
+  const auto kernel = exact_kernel(*device);
+  ASSERT_TRUE(kernel.has_value());
+  const auto map = trial_scene();
+  // not quite as large as the sections, and of no power of two
+  for (const std::uint64_t parts : {2, 4}) {
+    const std::uint64_t largest = map->words().size_bytes() / parts + 1000;
+    const DeviceMap there(*device, *map, largest);
+    SCOPED_TRACE(fmt::format(
+        "{} buffers of nodes, {} of words", there.nodes().size(), there.words().size()));
+    EXPECT_GE(there.words().size(), parts);
+    EXPECT_LE(there.words().size(), kWordParts);
+    EXPECT_EQ(count_equal(*device, there, *kernel, 50000), 50000u);
+    const RayKernel persistent{kernel->exact, device->has_ballots(), 8};
+    EXPECT_EQ(count_equal(*device, there, persistent, 50000), 50000u);
+  }
+  EXPECT_THROW(DeviceMap(*device, *map, 1u << 12), GpuError);
 }
 
 TEST(GpuDevices, TestSaysHowTheyFare) {

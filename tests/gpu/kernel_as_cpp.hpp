@@ -48,6 +48,9 @@ struct KernelAsCpp {
   const uint* codes;
   float list[kMostTouched * kTouchedNumbers];
 
+  [[nodiscard]] uvec4 node_at(uint i) const { return nodes[i]; }
+  [[nodiscard]] uvec2 word_at(uint i) const { return words[i]; }
+
   static float abs(float x) { return std::fabs(x); }
   static float sqrt(float x) { return std::sqrt(x); }
   template <class T>

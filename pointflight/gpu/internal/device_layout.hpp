@@ -7,5 +7,6 @@ namespace pointflight::device {
 
 using uint = std::uint32_t;
 #include "pointflight/gpu/kernel/layout.glsl"
+#include "pointflight/gpu/kernel/paper_layout.glsl"
 
 }  // namespace pointflight::device

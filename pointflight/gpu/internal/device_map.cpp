@@ -1,8 +1,10 @@
-#include <algorithm>
-#include <cmath>
-#include <cstring>
-#include <limits>
+#include <fmt/format.h>
 
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "pointflight/gpu/internal/device_upload.hpp"
 #include "pointflight/gpu/internal/ray_tracer.hpp"
 #include "pointflight/render/internal/beam_kernel.hpp"
 #include "pointflight/render/internal/cone_kernel.hpp"
@@ -10,77 +12,9 @@
 namespace pointflight {
 namespace {
 
-constexpr std::uint64_t kStaging = std::uint64_t{64} << 20;  // bytes
-constexpr std::uint64_t kBeyond = 64;  // bytes behind the words: a leaf may be read as if full
-
-/// Copies bytes to a buffer of the device's own, part by part.
-class Uploader {
- public:
-  explicit Uploader(GpuDevice& device)
-      : device_(device), staging_(device, kStaging, GpuBuffer::Use::kUpload) {
-    const VulkanFunctions& vk = device.vk();
-    VkCommandPoolCreateInfo pool{};
-    pool.sType = VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO;
-    pool.flags = VK_COMMAND_POOL_CREATE_RESET_COMMAND_BUFFER_BIT;
-    pool.queueFamilyIndex = device.queue_family();
-    require_success(vk.CreateCommandPool(device.handle(), &pool, nullptr, &pool_), "upload");
-    VkCommandBufferAllocateInfo commands{};
-    commands.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO;
-    commands.commandPool = pool_;
-    commands.commandBufferCount = 1;
-    VkFenceCreateInfo fence{};
-    fence.sType = VK_STRUCTURE_TYPE_FENCE_CREATE_INFO;
-    const bool has_both =
-        vk.AllocateCommandBuffers(device.handle(), &commands, &commands_) == VK_SUCCESS &&
-        vk.CreateFence(device.handle(), &fence, nullptr, &fence_) == VK_SUCCESS;
-    if (!has_both) {
-      vk.DestroyCommandPool(device.handle(), pool_, nullptr);
-      throw GpuError("upload", VK_ERROR_OUT_OF_HOST_MEMORY);
-    }
-  }
-  ~Uploader() {
-    device_.wait_until_idle();
-    device_.vk().DestroyFence(device_.handle(), fence_, nullptr);
-    device_.vk().DestroyCommandPool(device_.handle(), pool_, nullptr);
-  }
-  Uploader(const Uploader&) = delete;
-  Uploader& operator=(const Uploader&) = delete;
-
-  GpuBuffer made_of(const void* data, std::uint64_t bytes, std::uint64_t beyond) {
-    GpuBuffer buffer(
-        device_, std::max<std::uint64_t>(bytes + beyond, 256), GpuBuffer::Use::kDevice);
-    for (std::uint64_t at = 0; at < bytes; at += kStaging) {
-      const std::uint64_t part = std::min(kStaging, bytes - at);
-      std::memcpy(staging_.as<std::uint8_t>(part).data(),
-                  static_cast<const std::uint8_t*>(data) + at,
-                  part);
-      copy(buffer, at, part);
-    }
-    return buffer;
-  }
-
- private:
-  void copy(const GpuBuffer& to, std::uint64_t at, std::uint64_t bytes) {
-    const VulkanFunctions& vk = device_.vk();
-    VkCommandBufferBeginInfo begin{};
-    begin.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO;
-    begin.flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT;
-    require_success(vk.BeginCommandBuffer(commands_, &begin), "upload");
-    const VkBufferCopy part{0, at, bytes};
-    vk.CmdCopyBuffer(commands_, staging_.handle(), to.handle(), 1, &part);
-    require_success(vk.EndCommandBuffer(commands_), "upload");
-    device_.submit(commands_, fence_);
-    constexpr std::uint64_t kLong = std::numeric_limits<std::uint64_t>::max();
-    require_success(vk.WaitForFences(device_.handle(), 1, &fence_, VK_TRUE, kLong), "upload");
-    require_success(vk.ResetFences(device_.handle(), 1, &fence_), "upload");
-  }
-
-  GpuDevice& device_;
-  GpuBuffer staging_;
-  VkCommandPool pool_ = VK_NULL_HANDLE;
-  VkCommandBuffer commands_ = VK_NULL_HANDLE;
-  VkFence fence_ = VK_NULL_HANDLE;
-};
+constexpr std::uint64_t kBeyond = 64;    // bytes behind the words: a leaf may be read as if full
+constexpr std::uint64_t kNodeItem = 16;  // bytes: kernels read nodes by quarters of 64
+constexpr std::uint64_t kWordItem = sizeof(SurfelWord);
 
 }  // namespace
 
@@ -125,18 +59,67 @@ device::MapNumbers numbers_of(const SurfelMap& map) {
   return n;
 }
 
-DeviceMap::DeviceMap(GpuDevice& device, const SurfelMap& map) {
-  map.verify();
-  const std::uint64_t most = device.info().largest_buffer;
-  if (map.nodes().size_bytes() > most || map.words().size_bytes() + kBeyond > most) {
-    throw GpuError("the map is larger than a buffer of " + device.info().name,
-                   VK_ERROR_OUT_OF_DEVICE_MEMORY);
+namespace {
+
+/// In how many parts of 2^shift items a section goes.
+struct Split {
+  std::uint32_t shift;
+  std::uint64_t part;  ///< Bytes of each but the last.
+  std::uint64_t parts;
+
+  Split(std::uint64_t bytes, std::uint64_t item, std::uint64_t largest_buffer)
+      : shift(static_cast<std::uint32_t>(std::bit_width(largest_buffer / item)) - 1),
+        part(item << shift),
+        parts((bytes + part - 1) / part) {
+    if (bytes <= largest_buffer) {
+      shift = 31;  // no item lies beyond
+      part = bytes;
+      parts = 1;
+    }
   }
-  const device::MapNumbers numbers = numbers_of(map);
-  Uploader upload(device);
+};
+
+/// A section's bytes and so many behind them, in buffers.
+std::vector<GpuBuffer> uploaded(DeviceUpload& upload,
+                                std::span<const std::uint8_t> section,
+                                std::uint64_t beyond,
+                                const Split& split) {
+  std::vector<GpuBuffer> parts;
+  for (std::uint64_t k = 0; k < split.parts; ++k) {
+    const std::uint64_t at = k * split.part;
+    const std::uint64_t end = std::min(section.size() + beyond, at + split.part);
+    const std::uint64_t filled = std::min<std::uint64_t>(section.size(), end);
+    const std::uint64_t bytes = filled > at ? filled - at : 0;
+    parts.push_back(upload.made_of(
+        section.data() + std::min<std::uint64_t>(at, section.size()), bytes, end - at - bytes));
+  }
+  return parts;
+}
+
+}  // namespace
+
+DeviceMap::DeviceMap(GpuDevice& device, const SurfelMap& map, std::uint64_t largest_buffer) {
+  map.verify();
+  const std::span<const std::uint8_t> nodes(
+      reinterpret_cast<const std::uint8_t*>(map.nodes().data()), map.nodes().size_bytes());
+  const std::span<const std::uint8_t> words(
+      reinterpret_cast<const std::uint8_t*>(map.words().data()), map.words().size_bytes());
+  const Split by_nodes(nodes.size(), kNodeItem, largest_buffer);
+  const Split by_words(words.size() + kBeyond, kWordItem, largest_buffer);
+  if (by_nodes.parts > kNodeParts || by_words.parts > kWordParts ||
+      map.intensity_codes().size_bytes() + 4 > largest_buffer) {
+    throw GpuError(
+        fmt::format(
+            "the map is larger than {} buffers of {} may be", kWordParts, device.info().name),
+        VK_ERROR_OUT_OF_DEVICE_MEMORY);
+  }
+  device::MapNumbers numbers = numbers_of(map);
+  numbers.node_shift = by_nodes.shift;
+  numbers.word_shift = by_words.shift;
+  DeviceUpload upload(device);
   numbers_ = upload.made_of(&numbers, sizeof numbers, 0);
-  nodes_ = upload.made_of(map.nodes().data(), map.nodes().size_bytes(), 0);
-  words_ = upload.made_of(map.words().data(), map.words().size_bytes(), kBeyond);
+  nodes_ = uploaded(upload, nodes, 0, by_nodes);
+  words_ = uploaded(upload, words, kBeyond, by_words);
   codes_ = upload.made_of(map.intensity_codes().data(), map.intensity_codes().size_bytes(), 4);
 }
 

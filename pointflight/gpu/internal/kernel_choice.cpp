@@ -230,11 +230,12 @@ std::size_t count_equal_beams(RayTracer& tracer, const KernelMap& map, const Tri
 
 }  // namespace
 
-std::size_t count_equal(GpuDevice& device, const RayKernel& kernel, std::size_t rays) {
+std::size_t count_equal(GpuDevice& device,
+                        const DeviceMap& there,
+                        const RayKernel& kernel,
+                        std::size_t rays) {
   constexpr std::size_t kAims = 8;
-  const auto map = trial_scene();
-  const KernelMap kernel_map = kernel_map_of(*map);
-  const DeviceMap there(device, *map);
+  const KernelMap kernel_map = kernel_map_of(*trial_scene());
   RayTracer tracer(device, there, kernel);
   const std::size_t beams = rays / 4 / kAims;  // lines, and as many wide
   const std::size_t given = rays - 2 * beams * kAims;
@@ -248,20 +249,21 @@ std::size_t count_equal(GpuDevice& device, const RayKernel& kernel, std::size_t 
   return equal + count_equal_beams(tracer, kernel_map, trial) + count_equal_echoes(tracer, trial);
 }
 
+std::optional<RayKernel> find_exact_kernel(GpuDevice& device) {
+  const DeviceMap there(device, *trial_scene());
+  for (const RayKernel& kernel : kernels_for(device)) {
+    if (count_equal(device, there, kernel, kTrialRays) == kTrialRays) return kernel;
+  }
+  return std::nullopt;
+}
+
 std::optional<RayKernel> exact_kernel(GpuDevice& device) {
   static std::mutex mutex;
   static std::map<std::size_t, std::optional<RayKernel>> known;
   const std::lock_guard lock(mutex);
   const auto found = known.find(device.info().index);
   if (found != known.end()) return found->second;
-  std::optional<RayKernel> chosen;
-  for (const RayKernel& kernel : kernels_for(device)) {
-    if (count_equal(device, kernel, kTrialRays) < kTrialRays) continue;
-    chosen = kernel;
-    break;
-  }
-  known[device.info().index] = chosen;
-  return chosen;
+  return known[device.info().index] = find_exact_kernel(device);
 }
 
 std::shared_ptr<const SurfelMap> trial_scene() {

@@ -24,11 +24,17 @@ struct TrialAims {
 TrialAims trial_aims(std::size_t beams, std::size_t aims);
 
 /// How many of so many rays through the trial's room have the processor's bits by a kernel: a
-/// quarter of them are made of beams on the device, and a quarter are wide beams. Throws GpuError.
-std::size_t count_equal(GpuDevice& device, const RayKernel& kernel, std::size_t rays);
+/// quarter of them are made of beams on the device, and a quarter are wide beams. `there` is the
+/// room on the device. Throws GpuError.
+std::size_t count_equal(GpuDevice& device,
+                        const DeviceMap& there,
+                        const RayKernel& kernel,
+                        std::size_t rays);
 
-/// The first of `kernels_for` that has the processor's bits of a scene of its own, as it was found
-/// once in this process; nothing: none has. Throws GpuError.
+/// The first of `kernels_for` that has the processor's bits of the trial's room; nothing: none has.
+/// Throws GpuError.
+std::optional<RayKernel> find_exact_kernel(GpuDevice& device);
+/// The same, as it was found first in this process.
 std::optional<RayKernel> exact_kernel(GpuDevice& device);
 
 }  // namespace pointflight

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "pointflight/gpu/internal/device_layout.hpp"
-#include "pointflight/gpu/internal/gpu_device.hpp"
+#include "pointflight/gpu/internal/kernel_layout.hpp"
 
 namespace pointflight {
 
@@ -44,32 +44,37 @@ enum Binding : std::uint32_t {
   kCodes,
   kLists,
   kMore,
-  kBindings
+  kBindings,
+  // of a map in several buffers alone, from the second of each on
+  kMoreNodes = kBindings,
+  kMoreWords = kMoreNodes + 3,
+  kAllBindings = kMoreWords + 7
 };
+
+/// Buffers that the sections of a map may lie in (kernel/map.glsl).
+///@{
+inline constexpr std::size_t kNodeParts = kMoreWords - kMoreNodes + 1;
+inline constexpr std::size_t kWordParts = kAllBindings - kMoreWords + 1;
+///@}
 
 /// Both kernels, made for a device. They are bound alike.
 class KernelPipelines {
  public:
-  /// The device must outlive it. Throws GpuError.
-  KernelPipelines(GpuDevice& device, const RayKernel& kernel);
+  /// For a map in one buffer a section, or in several. The device must outlive it. Throws GpuError.
+  KernelPipelines(GpuDevice& device, const RayKernel& kernel, bool is_split);
   ~KernelPipelines();
   KernelPipelines(const KernelPipelines&) = delete;
   KernelPipelines& operator=(const KernelPipelines&) = delete;
 
-  [[nodiscard]] VkDescriptorSetLayout set_layout() const { return set_layout_; }
-  [[nodiscard]] VkPipelineLayout layout() const { return layout_; }
+  [[nodiscard]] const KernelLayout& layout() const { return layout_; }
   [[nodiscard]] VkPipeline rays() const { return rays_; }
   [[nodiscard]] VkPipeline wide() const { return wide_; }
 
  private:
-  void make(const RayKernel& kernel);
-  void make_layout();
-  VkPipeline made_of(std::span<const std::uint32_t> code, std::uint32_t most_chunks) const;
   void release() noexcept;
 
   GpuDevice& device_;
-  VkDescriptorSetLayout set_layout_ = VK_NULL_HANDLE;
-  VkPipelineLayout layout_ = VK_NULL_HANDLE;
+  KernelLayout layout_;
   VkPipeline rays_ = VK_NULL_HANDLE;
   VkPipeline wide_ = VK_NULL_HANDLE;
 };

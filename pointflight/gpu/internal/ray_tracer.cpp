@@ -5,6 +5,8 @@
 #include <cstring>
 #include <utility>
 
+#include "pointflight/gpu/internal/device_commands.hpp"
+
 namespace pointflight {
 namespace {
 
@@ -13,30 +15,10 @@ constexpr std::uint64_t kLongest = 20'000'000'000;         // ns that a device m
 constexpr std::uint32_t kEnoughToTell = 1u << 17;          // rays, how fast a device is
 constexpr std::uint64_t kFewest = std::uint64_t{1} << 18;  // bytes of a buffer
 
-void record_barrier(const VulkanFunctions& vk, VkCommandBuffer commands) {
-  VkMemoryBarrier barrier{};
-  barrier.sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER;
-  barrier.srcAccessMask = VK_ACCESS_SHADER_WRITE_BIT | VK_ACCESS_TRANSFER_WRITE_BIT;
-  barrier.dstAccessMask = VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT |
-                          VK_ACCESS_TRANSFER_READ_BIT | VK_ACCESS_HOST_READ_BIT;
-  constexpr VkPipelineStageFlags kStages =
-      VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT | VK_PIPELINE_STAGE_TRANSFER_BIT;
-  vk.CmdPipelineBarrier(commands,
-                        kStages,
-                        kStages | VK_PIPELINE_STAGE_HOST_BIT,
-                        0,
-                        1,
-                        &barrier,
-                        0,
-                        nullptr,
-                        0,
-                        nullptr);
-}
-
 }  // namespace
 
 RayTracer::RayTracer(GpuDevice& device, const DeviceMap& map, const RayKernel& kernel)
-    : device_(device), map_(map), kernel_(kernel), pipelines_(device, kernel) {
+    : device_(device), map_(map), kernel_(kernel), pipelines_(device, kernel, map.is_split()) {
   try {
     make_slots();
   } catch (const GpuError&) {
@@ -63,7 +45,8 @@ void RayTracer::make_slots() {
   const VulkanFunctions& vk = device_.vk();
   VkDevice handle = device_.handle();
   constexpr auto kCount = static_cast<std::uint32_t>(kSlots);
-  const VkDescriptorPoolSize size{VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, kBindings * kCount};
+  const VkDescriptorPoolSize size{VK_DESCRIPTOR_TYPE_STORAGE_BUFFER,
+                                  pipelines_.layout().bindings() * kCount};
   VkDescriptorPoolCreateInfo descriptors{};
   descriptors.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO;
   descriptors.maxSets = kCount;
@@ -86,7 +69,7 @@ void RayTracer::make_slots() {
     set.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO;
     set.descriptorPool = descriptors_;
     set.descriptorSetCount = 1;
-    const VkDescriptorSetLayout layout = pipelines_.set_layout();
+    const VkDescriptorSetLayout layout = pipelines_.layout().set_layout();
     set.pSetLayouts = &layout;
     require_success(vk.AllocateDescriptorSets(handle, &set, &slot.set), "slots");
     VkCommandBufferAllocateInfo commands{};
@@ -130,33 +113,28 @@ void RayTracer::make_room(Slot& slot, const Needs& needs) {
 }
 
 void RayTracer::bind(Slot& slot) {
-  std::array<VkBuffer, kBindings> buffers{};
+  std::array<VkBuffer, kAllBindings> buffers{};
   buffers[kMapNumbers] = map_.numbers().handle();
-  buffers[kNodes] = map_.nodes().handle();
-  buffers[kWords] = map_.words().handle();
+  // sections in fewer buffers than there may be repeat one, which nothing reads
+  const auto part = [](const std::vector<GpuBuffer>& parts, std::size_t k) {
+    return parts[k < parts.size() ? k : 0].handle();
+  };
+  buffers[kNodes] = part(map_.nodes(), 0);
+  buffers[kWords] = part(map_.words(), 0);
+  for (std::size_t k = 1; k < kNodeParts; ++k) buffers[kMoreNodes + k - 1] = part(map_.nodes(), k);
+  for (std::size_t k = 1; k < kWordParts; ++k) buffers[kMoreWords + k - 1] = part(map_.words(), k);
   buffers[kGiven] = slot.given.handle();
   buffers[kResults] = slot.results.handle();
-  buffers[kCounter] = counter_.handle();
   buffers[kBeams] = slot.beams.handle();
   buffers[kTables] = slot.tables.handle();
   buffers[kCodes] = map_.codes().handle();
   buffers[kLists] = lists_.handle();
   buffers[kMore] = slot.more.handle();
-  std::array<VkDescriptorBufferInfo, kBindings> infos{};
-  std::array<VkWriteDescriptorSet, kBindings> writes{};
+  std::array<VkDescriptorBufferInfo, kAllBindings> infos{};
+  for (std::size_t i = 0; i < infos.size(); ++i) infos[i] = {buffers[i], 0, VK_WHOLE_SIZE};
   const auto number = static_cast<std::uint64_t>(&slot - slots_.data());
-  for (std::uint32_t i = 0; i < kBindings; ++i) {
-    infos[i] = {buffers[i], 0, VK_WHOLE_SIZE};
-    // offsets of 256 suit all devices
-    if (i == kCounter) infos[i] = {buffers[i], 256 * number, 256};
-    writes[i].sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET;
-    writes[i].dstSet = slot.set;
-    writes[i].dstBinding = i;
-    writes[i].descriptorCount = 1;
-    writes[i].descriptorType = VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
-    writes[i].pBufferInfo = &infos[i];
-  }
-  device_.vk().UpdateDescriptorSets(device_.handle(), kBindings, writes.data(), 0, nullptr);
+  infos[kCounter] = {counter_.handle(), 256 * number, 256};  // offsets of 256 suit all devices
+  bind_buffers(device_, slot.set, std::span(infos).first(pipelines_.layout().bindings()));
 }
 
 std::span<MapRay> RayTracer::rays(std::size_t slot, std::size_t count) {
@@ -223,7 +201,7 @@ void RayTracer::record(Slot& slot) {
                      is_wide ? pipelines_.wide() : pipelines_.rays());
   vk.CmdBindDescriptorSets(slot.commands,
                            VK_PIPELINE_BIND_POINT_COMPUTE,
-                           pipelines_.layout(),
+                           pipelines_.layout().handle(),
                            0,
                            1,
                            &slot.set,
@@ -249,8 +227,12 @@ void RayTracer::dispatch(const Slot& slot,
                          const device::DeviceCall& call,
                          std::uint32_t groups) const {
   const VulkanFunctions& vk = device_.vk();
-  vk.CmdPushConstants(
-      slot.commands, pipelines_.layout(), VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof call, &call);
+  vk.CmdPushConstants(slot.commands,
+                      pipelines_.layout().handle(),
+                      VK_SHADER_STAGE_COMPUTE_BIT,
+                      0,
+                      sizeof call,
+                      &call);
   vk.CmdDispatch(slot.commands, groups, 1, 1);
 }
 

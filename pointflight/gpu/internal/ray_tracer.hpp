@@ -21,22 +21,27 @@ device::MapNumbers numbers_of(const SurfelMap& map);
 /// A map in a device's memory.
 class DeviceMap {
  public:
-  /// Throws GpuError if it does not fit, InputError if the map is damaged: kernels read what nodes
-  /// say without a look.
-  DeviceMap(GpuDevice& device, const SurfelMap& map);
+  /// In buffers of at most so many bytes; a section may take several. Throws GpuError if it does
+  /// not fit, InputError if the map is damaged: kernels read what nodes say without a look.
+  DeviceMap(GpuDevice& device, const SurfelMap& map, std::uint64_t largest_buffer);
+  /// In the largest that the device has.
+  DeviceMap(GpuDevice& device, const SurfelMap& map)
+      : DeviceMap(device, map, device.info().largest_buffer) {}
 
+  /// True if a section lies in several buffers.
+  [[nodiscard]] bool is_split() const { return nodes_.size() > 1 || words_.size() > 1; }
   /// As kernels bind them.
   ///@{
   [[nodiscard]] const GpuBuffer& numbers() const { return numbers_; }
-  [[nodiscard]] const GpuBuffer& nodes() const { return nodes_; }
-  [[nodiscard]] const GpuBuffer& words() const { return words_; }
-  [[nodiscard]] const GpuBuffer& codes() const {
-    return codes_;
-  }  ///< Of intensities.
-     ///@}
+  [[nodiscard]] const std::vector<GpuBuffer>& nodes() const { return nodes_; }
+  [[nodiscard]] const std::vector<GpuBuffer>& words() const { return words_; }
+  [[nodiscard]] const GpuBuffer& codes() const { return codes_; }
+  ///@}
 
  private:
-  GpuBuffer numbers_, nodes_, words_, codes_;
+  GpuBuffer numbers_;
+  std::vector<GpuBuffer> nodes_, words_;
+  GpuBuffer codes_;  ///< Of intensities.
 };
 
 /// Aims of the same beams that go to a device together.

@@ -9,7 +9,7 @@ void pop_cone() {
     float depth = uintBitsToFloat(entry.x & 0xfffffff8u);
     if (depth > c.look_behind) look();
     if (depth > c.deepest * 1.0001f) continue;
-    uvec2 child = child_in(nodes[5u * entry.y + 1u], entry.x & 7u);
+    uvec2 child = child_in(node_at(5u * entry.y + 1u), entry.x & 7u);
     c.index = child.x;
     c.next = child.y;
   }
@@ -37,11 +37,11 @@ float box_byte(uint low, uint high, uint lane) {
 
 void step_cone_node() {
   uint at = 5u * c.index;
-  uvec4 q0 = nodes[at];
-  uvec4 q1 = nodes[at + 1u];
-  uvec4 q2 = nodes[at + 2u];
-  uvec4 q3 = nodes[at + 3u];
-  uvec4 q4 = nodes[at + 4u];
+  uvec4 q0 = node_at(at);
+  uvec4 q1 = node_at(at + 1u);
+  uvec4 q2 = node_at(at + 2u);
+  uvec4 q3 = node_at(at + 3u);
+  uvec4 q4 = node_at(at + 4u);
   float scale = uintBitsToFloat(q0.w);
   float o_x = uintBitsToFloat(q0.x);
   float o_y = uintBitsToFloat(q0.y);
@@ -92,7 +92,7 @@ void step_cone_node() {
 /// The surfel `word` of a leaf whose corner lies so far from the beam's start, into the list if the
 /// beam touches it.
 void touch(uint word, float corner_x, float corner_y, float corner_z) {
-  uvec2 q = words[word];
+  uvec2 q = word_at(word);
   precise float x = (float(q.x & 1023u) + 0.5f) * map.position_step + corner_x;
   precise float y = (float((q.x >> 10) & 1023u) + 0.5f) * map.position_step + corner_y;
   precise float z = (float((q.x >> 20) & 1023u) + 0.5f) * map.position_step + corner_z;
@@ -190,7 +190,9 @@ void touch(uint word, float corner_x, float corner_y, float corner_z) {
   float longer = root_of(outer);
   precise float space = map.cone_radius * longer;
   precise float limit = map.support + space;
-  precise float nearest = inverse + c.wide_u * abs(inverse_u) + c.wide_v * abs(inverse_v);
+  precise float in_beam = inverse + c.wide_u * abs(inverse_u) + c.wide_v * abs(inverse_v);
+  precise float begin = depth_seen - reach_w;
+  float nearest = min(in_beam, divided(1.0f, max(begin, 1e-6f)));
   precise float limit2 = limit * limit;
   precise float reached = nearest * c.deepest;
   if (!(m2 < limit2 && 1.0f <= reached)) return;
@@ -233,7 +235,7 @@ void touch(uint word, float corner_x, float corner_y, float corner_z) {
 void step_cone_leaf() {
   uint leaf = c.index;
   uint count = c.next;
-  uvec2 header = words[leaf];
+  uvec2 header = word_at(leaf);
   uint leaf_x = header.x & 0xfffffu;
   uint leaf_y = (header.x >> 20) | ((header.y & 0xffu) << 12);
   uint leaf_z = (header.y >> 8) & 0xfffffu;

@@ -29,6 +29,9 @@ struct MapNumbers {
   float depth_steps_per_metre;  // of the window
   float metres_per_depth_step;
   uint has_intensity;
+  // of a map in several buffers: 2^shift items in each
+  uint node_shift;  // uvec4
+  uint word_shift;  // uvec2
 };
 
 /// A ray from a voxel of the map's grid and the rest, m (`GridOrigin`).

@@ -16,15 +16,13 @@ layout(local_size_x = 128) in;
 /// Of rays that a subgroup takes at a time, so many times at most; 0: for as long as there are any.
 layout(constant_id = 0) const uint kMostChunks = 0u;
 
-layout(std430, set = 0, binding = 0) restrict readonly buffer Map { MapNumbers map; };
-layout(std430, set = 0, binding = 1) restrict readonly buffer Nodes { uvec4 nodes[]; };
-layout(std430, set = 0, binding = 2) restrict readonly buffer Words { uvec2 words[]; };
 layout(std430, set = 0, binding = 3) restrict readonly buffer Given { uint given[]; };
 layout(std430, set = 0, binding = 4) restrict writeonly buffer Results { uint results[]; };
 layout(std430, set = 0, binding = 5) restrict buffer Counter { uint taken; };
 layout(std430, set = 0, binding = 6) restrict readonly buffer Beams { DeviceBeam beams[]; };
 layout(push_constant) uniform Call { DeviceCall call; };
 
+#include "map.glsl"
 #include "aim.glsl"
 #include "trace.glsl"
 

@@ -101,7 +101,7 @@ float signed_byte(uint bits) { return float(int(bits) >> 24); }
 
 /// |e0 . d| of a surfel.
 float cosine_of(uint word) {
-  uvec2 w = words[word];
+  uvec2 w = word_at(word);
   NORMAL_ROW(w)
   precise float v = m0x * s.ray.x + m0y * s.ray.y + m0z * s.ray.z;
   precise float cosine = abs(v) * map.thickness[w.x >> 30];
@@ -177,7 +177,7 @@ void pop() {
     s.depth -= 1;
     uvec2 entry = stack[s.depth];
     if (uintBitsToFloat(entry.x & 0xfffffff8u) <= s.end) {
-      take_child(nodes[5u * entry.y + 1u], entry.x & 7u);
+      take_child(node_at(5u * entry.y + 1u), entry.x & 7u);
     }
   }
 }
@@ -243,11 +243,11 @@ void start_way(DeviceRay ray) {
 /// From a node to the nearest of its children that the ray enters.
 void step_node() {
   uint at = 5u * s.index;
-  uvec4 q0 = nodes[at];
-  uvec4 q1 = nodes[at + 1u];
-  uvec4 q2 = nodes[at + 2u];
-  uvec4 q3 = nodes[at + 3u];
-  uvec4 q4 = nodes[at + 4u];
+  uvec4 q0 = node_at(at);
+  uvec4 q1 = node_at(at + 1u);
+  uvec4 q2 = node_at(at + 2u);
+  uvec4 q3 = node_at(at + 3u);
+  uvec4 q4 = node_at(at + 4u);
   bool from_low_x = s.inverse_x >= 0.0f;
   bool from_low_y = s.inverse_y >= 0.0f;
   bool from_low_z = s.inverse_z >= 0.0f;
@@ -351,7 +351,7 @@ bool add_hit(float t, int weight, uint word) {
 void step_leaf() {
   uint leaf = s.index;
   uint count = s.next;
-  uvec2 header = words[leaf];
+  uvec2 header = word_at(leaf);
   uint leaf_x = header.x & 0xfffffu;
   uint leaf_y = (header.x >> 20) | ((header.y & 0xffu) << 12);
   uint leaf_z = (header.y >> 8) & 0xfffffu;
@@ -361,13 +361,13 @@ void step_leaf() {
   // many surfels are passed at a distance
   uint near_by = 0u;
   for (uint i = 0u; i < count; ++i) {
-    if (is_near(words[leaf + 1u + i], corner_x, corner_y, corner_z)) near_by |= 1u << i;
+    if (is_near(word_at(leaf + 1u + i), corner_x, corner_y, corner_z)) near_by |= 1u << i;
   }
   bool any = false;
   while (near_by != 0u) {
     uint word = leaf + 1u + uint(findLSB(near_by));
     near_by &= near_by - 1u;
-    uvec2 w = words[word];
+    uvec2 w = word_at(word);
     precise float x = (float(w.x & 1023u) + 0.5f) * map.position_step + corner_x;
     precise float y = (float((w.x >> 10) & 1023u) + 0.5f) * map.position_step + corner_y;
     precise float z = (float((w.x >> 20) & 1023u) + 0.5f) * map.position_step + corner_z;

@@ -8,9 +8,6 @@
 
 layout(local_size_x = 128) in;
 
-layout(std430, set = 0, binding = 0) restrict readonly buffer Map { MapNumbers map; };
-layout(std430, set = 0, binding = 1) restrict readonly buffer Nodes { uvec4 nodes[]; };
-layout(std430, set = 0, binding = 2) restrict readonly buffer Words { uvec2 words[]; };
 layout(std430, set = 0, binding = 3) restrict readonly buffer Given { uint given[]; };
 layout(std430, set = 0, binding = 4) restrict writeonly buffer Results { WideResult results[]; };
 layout(std430, set = 0, binding = 5) restrict buffer Counter { uint taken; };
@@ -21,6 +18,7 @@ layout(std430, set = 0, binding = 9) restrict buffer Lists { float lists[]; };
 layout(std430, set = 0, binding = 10) restrict writeonly buffer More { uint more[]; };
 layout(push_constant) uniform Call { DeviceCall call; };
 
+#include "map.glsl"
 #include "aim.glsl"
 #include "trace.glsl"
 

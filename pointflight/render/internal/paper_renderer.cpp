@@ -201,7 +201,9 @@ PaperPoints map_as_points(const SurfelMap& map, double gamma_threshold) {
 
 }  // namespace
 
-PaperRenderer::PaperRenderer(const Scene& scene, const PaperOptions& options)
+PaperRenderer::PaperRenderer(const Scene& scene,
+                             const PaperOptions& options,
+                             const MakePainter& make_painter)
     : map_(scene.map), options_(options) {
   require_argument(map_ != nullptr, "PaperRenderer: the scene has no map");
   require_argument(options_.voxel_length > 0.0, "PaperRenderer: a voxel length above 0 is wanted");
@@ -215,66 +217,13 @@ PaperRenderer::PaperRenderer(const Scene& scene, const PaperOptions& options)
                                                  static_cast<std::int64_t>(cell.z())};
         const auto [at, is_new] = index.try_emplace(key, voxels_.size());
         if (is_new) voxels_.push_back({cell * l, {}});
-        Voxel& voxel = voxels_[at->second];
+        PaperVoxel& voxel = voxels_[at->second];
         point.place = (center - voxel.corner_world).cast<float>();
         largest_radius_ = std::max(largest_radius_, static_cast<double>(point.radius));
         voxel.points.add(point);
       });
-  for (Voxel& voxel : voxels_) voxel.points.finish();
-}
-
-void PaperRenderer::draw(const std::vector<std::size_t>& seen,
-                         const Pose& T_sensor_world,
-                         PaperImage& image,
-                         const Executor& executor) const {
-  // Some voxels at a time, so that their points stay in the cache: first every point is projected
-  // once, then bands of rows are filled. Each pixel belongs to one band and each band takes the
-  // points in the same order, so the result depends on no number of threads.
-  const auto threads = static_cast<std::size_t>(executor.threads());
-  const std::size_t bands = threads == 1 ? 1 : 4 * threads;
-  const std::size_t voxels_a_turn = threads == 1 ? 8 : 64 * threads;
-  const Matrix3f turn = T_sensor_world.rotation.toRotationMatrix().cast<float>();
-  struct Projected {
-    std::vector<PaperSplat> splats;
-    int low = 0, high = 0;  // rows, high exclusive
-  };
-  std::vector<Projected> projected(voxels_a_turn);
-  for (std::size_t first = 0; first < seen.size(); first += voxels_a_turn) {
-    const std::size_t count = std::min(voxels_a_turn, seen.size() - first);
-    executor.parallel_for(count, 1, [&](std::size_t i, std::size_t) {
-      const Voxel& voxel = voxels_[seen[first + i]];
-      Projected& own = projected[i];
-      own.splats.clear();
-      const Vector3f corner = (T_sensor_world * voxel.corner_world).cast<float>();
-      paper_project(image, voxel.points, corner, turn, own.splats);
-      own.low = image.rows;
-      own.high = 0;
-      for (const PaperSplat& splat : own.splats) {
-        own.low = std::min(own.low, std::max(0, splat.first_row));
-        own.high = std::max(own.high, std::min(image.rows, splat.last_row + 1));
-      }
-    });
-    // neighbouring voxels fill few rows: those are shared out
-    int low = image.rows;
-    int high = 0;
-    for (std::size_t i = 0; i < count; ++i) {
-      low = std::min(low, projected[i].low);
-      high = std::max(high, projected[i].high);
-    }
-    if (low >= high) continue;
-    const auto rows = static_cast<std::size_t>(high - low);
-    const auto fill_band = [&](std::size_t begin, std::size_t end) {
-      const int row_begin = low + static_cast<int>(begin);
-      const int row_end = low + static_cast<int>(end);
-      for (std::size_t i = 0; i < count; ++i) {
-        const Projected& own = projected[i];
-        if (own.low < row_end && own.high > row_begin) {
-          paper_fill(image, own.splats, row_begin, row_end);
-        }
-      }
-    };
-    executor.parallel_for(rows, (rows + bands - 1) / bands, fill_band);
-  }
+  for (PaperVoxel& voxel : voxels_) voxel.points.finish();
+  painter_ = make_painter ? make_painter(voxels_) : make_processor_painter(voxels_);
 }
 
 PaperPoints PaperRenderer::points_of(const Body& body, SimTime time) const {
@@ -327,7 +276,7 @@ void PaperRenderer::render_one(const RenderJob& job, const Executor& executor) c
   for (std::size_t v = 0; v < voxels_.size(); ++v) {
     if (may_see(image, T_sensor_world * (voxels_[v].corner_world + half), ball)) seen.push_back(v);
   }
-  draw(seen, T_sensor_world, image, executor);
+  painter_->draw(seen, T_sensor_world, image, executor);
   executor.parallel_for(hits.size(), 4096, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       hits[i] = look_up(image, angles.azimuth[i], angles.elevation[i]);

@@ -1,9 +1,12 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
 #include <vector>
 
-#include "pointflight/render/internal/paper_kernel.hpp"
+#include "pointflight/render/internal/paper_painter.hpp"
 #include "pointflight/render/renderer.hpp"
 
 namespace pointflight {
@@ -25,7 +28,14 @@ struct PaperOptions {
 /// IV.E).
 class PaperRenderer : public Renderer {
  public:
-  PaperRenderer(const Scene& scene, const PaperOptions& options);
+  /// Makes what paints images with these voxels' points, which stay where they are.
+  using MakePainter =
+      std::function<std::unique_ptr<PaperPainter>(std::span<const PaperVoxel> voxels)>;
+
+  /// Without `make_painter` the processor paints.
+  PaperRenderer(const Scene& scene,
+                const PaperOptions& options,
+                const MakePainter& make_painter = nullptr);
 
   [[nodiscard]] bool is_snapshot() const override { return true; }
 
@@ -33,16 +43,6 @@ class PaperRenderer : public Renderer {
   void render_one(const RenderJob& job, const Executor& executor) const override;
 
  private:
-  struct Voxel {
-    Vector3d corner_world;
-    PaperPoints points;
-  };
-  /// Points of the voxels that may be seen, batch by batch, into the image.
-  void draw(const std::vector<std::size_t>& seen,
-            const Pose& T_sensor_world,
-            PaperImage& image,
-            const Executor& executor) const;
-
   /// What is drawn of a body at an instant, in its own frame.
   [[nodiscard]] PaperPoints points_of(const Body& body, SimTime time) const;
   /// The batch's bodies in an image of their own, whose intensities are their numbers.
@@ -50,7 +50,8 @@ class PaperRenderer : public Renderer {
 
   std::shared_ptr<const SurfelMap> map_;
   PaperOptions options_;
-  std::vector<Voxel> voxels_;
+  std::vector<PaperVoxel> voxels_;
+  std::unique_ptr<PaperPainter> painter_;
   double largest_radius_ = 0.0;  ///< Of the points, m.
 };
 
