@@ -21,6 +21,7 @@ void add_view_command(CLI::App& app, int& exit_code);
 void add_campaign_command(CLI::App& app, int& exit_code);
 void add_gpu_command(CLI::App& app, int& exit_code);
 void add_study_command(CLI::App& app, int& exit_code);
+void add_world_command(CLI::App& app, int& exit_code);
 
 /// Exit codes that scripts can trust.
 enum ExitCode : int {

@@ -56,6 +56,7 @@ int run(int argc, char** argv) {
   app.require_subcommand(1);
   int exit_code = kDone;
   add_map_command(app, exit_code);
+  add_world_command(app, exit_code);
   add_scenario_command(app, exit_code);
   add_fly_command(app, exit_code);
   add_scan_command(app, exit_code);

@@ -8,8 +8,8 @@
 #include "apps/cli.hpp"
 #include "pointflight/core/parallel.hpp"
 #include "pointflight/core/progress.hpp"
-#include "pointflight/fidelity/exact_scene.hpp"
 #include "pointflight/fidelity/survey_walk.hpp"
+#include "pointflight/scenes/exact_scene.hpp"
 
 namespace pointflight::apps {
 

@@ -11,8 +11,8 @@
 #include <nlohmann/json.hpp>
 
 #include "pointflight/core/random.hpp"
-#include "pointflight/fidelity/exact_scene.hpp"
 #include "pointflight/map/import/map_builder.hpp"
+#include "pointflight/scenes/exact_scene.hpp"
 
 namespace pointflight {
 namespace {

@@ -23,7 +23,8 @@ allowed() {
     vehicle) echo "$ground" ;;
     world) echo "$ground map map/import" ;;
     survey) echo "$ground map map/import map/edit render lidar" ;;
-    fidelity) echo "$ground map render lidar survey" ;;
+    scenes) echo "$ground map/import" ;;
+    fidelity) echo "$ground map render lidar survey scenes" ;;
     sim) echo "$step" ;;
     learn) echo "$step run" ;;
     run) echo "$step" ;;
@@ -41,9 +42,9 @@ allowed() {
   esac
 }
 # room FOLDER: of which floor it is a part
-room() { sed -E 's#/(internal|patterns|controllers|messages)$##; s#/(internal|patterns|controllers|messages)/#/#'; }
+room() { sed -E 's#/(internal|patterns|controllers|messages|parts|worlds)$##; s#/(internal|patterns|controllers|messages|parts|worlds)/#/#'; }
 for folder in $(git ls-files 'pointflight/*.hpp' 'pointflight/*.cpp' | sed -E 's#^pointflight/(.*)/[^/]*$#\1#' | room | sort -u); do
-  for used in $(for part in "" /internal /patterns /controllers /messages; do
+  for used in $(for part in "" /internal /patterns /controllers /messages /parts /worlds; do
                   cat pointflight/"$folder$part"/*.[ch]pp 2>/dev/null
                 done | sed -nE 's#^ *\#include "(pointflight/)?([a-z_0-9/]+)/[^/]*"#\2#p' | room | sort -u); do
     case " $folder $(allowed "$folder") " in

@@ -14,7 +14,7 @@ enum class StreamId : std::uint32_t {
   kImuGyroBias = 3,      ///< index: sample * 3 + axis
   kImuAccelNoise = 4,    ///< index: sample * 3 + axis
   kImuAccelBias = 5,     ///< index: sample * 3 + axis
-  kForest = 6,           ///< layout of the parametric forest; index: draw number
+  kForest = 6,           ///< made-up forests (entity 0) and worlds (1 and up); index: draw number
   kCloudSampling = 7,    ///< points on analytic shapes; entity: shape, index: point
   kMissionSearch = 8,    ///< candidate positions in `scenario new`; index: candidate
   // 9: was blocks of a cloud, now a plain hash
@@ -44,6 +44,7 @@ enum class StreamId : std::uint32_t {
   kLidarBlockage = 33,    ///< entity: vehicle << 8 | lidar, index: second of the run
   kLidarDeskewing = 34,   ///< entity: vehicle << 8 | lidar, index: draw * 6 + component
   kLearning = 35,         ///< free positions; index: draw
+  kPlaces = 36,           ///< of made-up worlds; index: draw
   kTest = 1000,           ///< inputs of tests and benchmarks
 };
 

@@ -7,8 +7,8 @@
 #include "pointflight/core/parallel.hpp"
 #include "pointflight/core/progress.hpp"
 #include "pointflight/fidelity/error_statistics.hpp"
-#include "pointflight/fidelity/exact_scene.hpp"
 #include "pointflight/render/renderer.hpp"
+#include "pointflight/scenes/exact_scene.hpp"
 
 namespace pointflight {
 

@@ -1,7 +1,7 @@
 #pragma once
 
-#include "pointflight/fidelity/scene_tree.hpp"
 #include "pointflight/render/renderer.hpp"
+#include "pointflight/scenes/scene_tree.hpp"
 
 namespace pointflight {
 

@@ -9,8 +9,8 @@
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/core/math.hpp"
 #include "pointflight/core/random.hpp"
-#include "pointflight/fidelity/scene_tree.hpp"
 #include "pointflight/geometry/rotation.hpp"
+#include "pointflight/scenes/scene_tree.hpp"
 
 namespace pointflight {
 namespace {

@@ -4,9 +4,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "pointflight/fidelity/exact_scene.hpp"
-#include "pointflight/fidelity/scene_tree.hpp"
 #include "pointflight/geometry/motion.hpp"
+#include "pointflight/scenes/exact_scene.hpp"
+#include "pointflight/scenes/scene_tree.hpp"
 
 namespace pointflight {
 

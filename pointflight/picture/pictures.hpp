@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -16,6 +17,16 @@ namespace pointflight::picture {
 /// A top and a side view of a map, coloured by height. A ceiling over most of it is left out of the
 /// top view.
 void draw_map(const SurfelMap& map, const std::string& title, const std::string& path);
+
+/// What a picture of a world shows.
+struct WorldPicture {
+  std::shared_ptr<const SurfelMap> map;  ///< Never null.
+  std::string title;                     ///< Above both views.
+  Vector3d from;                         ///< The eye inside, m.
+  Vector3d to;                           ///< What it looks at, m.
+};
+/// Each from outside, without a ceiling over most of it, and from inside.
+void draw_worlds(std::span<const WorldPicture> worlds, const std::string& path);
 
 /// Where a scan was taken.
 struct ScanSetting {

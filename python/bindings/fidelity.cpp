@@ -11,7 +11,7 @@
 
 #include "pointflight/fidelity/scan_comparison.hpp"
 #include "pointflight/fidelity/scene_beams.hpp"
-#include "pointflight/fidelity/scene_tree.hpp"
+#include "pointflight/scenes/scene_tree.hpp"
 #include "python/bindings/arrays.hpp"
 #include "python/bindings/map_object.hpp"
 #include "python/bindings/run_objects.hpp"

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <map>
 
-#include "pointflight/fidelity/exact_scene.hpp"
 #include "pointflight/fidelity/scene_beams.hpp"
+#include "pointflight/scenes/exact_scene.hpp"
 #include "tests/support.hpp"
 
 namespace pointflight {

@@ -4,8 +4,8 @@
 #include <string_view>
 
 #include "pointflight/core/input_error.hpp"
-#include "pointflight/fidelity/exact_scene.hpp"
 #include "pointflight/geometry/internal/shape_tree.hpp"
+#include "pointflight/scenes/exact_scene.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::string_view text(reinterpret_cast<const char*>(data), size);

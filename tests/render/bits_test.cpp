@@ -12,11 +12,11 @@
 #include "pointflight/core/hash.hpp"
 #include "pointflight/core/internal/simd_targets-inl.hpp"
 #include "pointflight/core/random.hpp"
-#include "pointflight/fidelity/exact_scene.hpp"
 #include "pointflight/geometry/shape_scene.hpp"
 #include "pointflight/lidar/beam_pattern.hpp"
 #include "pointflight/map/import/map_builder.hpp"
 #include "pointflight/render/internal/beam_renderer.hpp"
+#include "pointflight/scenes/exact_scene.hpp"
 #include "tests/support.hpp"
 
 namespace pointflight {

@@ -17,6 +17,8 @@ struct ExactScene {
   ShapeScene geometry;                   ///< World, m.
   std::vector<std::string> tags;         ///< Kinds of shapes: "wall", "rod", ...
   std::vector<std::uint16_t> shape_tag;  ///< Of each shape, an index in `tags`.
+  /// Of each shape the number of the thing that it is a part of; empty: not known.
+  std::vector<std::uint32_t> shape_object;
   /// Points of each shape relative to the rest of the cloud; empty: all 1.
   std::vector<float> shape_density;
   std::vector<bool> is_target;  ///< Of each shape: small scenes aim their beams at these.

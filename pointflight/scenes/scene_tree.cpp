@@ -1,4 +1,4 @@
-#include "pointflight/fidelity/scene_tree.hpp"
+#include "pointflight/scenes/scene_tree.hpp"
 
 #include <cmath>
 

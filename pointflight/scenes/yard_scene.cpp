@@ -6,8 +6,8 @@
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/math.hpp"
 #include "pointflight/core/random.hpp"
-#include "pointflight/fidelity/exact_scene.hpp"
-#include "pointflight/fidelity/scene_tree.hpp"
+#include "pointflight/scenes/exact_scene.hpp"
+#include "pointflight/scenes/scene_tree.hpp"
 
 namespace pointflight {
 namespace {

@@ -1,7 +1,7 @@
 // Small cases that show one thing each: renderer behaviour at walls, edges, thin things.
 #include <functional>
 
-#include "pointflight/fidelity/exact_scene.hpp"
+#include "pointflight/scenes/exact_scene.hpp"
 
 namespace pointflight {
 namespace {

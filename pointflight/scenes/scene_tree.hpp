@@ -3,8 +3,8 @@
 #include <optional>
 #include <vector>
 
-#include "pointflight/fidelity/exact_scene.hpp"
 #include "pointflight/geometry/internal/shape_tree.hpp"
+#include "pointflight/scenes/exact_scene.hpp"
 
 namespace pointflight {
 
