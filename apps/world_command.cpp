@@ -145,8 +145,8 @@ void make_world_file(WorldFlags& flags) {
   fmt::print("{}\n", flags.output);
 }
 
-void add_resolution(CLI::App& app, WorldFlags& flags) {
-  app.add_option("--resolution", flags.resolution, "Of maps, m")
+CLI::Option* add_resolution(CLI::App& app, WorldFlags& flags) {
+  return app.add_option("--resolution", flags.resolution, "Of maps, m")
       ->check(within(0.02, 1.0))
       ->capture_default_str();
 }
@@ -167,11 +167,12 @@ void add_world_command(CLI::App& parent, int& /*exit_code*/) {
   auto flags = std::make_shared<WorldFlags>();
   auto* list = app->add_subcommand("list", "All kinds, with their sizes");
   list->add_flag("--json", flags->json, "JSON on stdout");
-  list->add_option("--png", flags->png, "A picture of all, which takes minutes");
-  add_resolution(*list, *flags);
+  auto* png = list->add_option("--png", flags->png, "A picture of all, which takes minutes");
+  add_resolution(*list, *flags)->needs(png);
   list->add_option("--seed", flags->options.seed, "Of the picture's worlds")
       ->check(CLI::NonNegativeNumber)
-      ->capture_default_str();
+      ->capture_default_str()
+      ->needs(png);
   add_force_flag(*list, flags->force);
   list->callback([flags] { print_worlds(*flags); });
   auto* show = app->add_subcommand("show", "The parameters of a kind, and what a seed draws");

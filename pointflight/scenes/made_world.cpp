@@ -67,72 +67,17 @@ ExactScene make_world(const WorldOptions& options) {
   return scene;
 }
 
-const std::vector<SceneClass>& scene_classes() {
-  // reflectivities at 905 nm: round numbers of the ECOSTRESS spectral library's order
-  static const std::vector<SceneClass> all = {{"wall", 0.5, "wall"},
-                                              {"floor", 0.35, "floor"},
-                                              {"ceiling", 0.6, "ceiling"},
-                                              {"ground", 0.25, "earth, ground"},
-                                              {"road", 0.15, "road, route"},
-                                              {"sidewalk", 0.3, "sidewalk, pavement"},
-                                              {"roof", 0.3, "building"},
-                                              {"column", 0.45, "column, pillar"},
-                                              {"beam", 0.4, "ceiling"},
-                                              {"arch", 0.45, "wall"},
-                                              {"vault", 0.5, "ceiling"},
-                                              {"stairs", 0.35, "stairs, steps"},
-                                              {"balustrade", 0.45, "bannister"},
-                                              {"railing", 0.3, "railing, rail"},
-                                              {"window frame", 0.5, "windowpane, window"},
-                                              {"glass", 0.1, "windowpane, window"},
-                                              {"door", 0.4, "door"},
-                                              {"pipe", 0.4, "pipe"},
-                                              {"table", 0.4, "table"},
-                                              {"desk", 0.4, "desk"},
-                                              {"chair", 0.3, "chair"},
-                                              {"swivel chair", 0.1, "swivel chair"},
-                                              {"monitor", 0.05, "monitor"},
-                                              {"shelf", 0.4, "shelf"},
-                                              {"cabinet", 0.4, "cabinet"},
-                                              {"sofa", 0.3, "sofa, couch"},
-                                              {"bed", 0.5, "bed"},
-                                              {"ladder", 0.4, "ladder"},
-                                              {"tree", 0.45, "tree"},
-                                              {"bush", 0.5, "plant"},
-                                              {"log", 0.3, "trunk"},
-                                              {"rock", 0.3, "rock, stone"},
-                                              {"grass", 0.5, "grass"},
-                                              {"car", 0.3, "car, auto"},
-                                              {"truck", 0.4, "truck"},
-                                              {"forklift", 0.3, "forklift"},
-                                              {"person", 0.35, "person"},
-                                              {"pallet", 0.4, "pallet"},
-                                              {"box", 0.45, "box"},
-                                              {"rack", 0.4, "rack"},
-                                              {"scaffold", 0.4, "scaffolding"},
-                                              {"pylon", 0.4, "pylon"},
-                                              {"wire", 0.2, "wire"},
-                                              {"streetlight", 0.35, "streetlight"},
-                                              {"crane", 0.35, "crane"},
-                                              {"girder", 0.35, "girder"},
-                                              {"rebar", 0.2, "rod"},
-                                              {"machine", 0.3, "machine"},
-                                              {"container", 0.3, "container"},
-                                              {"lamp", 0.6, "light"},
-                                              {"sign", 0.8, "signboard, sign"},
-                                              {"water", 0.02, "water"},
-                                              {"bench", 0.4, "bench"},
-                                              {"net", 0.3, "net"},
-                                              {"cable", 0.3, "cable"},
-                                              {"rail", 0.3, "rail"}};
+const std::vector<std::string>& scene_classes() {
+  static const std::vector<std::string> all = {
+      "wall",         "floor",       "ceiling", "ground",  "road",   "sidewalk",   "roof",
+      "column",       "beam",        "arch",    "vault",   "stairs", "balustrade", "railing",
+      "window frame", "glass",       "door",    "pipe",    "table",  "desk",       "chair",
+      "swivel chair", "monitor",     "shelf",   "cabinet", "sofa",   "bed",        "ladder",
+      "tree",         "bush",        "log",     "rock",    "grass",  "car",        "truck",
+      "forklift",     "person",      "pallet",  "box",     "rack",   "scaffold",   "pylon",
+      "wire",         "streetlight", "crane",   "girder",  "rebar",  "machine",    "container",
+      "lamp",         "sign",        "water",   "bench",   "net",    "cable",      "rail"};
   return all;
-}
-
-double reflectivity_of(const std::string& scene_class) {
-  for (const SceneClass& known : scene_classes()) {
-    if (known.name == scene_class) return known.reflectivity;
-  }
-  return 0.3;
 }
 
 }  // namespace pointflight

@@ -76,16 +76,7 @@ WorldValues values_of(const WorldOptions& options);
 /// The scene; `name` is the world's. Throws InputError as above.
 ExactScene make_world(const WorldOptions& options);
 
-/// How much of a class's surface gives back of 905 nm light that falls on it straight, and what the
-/// class is called by the ADE20K data set; 0.3 for classes that have no row.
-struct SceneClass {
-  const char* name;     ///< The tag of its shapes.
-  double reflectivity;  ///< 0 to 1.
-  const char* ade20k;   ///< The name there, or the nearest.
-};
-/// Those that are known.
-const std::vector<SceneClass>& scene_classes();
-/// Of one of them by its name.
-double reflectivity_of(const std::string& scene_class);
+/// What the things in worlds may be: the tags of their surfaces.
+const std::vector<std::string>& scene_classes();
 
 }  // namespace pointflight

@@ -76,8 +76,6 @@ class SceneBuilder {
 
   /// What has been built so far.
   [[nodiscard]] const ExactScene& scene() const { return scene_; }
-  /// The number of the present thing.
-  [[nodiscard]] std::uint32_t object() const { return object_; }
   /// All of it: `free` is where sensors may stand.
   ExactScene finish(const Aabb& free);
 

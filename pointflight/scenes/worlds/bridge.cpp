@@ -26,40 +26,39 @@ double valley(double x, double y) {
          0.2 * math::sin(0.5 * x + 0.2 * y) * math::cos(0.4 * y);
 }
 
-/// A suspension bridge: towers, main cables as parabolas, hangers, girders and cross beams below a
-/// deck with railings.
-Aabb build_bridge(SceneBuilder& to, const WorldValues& values) {
-  to.begin("ground");
-  to.relief({0, 0}, {kBridgeLong, kBridgeWide}, 0.6, valley);
-  // a beam that falls on water gives nothing back but straight from above: it is left out here
-  const double middle = 0.5 * kBridgeWide;
-  const double wide = 8.0;
-  const double low = middle - 0.5 * wide;
-  const double high = middle + 0.5 * wide;
-  add_slab(to, "road", box_of({0, low, kDeck - 0.25}, {kBridgeLong, high, kDeck}));
-  for (const double y : {low + 0.4, high - 0.4}) {
+constexpr double kDeckLow = 0.5 * kBridgeWide - 4.0;  // its edges in y
+constexpr double kDeckHigh = 0.5 * kBridgeWide + 4.0;
+constexpr double kTowerAt = 24.0;  // from either end
+
+/// The deck, girders and bracing below it.
+void add_deck(SceneBuilder& to) {
+  add_slab(to, "road", box_of({0, kDeckLow, kDeck - 0.25}, {kBridgeLong, kDeckHigh, kDeck}));
+  for (const double y : {kDeckLow + 0.4, kDeckHigh - 0.4}) {
     parts::add_girder(to, {5.0, y, kDeck - 1.9}, {kBridgeLong - 5.0, y, kDeck - 1.9}, 1.6);
   }
   for (double x = 8.0; x < kBridgeLong - 7.0; x += 4.0) {
-    parts::add_girder(to, {x, low + 0.4, kDeck - 1.1}, {x, high - 0.4, kDeck - 1.1}, 0.8);
+    parts::add_girder(to, {x, kDeckLow + 0.4, kDeck - 1.1}, {x, kDeckHigh - 0.4, kDeck - 1.1}, 0.8);
     to.begin("girder");
-    to.rod({x, low + 0.4, kDeck - 1.8}, {x + 4.0, high - 0.4, kDeck - 1.8}, 0.06);
-    to.rod({x, high - 0.4, kDeck - 1.8}, {x + 4.0, low + 0.4, kDeck - 1.8}, 0.06);
+    to.rod({x, kDeckLow + 0.4, kDeck - 1.8}, {x + 4.0, kDeckHigh - 0.4, kDeck - 1.8}, 0.06);
+    to.rod({x, kDeckHigh - 0.4, kDeck - 1.8}, {x + 4.0, kDeckLow + 0.4, kDeck - 1.8}, 0.06);
   }
-  const double tower = values["tower"];
-  const double x0 = 24.0;
-  const double x1 = kBridgeLong - x0;
+}
+
+/// Towers, main cables as parabolas, hangers, railings.
+void add_suspension(SceneBuilder& to, double tower, double hangers) {
+  const double x0 = kTowerAt;
+  const double x1 = kBridgeLong - kTowerAt;
   for (const double x : {x0, x1}) {
     to.begin("column");
-    for (const double y : {low - 0.6, high + 0.6}) {
+    for (const double y : {kDeckLow - 0.6, kDeckHigh + 0.6}) {
       to.box({x - 0.7, y - 0.6, -2.0}, {x + 0.7, y + 0.6, kDeck + tower});
     }
     for (const double z : {kDeck - 2.6, kDeck + 0.55 * tower, kDeck + tower - 0.8}) {
-      to.box({x - 0.5, low, z}, {x + 0.5, high, z + 0.8});
+      to.box({x - 0.5, kDeckLow, z}, {x + 0.5, kDeckHigh, z + 0.8});
     }
-    to.box({x - 2.0, low - 2.0, -2.0}, {x + 2.0, high + 2.0, 1.0});
+    to.box({x - 2.0, kDeckLow - 2.0, -2.0}, {x + 2.0, kDeckHigh + 2.0, 1.0});
   }
-  for (const double y : {low - 0.2, high + 0.2}) {
+  for (const double y : {kDeckLow - 0.2, kDeckHigh + 0.2}) {
     const double span = x1 - x0;
     const auto cable = [&](double x) {
       const double share = (x - x0) / span;
@@ -74,11 +73,16 @@ Aabb build_bridge(SceneBuilder& to, const WorldValues& values) {
     }
     to.rod({x0, y, kDeck + tower}, {2.0, y, kDeck}, 0.12);
     to.rod({x1, y, kDeck + tower}, {kBridgeLong - 2.0, y, kDeck}, 0.12);
-    for (double x = x0 + values["hangers"]; x < x1 - 0.5; x += values["hangers"]) {
+    for (double x = x0 + hangers; x < x1 - 0.5; x += hangers) {
       to.rod({x, y, kDeck}, {x, y, cable(x)}, 0.02);
     }
     parts::add_railing(to, {0.5, y, kDeck}, {kBridgeLong - 0.5, y, kDeck}, 1.1);
   }
+}
+
+/// Cars on the deck, trees on the banks, rocks in the bed.
+void add_bridge_things(SceneBuilder& to) {
+  const double middle = 0.5 * kBridgeWide;
   for (int i = 0; i < 4; ++i) {
     const double x = to.between(8.0, 92.0);
     const bool is_there = to.chance(0.5);
@@ -105,6 +109,16 @@ Aabb build_bridge(SceneBuilder& to, const WorldValues& values) {
     const auto placed = to.at({x, y, valley(x, y)});
     parts::add_rock(to, to.between(0.3, 1.0));
   }
+}
+
+/// A suspension bridge over a river bed. A beam that falls on water gives nothing back but straight
+/// from above: water is left out here.
+Aabb build_bridge(SceneBuilder& to, const WorldValues& values) {
+  to.begin("ground");
+  to.relief({0, 0}, {kBridgeLong, kBridgeWide}, 0.6, valley);
+  add_deck(to);
+  add_suspension(to, values["tower"], values["hangers"]);
+  add_bridge_things(to);
   return box_of({6, 2, 2.0}, {kBridgeLong - 6, kBridgeWide - 2, 18.0});
 }
 

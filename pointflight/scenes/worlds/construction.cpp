@@ -12,6 +12,7 @@ namespace {
 
 /// Bars that stand out of a column or a slab's edge.
 void add_rebar(SceneBuilder& to, const Vector3d& foot, double height) {
+  to.begin("rebar");
   for (const double x : {-0.15, 0.15}) {
     for (const double y : {-0.15, 0.0, 0.15}) {
       to.rod(foot + Vector3d(x, y, 0), foot + Vector3d(x, y, height), 0.008);
@@ -41,63 +42,64 @@ void add_net(SceneBuilder& to, double length, double height) {
   for (double z = 0.0; z <= height; z += 0.12) to.rod({0, 0, z}, {0, length, z}, 0.0025);
 }
 
-Aabb build_construction(SceneBuilder& to, const WorldValues& values) {
-  to.begin("ground");
-  to.relief({-12, -12}, {38, 30}, 0.5, [](double x, double y) {
-    return -0.15 + 0.08 * math::sin(0.7 * x) * math::cos(0.6 * y) +
-           0.04 * math::sin(2.1 * x + 1.4 * y);
-  });
-  const int floors = values.count("floors");
-  constexpr double kFloor = 3.4;  // m
-  constexpr double kLong = 24.0;
-  constexpr double kDeep = 14.0;
+constexpr double kShellFloor = 3.4;  // m, floor to floor
+constexpr double kShellLong = 24.0;
+constexpr double kShellDeep = 14.0;
+
+/// Slabs, columns, stairs and railings; the top storey is half done, bars stand out of it.
+void add_skeleton(SceneBuilder& to, int floors) {
   const Aabb shaft = box_of({10, 5.5, 0}, {13, 8.5, 0});
   for (int level = 0; level <= floors; ++level) {
-    const double z = kFloor * level;
-    // the top storey is half done
-    const double until = level == floors ? 14.0 : kLong;
-    add_slab(to, "floor", box_of({0, 0, z - 0.25}, {until, kDeep, z}), level > 0 ? shaft : Aabb{});
+    const double z = kShellFloor * level;
+    const double until = level == floors ? 14.0 : kShellLong;
+    add_slab(
+        to, "floor", box_of({0, 0, z - 0.25}, {until, kShellDeep, z}), level > 0 ? shaft : Aabb{});
     for (double x = 0.4; x < until; x += 5.8) {
-      for (double y = 0.4; y < kDeep; y += 6.6) {
+      for (double y = 0.4; y < kShellDeep; y += 6.6) {
         if (level < floors && (level + 1 < floors || x < 14.0)) {
           to.begin("column");
-          to.box({x - 0.2, y - 0.2, z}, {x + 0.2, y + 0.2, z + kFloor - 0.25});
+          to.box({x - 0.2, y - 0.2, z}, {x + 0.2, y + 0.2, z + kShellFloor - 0.25});
         } else {
-          to.begin("rebar");
           add_rebar(to, {x, y, z}, 0.9);
         }
       }
     }
-    if (level < floors) {
+    if (level + 1 < floors) {
       const auto placed = to.at({10.0, 5.6, z});
-      if (level + 1 < floors) parts::add_stairs(to, 1.2, kFloor, 0.15);
+      parts::add_stairs(to, 1.2, kShellFloor, 0.15);
     }
     if (level > 0) {
       parts::add_railing(to, {0.1, 0.1, z}, {until, 0.1, z});
-      parts::add_railing(to, {0.1, kDeep - 0.1, z}, {until, kDeep - 0.1, z});
+      parts::add_railing(to, {0.1, kShellDeep - 0.1, z}, {until, kShellDeep - 0.1, z});
     }
   }
-  add_bar_mat(to, {14.2, 0.5, kFloor * floors + 0.1}, 6.0, 12.0);
+}
+
+/// Scaffold, net, bars on the top slab and a crane beside it.
+void add_works(SceneBuilder& to, int floors, double crane) {
+  add_bar_mat(to, {14.2, 0.5, kShellFloor * floors + 0.1}, 6.0, 12.0);
   {
-    const auto placed = to.at({-0.3, 0.0, -0.1}, 0.0);
-    const auto turned = to.at({-1.0, 0.0, 0.0});
+    const auto placed = to.at({-1.3, 0.0, -0.1});
     parts::add_scaffold(to, 5, floors);
   }
   {
-    const auto placed = to.at({0.0, kDeep + 0.3, -0.1}, 0.5 * kPi);
-    const auto mirrored = to.at({0.0, -kLong, 0.0});
+    const auto placed = to.at({0.0, kShellDeep + 0.3, -0.1}, 0.5 * kPi);
+    const auto mirrored = to.at({0.0, -kShellLong, 0.0});
     parts::add_scaffold(to, 9, floors);
   }
   {
-    const auto placed = to.at({kLong + 0.4, 1.0, 0.0});
-    add_net(to, 12.0, kFloor * (floors - 1));
+    const auto placed = to.at({kShellLong + 0.4, 1.0, 0.0});
+    add_net(to, 12.0, kShellFloor * (floors - 1));
   }
   {
     const double turn = to.between(-kPi, kPi);
     const auto placed = to.at({30.0, 22.0, -0.1}, turn);
-    parts::add_tower_crane(to, values["crane"], 24.0);
+    parts::add_tower_crane(to, crane, 24.0);
   }
-  // containers, stacks, machines, people
+}
+
+/// Containers, stacks, a lorry, people, a ladder.
+void add_site_things(SceneBuilder& to, int floors) {
   for (int i = 0; i < 3; ++i) {
     const double turn = to.between(-0.1, 0.1);
     const auto placed = to.at({-8.0, -6.0 + 8.0 * i, -0.05}, turn);
@@ -118,13 +120,25 @@ Aabb build_construction(SceneBuilder& to, const WorldValues& values) {
     const double x = to.between(1.0, 12.0);
     const double y = to.between(1.0, 5.0);
     const int level = to.whole(0, floors);
-    const auto placed = to.at({x, y, kFloor * level}, to.between(-kPi, kPi));
+    const auto placed = to.at({x, y, kShellFloor * level}, to.between(-kPi, kPi));
     parts::add_person(to);
   }
   {
     const auto placed = to.at({20.0, -1.0, -0.1}, 0.5 * kPi);
     parts::add_ladder(to, 3.8, 0.9);
   }
+}
+
+Aabb build_construction(SceneBuilder& to, const WorldValues& values) {
+  to.begin("ground");
+  to.relief({-12, -12}, {38, 30}, 0.5, [](double x, double y) {
+    return -0.15 + 0.08 * math::sin(0.7 * x) * math::cos(0.6 * y) +
+           0.04 * math::sin(2.1 * x + 1.4 * y);
+  });
+  const int floors = values.count("floors");
+  add_skeleton(to, floors);
+  add_works(to, floors, values["crane"]);
+  add_site_things(to, floors);
   return box_of({-11, -11, 0.8}, {37, 29, 12.0});
 }
 

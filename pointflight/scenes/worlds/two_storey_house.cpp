@@ -78,6 +78,49 @@ void furnish_house(SceneBuilder& to) {
   }
 }
 
+/// A gabled roof and a chimney.
+void add_house_roof(SceneBuilder& to, double ridge) {
+  const double eaves = 2 * kHouseStorey;
+  to.begin("roof");
+  const double middle = 0.5 * kHouseX;
+  for (const double side : {-1.0, 1.0}) {
+    const double end = middle + side * (middle + 0.6);
+    to.profile({{end, eaves - 0.1},
+                {middle, eaves + ridge},
+                {middle, eaves + ridge - 0.25},
+                {end, eaves - 0.35}},
+               -0.6,
+               kHouseY + 0.6);
+  }
+  for (const double y : {0.0, kHouseY}) {
+    to.triangle({0, y, eaves}, {kHouseX, y, eaves}, {0.5 * kHouseX, y, eaves + ridge - 0.25});
+  }
+  to.box({8.5, 4.0, eaves}, {9.2, 4.7, eaves + ridge + 0.6});
+}
+
+/// Trees, a hedge, a fence, a car.
+void add_garden(SceneBuilder& to, int trees) {
+  for (int i = 0; i < trees; ++i) {
+    const bool is_behind = to.chance(0.5);
+    const double x = to.between(-7.0, 19.0);
+    const double y = is_behind ? to.between(12.5, 16.0) : to.between(-7.5, -4.5);
+    parts::Tree tree;
+    tree.height = to.between(4.0, 7.0);
+    tree.trunk = 0.12;
+    tree.crown = to.between(1.2, 2.0);
+    tree.leaves = 900;
+    const auto placed = to.at({x, y, -0.1});
+    parts::add_broadleaf(to, tree);
+  }
+  for (int i = 0; i < 14; ++i) {
+    const auto placed = to.at({-8.0 + 2.1 * i, 17.2, -0.1});
+    parts::add_bush(to, 0.8, 250);
+  }
+  parts::add_railing(to, {-8.5, -8.5, -0.1}, {20.5, -8.5, -0.1}, 1.1);
+  const auto placed = to.at({16.5, -3.0, -0.05}, 0.5 * kPi);
+  parts::add_car(to, parts::CarBody::kHatchback);
+}
+
 Aabb build_two_storey_house(SceneBuilder& to, const WorldValues& values) {
   to.begin("ground");
   to.relief({-9, -9}, {21, 18}, 0.5, [](double x, double y) {
@@ -109,45 +152,8 @@ Aabb build_two_storey_house(SceneBuilder& to, const WorldValues& values) {
                      {hole.max.x(), hole.max.y(), kHouseStorey},
                      0.9);
   furnish_house(to);
-  // a gabled roof and a chimney
-  const double eaves = 2 * kHouseStorey;
-  const double ridge = values["ridge"];
-  to.begin("roof");
-  const double middle = 0.5 * kHouseX;
-  for (const double side : {-1.0, 1.0}) {
-    const double end = middle + side * (middle + 0.6);
-    to.profile({{end, eaves - 0.1},
-                {middle, eaves + ridge},
-                {middle, eaves + ridge - 0.25},
-                {end, eaves - 0.35}},
-               -0.6,
-               kHouseY + 0.6);
-  }
-  for (const double y : {0.0, kHouseY}) {
-    to.triangle({0, y, eaves}, {kHouseX, y, eaves}, {0.5 * kHouseX, y, eaves + ridge - 0.25});
-  }
-  to.box({8.5, 4.0, eaves}, {9.2, 4.7, eaves + ridge + 0.6});
-  // the garden
-  const int trees = values.count("trees");
-  for (int i = 0; i < trees; ++i) {
-    const bool is_behind = to.chance(0.5);
-    const double x = to.between(-7.0, 19.0);
-    const double y = is_behind ? to.between(12.5, 16.0) : to.between(-7.5, -4.5);
-    parts::Tree tree;
-    tree.height = to.between(4.0, 7.0);
-    tree.trunk = 0.12;
-    tree.crown = to.between(1.2, 2.0);
-    tree.leaves = 900;
-    const auto placed = to.at({x, y, -0.1});
-    parts::add_broadleaf(to, tree);
-  }
-  for (int i = 0; i < 14; ++i) {
-    const auto placed = to.at({-8.0 + 2.1 * i, 17.2, -0.1});
-    parts::add_bush(to, 0.8, 250);
-  }
-  parts::add_railing(to, {-8.5, -8.5, -0.1}, {20.5, -8.5, -0.1}, 1.1);
-  const auto placed = to.at({16.5, -3.0, -0.05}, 0.5 * kPi);
-  parts::add_car(to, parts::CarBody::kHatchback);
+  add_house_roof(to, values["ridge"]);
+  add_garden(to, values.count("trees"));
   return box_of({-8, -8, 0.6}, {20, 17, 5.2});
 }
 
