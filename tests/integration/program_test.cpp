@@ -38,7 +38,7 @@ TEST_F(Program, HelpAndVersionEverywhere) {
 }
 
 TEST_F(Program, WrongFlagsAreWrongInput) {
-  expect_user_error(run(""), "a command is missing, one of: map, scenario, fly");
+  expect_user_error(run(""), "a command is missing, one of: map, world, scenario, fly");
   expect_user_error(run("fly"), "scenario is required");
   expect_user_error(run("fly x.yaml -o /tmp/x --rate fast"), "--rate: 'fast'");
   expect_user_error(run(fmt::format("map import {} -o /tmp/x --resolution -1", cloud())),
