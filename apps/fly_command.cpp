@@ -13,6 +13,7 @@
 #include "apps/flags.hpp"
 #include "apps/fly_links.hpp"
 #include "apps/input_kind.hpp"
+#include "apps/named_map.hpp"
 #include "apps/policy_flags.hpp"
 #include "apps/renderer_flags.hpp"
 #include "apps/ros_flags.hpp"
@@ -34,6 +35,7 @@ namespace pointflight::apps {
 namespace {
 
 namespace fs = std::filesystem;
+using MapPointer = std::shared_ptr<const SurfelMap>;
 
 struct FlyFlags {
   std::string input;
@@ -72,20 +74,21 @@ double parse_rate(const std::string& text) {
 
 std::vector<Vector3d> waypoints_from(const std::vector<std::string>& words) {
   std::vector<Vector3d> waypoints;
-  waypoints.reserve(words.size());
   for (const std::string& word : words) {
     waypoints.emplace_back(parse_numbers(word, 3, "--mission", "x,y,z x,y,z ... in metres").data());
   }
   return waypoints;
 }
 
-/// A scenario made up for a map.
+/// A scenario made up for a map, which is opened.
 Scenario scenario_for_map(const FlyFlags& flags,
+                          MapPointer& map,
                           const std::optional<Aabb>& bounds,
                           const Executor& executor) {
   ScenarioRequest wish;
-  wish.map_path = flags.input;
-  wish.map_key = flags.input;
+  wish.map = map = open_named_map(flags.input);
+  wish.world = world_in(flags.input);
+  if (!wish.world) wish.map_key = flags.input;
   if (!flags.lidar.empty()) wish.lidar = flags.lidar;
   if (!flags.vehicle.empty()) wish.vehicle = flags.vehicle;
   if (!flags.start.empty()) wish.start = Vector3d(flags.start.data());
@@ -96,7 +99,6 @@ Scenario scenario_for_map(const FlyFlags& flags,
   MadeScenario made = make_scenario(wish, executor);
   for (const std::string& note : made.notes) log("note: " + note);
   Scenario scenario = std::move(made.scenario);
-  scenario.path.clear();
   if (!wish.mission) scenario.vehicles.front().mission.waypoints.clear();
   return scenario;
 }
@@ -115,20 +117,24 @@ Scenario scenario_from_file(const FlyFlags& flags) {
     vehicle.lidars.resize(1);  // where the first one sits
     vehicle.lidars.front().model = from_here(flags.lidar);
   }
-  if (!flags.map.empty()) scenario.map = fs::absolute(flags.map).string();
+  if (!flags.map.empty()) {
+    scenario.map = fs::absolute(flags.map).string();
+    scenario.world.reset();
+  }
   return scenario;
 }
 
-Scenario load_input(const FlyFlags& flags, const Executor& executor) {
+/// What to fly; `map` is set if it had to be opened for that.
+Scenario load_input(const FlyFlags& flags, MapPointer& map, const Executor& executor) {
   std::optional<Aabb> bounds;
   if (!flags.start_in.empty()) bounds = box_from(flags.start_in, "--start-in");
   const auto waypoints = waypoints_from(flags.mission);
-  const bool is_map = fs::path(flags.input).extension() == ".pfmap";
+  const bool is_map = fs::path(flags.input).extension() == ".pfmap" || world_in(flags.input);
   if (is_map && !flags.map.empty()) {
     throw InputError(fmt::format("--map: is for a scenario; {} is a map itself", flags.input));
   }
   Scenario scenario =
-      is_map ? scenario_for_map(flags, bounds, executor) : scenario_from_file(flags);
+      is_map ? scenario_for_map(flags, map, bounds, executor) : scenario_from_file(flags);
   if (!waypoints.empty()) {
     scenario.vehicles.front().mission.waypoints = waypoints;
     scenario.vehicles.front().commands.clear();
@@ -300,12 +306,13 @@ int fly(const FlyFlags& flags) {
   const Executor executor(flags.threads);
   auto parts = parts_of(flags, executor.threads());
   for (const auto& part : parts) part->check();
-  Scenario scenario = load_input(flags, executor);
+  MapPointer map;
+  Scenario scenario = load_input(flags, map, executor);
   const bool is_live =
       std::any_of(parts.begin(), parts.end(), [&](auto& part) { return part->is_live(scenario); });
   if (flags.rate.empty()) options.rate = is_live ? 1.0 : 0.0;
   for (const auto& part : parts) part->prepare(scenario, options.rate);
-  const auto map = scenario.open_map();
+  if (!map) map = open_map_of(scenario);
   Simulation simulation(scenario, map, executor);
   say_warnings(simulation, executor);
 
@@ -328,7 +335,9 @@ int fly(const FlyFlags& flags) {
 void add_fly_command(CLI::App& parent, int& exit_code) {
   auto* app = parent.add_subcommand("fly", "Fly a scenario, or a map with a generated scenario");
   auto flags = std::make_shared<FlyFlags>();
-  app->add_option("scenario", flags->input, "A scenario .yaml, or a .pfmap")->required();
+  app->add_option(
+         "scenario", flags->input, "A scenario .yaml, a .pfmap, or a made-up world: street:7")
+      ->required();
   app->add_option(
       "-o,--output", flags->output, "Folder for the results; needed without ROS and --view");
   app->add_option("--seed", flags->seed, "Seed of everything random, instead of the scenario's")

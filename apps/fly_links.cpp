@@ -98,7 +98,9 @@ void FolderLink::write_timing() const {
   json["real_time_factor"] = cost.real_time_factor;
   json["cost"] = json_of(cost);
   json["threads"] = threads_;
-  json["map"] = fs::weakly_canonical(resolve_path(scenario.map, scenario.folder())).string();
+  json["map"] = scenario.world
+                    ? scenario.map_name()
+                    : fs::weakly_canonical(resolve_path(scenario.map, scenario.folder())).string();
   json["command_line"] = command_line();
   OutputFile file(timing_path_);
   file.write(json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");

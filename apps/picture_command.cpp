@@ -13,6 +13,7 @@
 #include "apps/commands.hpp"
 #include "apps/flags.hpp"
 #include "apps/input_kind.hpp"
+#include "apps/named_map.hpp"
 #include "apps/terminal.hpp"
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/core/owned_files.hpp"
@@ -53,8 +54,11 @@ std::shared_ptr<const SurfelMap> map_of(const PictureFlags& flags,
     throw InputError(fmt::format("{}: is missing; give the map of the flight with --map",
                                  (fs::path(flags.run) / "scenario.yaml").string()));
   }
-  if (!flags.map.empty()) scenario->map = fs::absolute(flags.map).string();
-  return scenario->open_map();
+  if (!flags.map.empty()) {
+    scenario->map = fs::absolute(flags.map).string();
+    scenario->world.reset();
+  }
+  return open_map_of(*scenario);
 }
 
 /// A folder that goes with its pictures, among the system's temporary ones.

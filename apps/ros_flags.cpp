@@ -207,8 +207,8 @@ std::unique_ptr<RosLink> make_ros_link(const RosFlags& flags,
   RosProfile profile = profile_for(scenario, flags.profile);
   if (flags.has_ros()) warn_of_small_inflation(simulation, profile);
   const SurfelMap& map = simulation.map();
-  if (const auto note =
-          note_of(map_frame_for(map.bounds_world(), profile), profile, simulation.scenario().map)) {
+  if (const auto note = note_of(
+          map_frame_for(map.bounds_world(), profile), profile, simulation.scenario().map_name())) {
     log(*note);
   }
   if (flags.sim_time) add_clock(profile);

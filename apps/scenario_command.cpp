@@ -11,6 +11,7 @@
 #include "apps/commands.hpp"
 #include "apps/flags.hpp"
 #include "apps/input_kind.hpp"
+#include "apps/named_map.hpp"
 #include "apps/settings_json.hpp"
 #include "apps/terminal.hpp"
 #include "pointflight/core/input_error.hpp"
@@ -45,8 +46,9 @@ void new_scenario(const NewFlags& flags) {
   const Executor executor;
   check_outputs({flags.output}, {flags.map, flags.lidar, flags.vehicle}, flags.force);
   ScenarioRequest wish;
-  wish.map_path = flags.map;
-  wish.map_key = path_in_file(flags.output, flags.map);
+  wish.map = open_named_map(flags.map);
+  wish.world = world_in(flags.map);
+  if (!wish.world) wish.map_key = path_in_file(flags.output, flags.map);
   wish.lidar = flags.lidar;
   wish.vehicle = flags.vehicle;
   wish.length = flags.length;
@@ -107,7 +109,7 @@ void print_scenario(const std::string& path, const Simulation& simulation) {
 void check_scenario(const std::string& path, bool as_json) {
   require_kind(path, {InputKind::kYaml}, "a scenario (.yaml)");
   const Scenario scenario = load_scenario(path);
-  const auto map = scenario.open_map();
+  const auto map = open_map_of(scenario);
   const Executor executor;
   const Simulation simulation(scenario, map, executor);
   // whatever --ros1, --ros2 and --record will ask for
@@ -172,7 +174,7 @@ void add_scenario_command(CLI::App& parent, int& /*exit_code*/) {
   app->require_subcommand(1);
   auto* make = app->add_subcommand("new", "A commented scenario with a free start and waypoints");
   auto flags = std::make_shared<NewFlags>();
-  make->add_option("map", flags->map, "A .pfmap")->required();
+  make->add_option("map", flags->map, "A .pfmap, or a made-up world: street:7")->required();
   make->add_option("-o,--output", flags->output, "The .yaml to write")->required();
   make->add_option("--lidar", flags->lidar, "A shipped sensor")->capture_default_str();
   make->add_option("--vehicle", flags->vehicle, "A shipped vehicle")->capture_default_str();

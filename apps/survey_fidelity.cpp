@@ -11,9 +11,12 @@
 #include "pointflight/fidelity/scene_beams.hpp"
 #include "pointflight/fidelity/survey.hpp"
 #include "pointflight/fidelity/survey_report.hpp"
+#include "pointflight/fidelity/survey_way.hpp"
 #include "pointflight/io/pcd_writer.hpp"
 #include "pointflight/lidar/lidar.hpp"
 #include "pointflight/map/import/map_builder.hpp"
+#include "pointflight/scenes/made_world.hpp"
+#include "pointflight/scenes/space_ways.hpp"
 #include "pointflight/survey/survey_map.hpp"
 
 namespace pointflight::apps {
@@ -163,7 +166,10 @@ void add_survey_flags(CLI::App& app, SurveyFlags& flags) {
         ->capture_default_str()
         ->needs(survey);
   };
-  app.add_option("--seconds", flags.walk.seconds, "Duration of the simulated survey walk, s")
+  app.add_option(
+         "--seconds",
+         flags.walk.seconds,
+         "Duration of the simulated survey walk, s; in made-up worlds about: it goes everywhere")
       ->check(within(1.0, 3600.0))
       ->capture_default_str()
       ->needs(survey);
@@ -193,8 +199,12 @@ void measure_surveyed(const ExactScene& scene,
                       const Progress& progress,
                       nlohmann::ordered_json& cases) {
   const SceneTree tree(scene);
-  const Survey survey =
-      make_survey(scene, tree, load_lidar(flags.lidar), flags.walk, executor, progress);
+  SurveyOptions walk = flags.walk;
+  if (WorldKind::table().find(scene.name) != nullptr) {
+    walk.way = plan_survey_way(scene, walk.seconds * walk.speed, executor);
+    walk.seconds = length_of_way(walk.way) / walk.speed;
+  }
+  const Survey survey = make_survey(scene, tree, load_lidar(flags.lidar), walk, executor, progress);
   if (!flags.out.empty()) write_out(scene, survey, flags, progress);
   const SceneBeams beams = beams_beside(scene, tree, survey, flags, executor, progress);
   const SeenSurfaces seen = surfaces_of([&] { return rays_of(survey); });

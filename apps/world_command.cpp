@@ -10,6 +10,8 @@
 #include "apps/commands.hpp"
 #include "apps/flags.hpp"
 #include "apps/terminal.hpp"
+#include "apps/world_flags.hpp"
+#include "apps/world_survey.hpp"
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/core/output_file.hpp"
 #include "pointflight/core/parallel.hpp"
@@ -27,6 +29,8 @@ struct WorldFlags {
   std::string output;
   std::string png;
   double resolution = 0.05;
+  bool has_resolution = false;  ///< It was given.
+  WorldSurveyFlags survey;
   int threads = 0;
   bool json = false;
   bool force = false;
@@ -54,9 +58,8 @@ void draw_all(const WorldFlags& flags) {
   for (const WorldKind& kind : WorldKind::table().rows()) {
     progress(kind.name, static_cast<double>(pictures.size()) / all);
     const WorldOptions options{kind.name, flags.options.seed, {}};
-    const ImportedMap made = make_world_map(options, flags.resolution, Executor());
-    auto map = SurfelMap::from_bytes(map_bytes(made.tree, made.description), kind.name);
-    pictures.push_back(picture_of(std::move(map), options));
+    pictures.push_back(
+        picture_of(open_world_map({options, flags.resolution}, Executor()), options));
   }
   end_progress();
   picture::draw_worlds(pictures, flags.png);
@@ -77,20 +80,8 @@ void print_worlds(const WorldFlags& flags) {
   if (!flags.png.empty()) draw_all(flags);
 }
 
-/// "aisle=3.2"
-void read_chosen(WorldFlags& flags) {
-  for (const std::string& text : flags.chosen) {
-    const std::size_t equals = text.find('=');
-    if (equals == std::string::npos) {
-      throw InputError(fmt::format("--set {}: NAME=VALUE is wanted", text));
-    }
-    flags.options.chosen[text.substr(0, equals)] =
-        parse_numbers(text.substr(equals + 1), 1, "--set", "NAME=VALUE").front();
-  }
-}
-
 void show_world(WorldFlags& flags) {
-  read_chosen(flags);
+  read_chosen(flags.chosen, flags.options);
   const WorldValues values = values_of(flags.options);
   const WorldKind& kind = *WorldKind::table().find(flags.options.name);
   Json json{{"name", kind.name},
@@ -124,22 +115,34 @@ void show_world(WorldFlags& flags) {
 
 void make_world_file(WorldFlags& flags) {
   const auto start = std::chrono::steady_clock::now();
-  read_chosen(flags);
+  read_chosen(flags.chosen, flags.options);
   check_outputs({flags.output, flags.png}, {}, flags.force);
   values_of(flags.options);  // refuses what is wrong before anything begins
   OutputFile output(flags.output);
   const Executor executor(flags.threads);
   const Progress progress = interruptible_progress();
-  const ImportedMap made = make_world_map(flags.options, flags.resolution, executor, progress);
+  std::uint64_t surfels = 0;
+  if (flags.survey.on) {
+    std::optional<double> resolution;
+    if (flags.has_resolution) resolution = flags.resolution;
+    const PictureFolder scans(flags.survey.scans, flags.force);
+    const EditedMap made =
+        survey_world(flags.options, flags.survey, resolution, executor, progress);
+    surfels = made.surfels;
+    write_map(std::move(output), made.tree, made.description);
+  } else {
+    const ImportedMap made = make_world_map({flags.options, flags.resolution}, executor, progress);
+    surfels = made.report.surfels;
+    write_map(std::move(output), made.tree, made.description);
+  }
   end_progress();
-  write_map(std::move(output), made.tree, made.description);
   if (!flags.png.empty()) {
     const picture::WorldPicture picture = picture_of(SurfelMap::open(flags.output), flags.options);
     picture::draw_worlds({&picture, 1}, flags.png);
   }
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
   log(fmt::format("{} surfels at {:.4g} m in {:.1f} s",
-                  short_count(static_cast<double>(made.report.surfels)),
+                  short_count(static_cast<double>(surfels)),
                   flags.resolution,
                   took.count()));
   fmt::print("{}\n", flags.output);
@@ -151,15 +154,26 @@ CLI::Option* add_resolution(CLI::App& app, WorldFlags& flags) {
       ->capture_default_str();
 }
 
-void add_options(CLI::App& app, WorldFlags& flags) {
-  app.add_option("world", flags.options.name, "Its name: pointflight world list")->required();
-  app.add_option("--seed", flags.options.seed, "Another seed, another world of this kind")
-      ->check(CLI::NonNegativeNumber)
-      ->capture_default_str();
-  app.add_option("--set", flags.chosen, "NAME=VALUE of a parameter, else drawn by the seed");
+}  // namespace
+
+void read_chosen(const std::vector<std::string>& words, WorldOptions& options) {
+  for (const std::string& text : words) {
+    const std::size_t equals = text.find('=');
+    if (equals == std::string::npos) {
+      throw InputError(fmt::format("--set {}: NAME=VALUE is wanted", text));
+    }
+    options.chosen[text.substr(0, equals)] =
+        parse_numbers(text.substr(equals + 1), 1, "--set", "NAME=VALUE").front();
+  }
 }
 
-}  // namespace
+void add_world_options(CLI::App& app, WorldOptions& options, std::vector<std::string>& chosen) {
+  app.add_option("world", options.name, "Its name: pointflight world list")->required();
+  app.add_option("--seed", options.seed, "Another seed, another world of this kind")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  app.add_option("--set", chosen, "NAME=VALUE of a parameter, else drawn by the seed");
+}
 
 void add_world_command(CLI::App& parent, int& /*exit_code*/) {
   auto* app = parent.add_subcommand("world", "Made-up worlds, as many of each kind as seeds");
@@ -176,17 +190,22 @@ void add_world_command(CLI::App& parent, int& /*exit_code*/) {
   add_force_flag(*list, flags->force);
   list->callback([flags] { print_worlds(*flags); });
   auto* show = app->add_subcommand("show", "The parameters of a kind, and what a seed draws");
-  add_options(*show, *flags);
+  add_world_options(*show, flags->options, flags->chosen);
   show->add_flag("--json", flags->json, "JSON on stdout");
   show->callback([flags] { show_world(*flags); });
   auto* make = app->add_subcommand("make", "The map of a world, as a perfect scan gives it");
-  add_options(*make, *flags);
+  add_world_options(*make, flags->options, flags->chosen);
   make->add_option("-o,--output", flags->output, "The .pfmap to write")->required();
   add_resolution(*make, *flags);
   make->add_option("--png", flags->png, "A picture of it: from outside and from inside");
   make->add_option("--threads", flags->threads, "0: all")->check(CLI::NonNegativeNumber);
   add_force_flag(*make, flags->force);
-  make->callback([flags] { make_world_file(*flags); });
+  add_world_survey_flags(*make, flags->survey);
+  make->callback([flags, make] {
+    flags->has_resolution = make->count("--resolution") > 0;
+    make_world_file(*flags);
+  });
+  add_world_tasks_command(*app);
 }
 
 }  // namespace pointflight::apps

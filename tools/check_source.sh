@@ -9,7 +9,7 @@ breach() {
 
 # Includes go down the floors only: a folder may use what stands after the colon, and itself.
 ground="core geometry io"
-step="$ground map map/import render lidar vehicle world sim"
+step="$ground map map/import render lidar vehicle world scenes sim"
 allowed() {
   case $1 in
     core) ;;

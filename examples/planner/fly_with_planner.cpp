@@ -2,19 +2,26 @@
 // folder in the loop with the simulation, through the public interface only.
 //
 //   fly_with_planner MAP.pfmap -o RUN [--force] [--seed N] [--seeds N] [--obstacles N] [--threads
-//   N] fly_with_planner SCENARIO.yaml -o RUN [--threads N]
+//   N] fly_with_planner SCENARIO.yaml -o RUN [--route] [--fence x,y,z,x,y,z]
+//   [--threads N]
 //
 // A scenario's first vehicle is flown to its last waypoint, with the scenario's own seed: as a
-// campaign's command (docs/campaigns.md).
+// campaign's command (docs/campaigns.md). With --route it flies by the others as well: a way
+// through a building that somebody else has found.
 //
 // With --seeds N it flies the seeds 1 .. N and says for each how it went; a seed that fails prints
 // the command that replays it. Exit code 0: all arrived without a collision.
+#include <algorithm>
+#include <array>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <exception>
+#include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "examples/planner/planner.hpp"
 #include "pointflight/core/input_error.hpp"
@@ -34,10 +41,15 @@ struct Options {
   int seeds = 0;  ///< Above 0: these many, from 1 on.
   int obstacles = 40;
   int threads = 0;
+  bool is_route = false;
+  std::optional<Aabb> fence;  ///< That a scenario's vehicle does not leave; else the map's box.
 };
 
 constexpr double kLow = 1.4;  // m: the layer in which drone and obstacles fly
 constexpr double kHigh = 3.2;
+constexpr double kUnder = 0.9;   // m under start and goal that a scenario's vehicle may fly
+constexpr double kOver = 1.5;    // and over
+constexpr double kPassed = 0.7;  // m from a waypoint, on to the next
 
 /// Collects what a scan saw, in the world, and passes everything on to the recorder.
 class Eyes : public SampleSink {
@@ -120,16 +132,24 @@ Scenario scenario_for(const Options& options, const SurfelMap& map, int seed, Ve
   return s;
 }
 
-/// A scenario of somebody else's, whose mission only says where to.
-Scenario scenario_from(const std::string& path, Vector3d& goal) {
+/// A scenario of somebody else's, whose mission only says where to: by which positions, if
+/// `is_route`.
+Scenario scenario_from(const std::string& path, bool is_route, std::vector<Vector3d>& goals) {
   Scenario s = load_scenario(path);
   MissionSettings& mission = s.vehicles.front().mission;
   if (mission.waypoints.empty()) {
     throw InputError(path + ": mission.waypoints: names no place to fly to");
   }
-  goal = mission.waypoints.back();
+  goals = std::move(mission.waypoints);
+  if (!is_route) goals = {goals.back()};
   mission.waypoints.clear();
-  if (s.duration <= 0.0) s.duration = 120.0;
+  double way = 0.0;
+  Vector3d from = s.vehicles.front().start;
+  for (const Vector3d& to : goals) {
+    way += (to - from).norm();
+    from = to;
+  }
+  if (s.duration <= 0.0) s.duration = std::max(120.0, 5.0 * way / mission.motion.speed);
   return s;
 }
 
@@ -143,8 +163,9 @@ struct Outcome {
 };
 
 Outcome fly(const Scenario& scenario,
-            const Vector3d& goal,
+            const std::vector<Vector3d>& goals,
             const std::shared_ptr<const SurfelMap>& map,
+            const Aabb& fence,
             const std::string& output,
             Existing existing,
             const Executor& executor) {
@@ -153,9 +174,10 @@ Outcome fly(const Scenario& scenario,
   if (!output.empty()) recorder = std::make_unique<FlightRecorder>(output, simulation, existing);
   Eyes eyes(recorder.get());
   planner::PlannerOptions planning;
-  planning.height_min = kLow;
-  planning.height_max = kHigh;
-  planner::Planner planner(planning, goal);
+  planning.fence = fence;
+  planning.speed = scenario.vehicles.front().mission.motion.speed;
+  planner::Planner planner(planning, goals.front());
+  std::size_t goal = 0;
   Outcome outcome;
   // with every scan, a little after its last beam
   for (int scan = 1;; ++scan) {
@@ -169,7 +191,11 @@ Outcome fly(const Scenario& scenario,
     outcome.planning_ms = std::max(outcome.planning_ms, 1e3 * took.count());
     if (trajectory) simulation.command(0, TrajectoryCommand{trajectory});
     const RigidBodyState& body = simulation.status(0).state.body;
-    if ((body.p_world - goal).norm() < 0.4) {
+    const auto away = [&](std::size_t i) { return (body.p_world - goals[i]).norm(); };
+    while (goal + 1 < goals.size() && (away(goal) < kPassed || away(goal + 1) < away(goal))) {
+      planner.fly_to(goals[++goal]);
+    }
+    if ((body.p_world - goals.back()).norm() < 0.4) {
       outcome.arrived = true;
       simulation.complete();
       break;
@@ -182,6 +208,19 @@ Outcome fly(const Scenario& scenario,
   outcome.flown = summary.distance_flown;
   outcome.closest = summary.closest_approach.value_or(10.0);
   return outcome;
+}
+
+/// "0,0,0,10,10,5"
+Aabb box_of(const std::string& text) {
+  std::array<double, 6> v{};
+  const char format[] = "%lf,%lf,%lf,%lf,%lf,%lf";
+  if (std::sscanf(text.c_str(), format, &v[0], &v[1], &v[2], &v[3], &v[4], &v[5]) != 6) {
+    throw InputError("--fence: '" + text + "'; x,y,z,x,y,z of two corners, m");
+  }
+  Aabb box;
+  box.add({v[0], v[1], v[2]});
+  box.add({v[3], v[4], v[5]});
+  return box;
 }
 
 Options parse(int argc, char** argv) {
@@ -211,6 +250,10 @@ Options parse(int argc, char** argv) {
       options.seeds = number();
     } else if (flag == "--obstacles") {
       options.obstacles = number();
+    } else if (flag == "--route") {
+      options.is_route = true;
+    } else if (flag == "--fence") {
+      options.fence = box_of(value());
     } else if (flag == "--threads") {
       options.threads = number();
     } else if (options.map.empty() && flag.front() != '-') {
@@ -245,10 +288,17 @@ bool say(std::int64_t seed, const Outcome& o) {
 }
 
 int fly_scenario(const Options& options, const Executor& executor) {
-  Vector3d goal;
-  const Scenario scenario = scenario_from(options.map, goal);
+  std::vector<Vector3d> goals;
+  const Scenario scenario = scenario_from(options.map, options.is_route, goals);
+  const auto map = scenario.open_map();
+  Aabb fence = options.fence.value_or(map->bounds_world());
+  Aabb flown;
+  flown.add(scenario.vehicles.front().start);
+  for (const Vector3d& goal : goals) flown.add(goal);
+  fence.min.z() = std::max(fence.min.z(), flown.min.z() - kUnder);
+  fence.max.z() = std::min(fence.max.z(), flown.max.z() + kOver);
   const Outcome outcome =
-      fly(scenario, goal, scenario.open_map(), options.output, options.existing, executor);
+      fly(scenario, goals, map, fence, options.output, options.existing, executor);
   return say(scenario.seed, outcome) ? 0 : 1;
 }
 
@@ -267,7 +317,10 @@ int main(int argc, char** argv) try {
     const std::string output = options.seeds > 0 ? std::string() : options.output;
     Vector3d goal;
     const Scenario scenario = scenario_for(options, *map, seed, goal);
-    if (say(seed, fly(scenario, goal, map, output, options.existing, executor))) continue;
+    Aabb fence = map->bounds_world();
+    fence.min.z() = kLow;
+    fence.max.z() = kHigh;
+    if (say(seed, fly(scenario, {goal}, map, fence, output, options.existing, executor))) continue;
     ++failed;
     std::printf("  replay: %s %s -o replay_%d --seed %d --obstacles %d\n",
                 argv[0],

@@ -129,11 +129,24 @@ bool LocalMap::contains(const Vector3d& p) const {
   return !score_.empty();
 }
 
+bool LocalMap::is_known(const Vector3d& p) const {
+  const std::size_t i = index_of(p);
+  return score_[i] > 0 || free_[i] > 0;
+}
+
 std::size_t LocalMap::index_of(const Vector3d& p) const {
   const std::int64_t x = cell_number(p.x()) - low_[0];
   const std::int64_t y = cell_number(p.y()) - low_[1];
   const std::int64_t z = cell_number(p.z()) - low_[2];
   return static_cast<std::size_t>((z * kSize[1] + y) * kSize[0] + x);
+}
+
+std::uint64_t LocalMap::key_of(const Vector3d& p) {
+  std::uint64_t key = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    key = key << 21u | (static_cast<std::uint64_t>(cell_number(p[axis])) & 0x1fffffu);
+  }
+  return key;
 }
 
 Vector3d LocalMap::center_of(std::size_t index) const {
@@ -204,7 +217,7 @@ void LocalMap::add_scan(const std::vector<SeenPoint>& points, const Vector3d& ce
     if (!contains(s.point)) continue;
     const std::size_t i = index_of(s.point);
     // if there surely was nothing something has come
-    if (free_[i] >= kSurelyFree) fresh.push_back(s.point);
+    if (free_[i] >= kSurelyFree && !is_beside_filled(s.point)) fresh.push_back(s.point);
     seen[i] = kHit;
   }
   find_movers(fresh, time);
@@ -218,6 +231,20 @@ void LocalMap::add_scan(const std::vector<SeenPoint>& points, const Vector3d& ce
     }
   }
   measure_distances();
+}
+
+/// An edge that comes into sight beside what is known is nothing that moves.
+bool LocalMap::is_beside_filled(const Vector3d& p) const {
+  constexpr int kBeside = 2;  // cells
+  for (int z = -kBeside; z <= kBeside; ++z) {
+    for (int y = -kBeside; y <= kBeside; ++y) {
+      for (int x = -kBeside; x <= kBeside; ++x) {
+        const Vector3d q = p + kCell * Vector3d(x, y, z);
+        if (contains(q) && score_[index_of(q)] > 0) return true;
+      }
+    }
+  }
+  return false;
 }
 
 /// Groups of fresh points are movers; matched with those known, their motion is their velocity.
@@ -269,6 +296,24 @@ double LocalMap::distance(const Vector3d& p) const {
   if (!contains(p)) return 0.0;
   const double cells = std::sqrt(static_cast<double>(distance_[index_of(p)]));
   return std::min(kDistanceMax, kCell * cells);
+}
+
+double LocalMap::distance_between(const Vector3d& p) const {
+  const Vector3d corner = p - Vector3d::Constant(0.5 * kCell);
+  const Vector3d low = kCell * (corner / kCell).array().floor().matrix();
+  const Vector3d share = (corner - low) / kCell;
+  double sum = 0.0;
+  for (int i = 0; i < 8; ++i) {
+    double weight = 1.0;
+    Vector3d q = low + Vector3d::Constant(0.5 * kCell);
+    for (int axis = 0; axis < 3; ++axis) {
+      const bool is_next = (i >> axis & 1) != 0;
+      weight *= is_next ? share[axis] : 1.0 - share[axis];
+      q[axis] += is_next ? kCell : 0.0;
+    }
+    if (weight > 0.0) sum += weight * distance(q);
+  }
+  return sum;
 }
 
 }  // namespace planner

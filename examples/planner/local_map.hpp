@@ -35,26 +35,33 @@ struct Mover {
 /// nearest filled cell, and movers with their velocities.
 class LocalMap {
  public:
-  static constexpr double kCell = 0.25;                        ///< m
-  static constexpr std::array<int, 3> kSize = {112, 112, 24};  ///< Cells.
+  static constexpr double kCell = 0.15;                        ///< m
+  static constexpr std::array<int, 3> kSize = {128, 128, 32};  ///< Cells.
 
   /// Takes a scan's points, measured at `time` (s) around `center`.
   void add_scan(const std::vector<SeenPoint>& points, const Vector3d& center, double time);
 
   /// Distance from a cell to the nearest filled one that stands still, at most 3 m; 0 outside.
   [[nodiscard]] double distance(const Vector3d& p) const;
+  /// The same between the centres of cells.
+  [[nodiscard]] double distance_between(const Vector3d& p) const;
 
   [[nodiscard]] bool contains(const Vector3d& p) const;
+  /// True if a scan has seen something there, or that nothing is; for positions inside.
+  [[nodiscard]] bool is_known(const Vector3d& p) const;
   /// Those that were seen to move.
   [[nodiscard]] const std::vector<Mover>& movers() const { return movers_; }
 
   /// Flat index of a cell, and its centre.
   [[nodiscard]] std::size_t index_of(const Vector3d& p) const;
   [[nodiscard]] Vector3d center_of(std::size_t index) const;
+  /// The same cell whatever the vehicle's position: for what is remembered of the world.
+  [[nodiscard]] static std::uint64_t key_of(const Vector3d& p);
   [[nodiscard]] std::size_t size() const { return score_.size(); }
 
  private:
   void move_to(const Vector3d& center);
+  [[nodiscard]] bool is_beside_filled(const Vector3d& p) const;
   void find_movers(const std::vector<Vector3d>& fresh, double time);
   void measure_distances();
 

@@ -14,12 +14,14 @@ using pointflight::BSplineTrajectory;
 using pointflight::PositionCommand;
 using pointflight::Trajectory;
 
-constexpr double kMargin = 0.25;    // m beyond the hull that no path may use
-constexpr double kComfort = 1.2;    // m from which on room costs nothing
+constexpr double kMargin = 0.25;  // m beyond the hull that paths use only if there is no other way
+constexpr double kTight = 0.02;   // m that no path may use
+constexpr double kComfort = 1.2;  // m from which on room costs nothing
 constexpr double kLookAhead = 2.5;  // s for which movers are foreseen
 constexpr double kInterval = 0.25;  // s between knots
-constexpr double kHorizon = 9.0;    // m of path that is flown at once
-constexpr std::size_t kNodesMax = 60000;
+constexpr double kHorizon = 8.0;    // m of path that is flown at once
+constexpr double kBlind = 0.3;      // m below the vehicle it flies only where it has seen
+constexpr std::size_t kNodesMax = 120000;
 
 /// Steps from a cell to the 26 around it.
 std::vector<Eigen::Vector3i> neighbours() {
@@ -34,12 +36,21 @@ std::vector<Eigen::Vector3i> neighbours() {
   return steps;
 }
 
+bool is_inside(const pointflight::Aabb& box, const Vector3d& p) {
+  return (p - box.min).minCoeff() >= 0.0 && (box.max - p).minCoeff() >= 0.0;
+}
+
 }  // namespace
 
 /// Distance of the hull to what stands still and to where movers will be.
 double Planner::room_at(const Vector3d& p, double time, double ahead) const {
-  // half a cell: a point of a filled cell lies up to so far from its centre
-  double room = map_.distance(p) - 0.5 * LocalMap::kCell;
+  return room_with(map_.distance(p), p, time, ahead);
+}
+
+/// Given the distance to what stands still.
+double Planner::room_with(double distance, const Vector3d& p, double time, double ahead) const {
+  // a point of a filled cell lies up to half a cell from its centre, most of them less
+  double room = distance - 0.3 * LocalMap::kCell;
   for (const Mover& mover : map_.movers()) {
     const double foreseen = time + std::min(ahead, kLookAhead);
     const double unsure = 0.15 * std::min(ahead, kLookAhead);
@@ -53,13 +64,39 @@ double Planner::room(const Trajectory& trajectory, double time, double skip) con
   // and while it then rests
   const double end = std::max(trajectory.duration(), skip) + 2.0;
   for (double t = skip; t < end; t += 0.1) {
-    least = std::min(least, room_at(trajectory.at(t).p_world, time, t - skip));
+    const Vector3d p = trajectory.at(t).p_world;
+    least = std::min(least, room_with(map_.distance_between(p), p, time, t - skip));
   }
   return least;
 }
 
+void Planner::fly_to(const Vector3d& goal) {
+  goal_ = goal;
+  learned_.clear();  // what was far from one goal may be near another
+}
+
+double Planner::left(const Vector3d& p) const {
+  const auto known = learned_.find(LocalMap::key_of(p));
+  const double straight = (goal_ - p).norm();
+  return known == learned_.end() ? straight
+                                 : std::max(straight, static_cast<double>(known->second));
+}
+
+/// From each cell that was searched it is as far to the goal as from where the search ended, less
+/// the way there (real-time adaptive A*: Koenig and Likhachev 2006).
+void Planner::learn(const std::vector<std::size_t>& visited,
+                    const std::vector<float>& cost,
+                    double estimate) {
+  for (const std::size_t cell : visited) {
+    const Vector3d p = map_.center_of(cell);
+    const double least = estimate - static_cast<double>(cost[cell]);
+    if (least <= left(p)) continue;
+    learned_[LocalMap::key_of(p)] = static_cast<float>(least);
+  }
+}
+
 /// A* over cells towards the goal, or to the best position within the horizon.
-std::vector<Vector3d> Planner::search(const Vector3d& from, double time) const {
+std::vector<Vector3d> Planner::search(const Vector3d& from, double time) {
   struct Open {
     double estimate;
     std::size_t cell;
@@ -70,22 +107,23 @@ std::vector<Vector3d> Planner::search(const Vector3d& from, double time) const {
   std::vector<std::uint32_t> parent(map_.size(), 0);
   std::priority_queue<Open> open;
   const std::size_t start = map_.index_of(from);
-  const auto left = [&](const Vector3d& p) { return (goal_ - p).norm(); };
   cost[start] = 0.0f;
   parent[start] = static_cast<std::uint32_t>(start);
   open.push({left(map_.center_of(start)), start});
   std::size_t best = start;
   double best_score = left(from);
-  std::size_t visited = 0;
+  std::vector<std::size_t> visited;
+  std::optional<double> estimate;  // of the whole way
   const auto around = neighbours();
-  while (!open.empty() && visited++ < kNodesMax) {
+  while (!open.empty() && visited.size() < kNodesMax) {
     const Open node = open.top();
     open.pop();
     const Vector3d p = map_.center_of(node.cell);
     const double so_far = static_cast<double>(cost[node.cell]);
     if (node.estimate > so_far + left(p) + 1e-3) continue;
     const double away = (p - from).norm();
-    if (left(p) < LocalMap::kCell) {
+    visited.push_back(node.cell);
+    if ((goal_ - p).norm() < LocalMap::kCell) {
       best = node.cell;
       break;
     }
@@ -98,18 +136,21 @@ std::vector<Vector3d> Planner::search(const Vector3d& from, double time) const {
     // nothing within the horizon leads to the goal sooner than what leaves it here
     if (away > kHorizon + 1.0) {
       best = node.cell;
+      estimate = node.estimate;
       break;
     }
     for (const Eigen::Vector3i& d : around) {
       const Vector3d q = p + LocalMap::kCell * d.cast<double>();
-      if (!map_.contains(q) || q.z() < options_.height_min || q.z() > options_.height_max) continue;
+      if (!map_.contains(q) || !is_inside(options_.fence, q)) continue;
+      if (q.z() < from.z() - kBlind && !map_.is_known(q)) continue;
       const double room = room_at(q, time, away / options_.speed);
       // out of a tight position any way is good that leads to more room
-      if (room < kMargin && room <= room_at(p, time, away / options_.speed)) continue;
+      if (room < kTight && room <= room_at(p, time, away / options_.speed)) continue;
       const double tight = std::clamp((kComfort - room) / kComfort, 0.0, 1.5);
+      const double narrow = std::max(0.0, 1.0 - room / kMargin);
       const double step = LocalMap::kCell *
                           std::sqrt(d.x() * d.x() + d.y() * d.y() + 4.0 * d.z() * d.z()) *
-                          (1.0 + 6.0 * tight * tight);
+                          (1.0 + 6.0 * tight * tight + 20.0 * narrow);
       const std::size_t to = map_.index_of(q);
       const auto total = static_cast<float>(so_far + step);
       if (total >= cost[to]) continue;
@@ -118,6 +159,7 @@ std::vector<Vector3d> Planner::search(const Vector3d& from, double time) const {
       open.push({static_cast<double>(total) + left(q), to});
     }
   }
+  if (estimate) learn(visited, cost, *estimate);
   std::vector<Vector3d> path;
   for (std::size_t at = best; at != start; at = parent[at]) path.push_back(map_.center_of(at));
   path.push_back(from);
@@ -234,7 +276,7 @@ std::shared_ptr<const Trajectory> Planner::update(const std::vector<SeenPoint>& 
   double chosen_room = -std::numeric_limits<double>::infinity();
   if (found.size() > 1) {
     const std::vector<Vector3d> path = shortened(found, time);
-    for (const double share : {1.0, 0.6, 0.35}) {
+    for (const double share : {1.0, 0.6, 0.35, 0.2}) {
       auto trajectory = spline(path, now, share * options_.speed);
       const double r = room(*trajectory, time, 0.0);
       if (r > chosen_room) {
@@ -244,16 +286,17 @@ std::shared_ptr<const Trajectory> Planner::update(const std::vector<SeenPoint>& 
       if (chosen_room > 0.6 * kMargin) break;
     }
   }
-  // what is flown may be better than what is new
+  // what is flown may be better than what is new; at rest anywhere there is room, and no way ahead
   const double flown_for = time - flown_since_;
-  if (flown_ && chosen_room < 0.6 * kMargin) {
+  const double enough = flown_ && flown_for < flown_->duration() ? 0.6 * kMargin : kTight;
+  if (flown_ && chosen_room < enough) {
     const double r = room(*flown_, time, flown_for);
     if (r > chosen_room) {
       chosen_room = r;
       chosen = nullptr;
     }
   }
-  if (chosen_room < 0.1) {
+  if (chosen_room < kTight) {
     auto move = escape(now, time);
     if (move && room(*move, time, 0.0) > chosen_room) chosen = std::move(move);
   }

@@ -5,6 +5,7 @@
 
 #include <memory>
 #include <optional>
+#include <unordered_map>
 #include <vector>
 
 #include "examples/planner/local_map.hpp"
@@ -16,8 +17,7 @@ struct PlannerOptions {
   double radius = 0.26;       ///< Of the vehicle, m.
   double speed = 2.0;         ///< m/s
   double acceleration = 2.0;  ///< m/s^2
-  double height_min = 1.2;    ///< Of the flight, world z, m.
-  double height_max = 3.5;
+  pointflight::Aabb fence;    ///< Which the flight does not leave, world, m.
 };
 
 class Planner {
@@ -30,10 +30,17 @@ class Planner {
                                                         const pointflight::PositionCommand& now,
                                                         double time);
 
+  /// Another goal from here on.
+  void fly_to(const Vector3d& goal);
+
   [[nodiscard]] const LocalMap& map() const { return map_; }
 
  private:
-  [[nodiscard]] std::vector<Vector3d> search(const Vector3d& from, double time) const;
+  [[nodiscard]] std::vector<Vector3d> search(const Vector3d& from, double time);
+  [[nodiscard]] double left(const Vector3d& p) const;
+  void learn(const std::vector<std::size_t>& visited,
+             const std::vector<float>& cost,
+             double estimate);
   [[nodiscard]] std::vector<Vector3d> shortened(const std::vector<Vector3d>& path,
                                                 double time) const;
   [[nodiscard]] std::shared_ptr<const pointflight::Trajectory> spline(
@@ -44,6 +51,10 @@ class Planner {
   [[nodiscard]] double room(const pointflight::Trajectory& trajectory,
                             double time,
                             double skip) const;
+  [[nodiscard]] double room_with(double distance,
+                                 const Vector3d& p,
+                                 double time,
+                                 double ahead) const;
   [[nodiscard]] double room_at(const Vector3d& p, double time, double ahead) const;
   [[nodiscard]] std::shared_ptr<const pointflight::Trajectory> escape(
       const pointflight::PositionCommand& now, double time) const;
@@ -51,6 +62,9 @@ class Planner {
   PlannerOptions options_;
   Vector3d goal_;
   LocalMap map_;
+  /// How far the goal is at least from cells that were searched, m, by `LocalMap::key_of`: what
+  /// leads out of a dead end, when the map has forgotten it.
+  std::unordered_map<std::uint64_t, float> learned_;
   std::shared_ptr<const pointflight::Trajectory> flown_;
   double flown_since_ = 0.0;
 };

@@ -71,8 +71,9 @@ Campaign::Campaign(Study study, std::string folder, std::string program)
 
 /// Its map, and what else it takes from files.
 void Campaign::take_inputs(const Scenario& scenario) {
-  std::shared_ptr<const SurfelMap>& map = maps_[scenario.map];
-  if (!map) map = scenario.open_map();
+  // the map of a world follows from the scenario, and takes a while to make
+  std::string& hash = map_hashes_[scenario.map_name()];
+  if (hash.empty() && !scenario.world) hash = scenario.open_map()->hash();
   for (const std::string& path : files_of(scenario)) {
     if (inputs_.contains(path)) continue;
     inputs_[path] = hash64(MappedFile(path).bytes());
@@ -149,7 +150,7 @@ std::string Campaign::identity() const {
   std::string command;
   for (const std::string& word : study_.command) command += word + '\0';
   std::string maps;
-  for (const auto& [path, map] : maps_) maps += map->hash() + "\n";
+  for (const auto& [path, hash] : map_hashes_) maps += hash + "\n";
   std::string inputs;  // by what they hold: where they lie may differ from host to host
   for (const auto& [path, content] : inputs_) {
     inputs += fmt::format("{} {:016x}\n", fs::path(path).filename().string(), content);
@@ -336,11 +337,14 @@ std::optional<RunRecord> Campaign::fly(std::size_t number, const std::atomic<boo
     attempt.keep(record);
     return record;
   }
-  const auto map = maps_.find(scenario.map);
-  write_scenario_copy(scenario,
-                      map != maps_.end() ? *map->second : *scenario.open_map(),
-                      folder,
-                      run_folder(number));
+  const auto known = map_hashes_.find(scenario.map_name());
+  std::string map_hash;
+  if (known != map_hashes_.end()) {
+    map_hash = known->second;
+  } else if (!scenario.world) {
+    map_hash = scenario.open_map()->hash();
+  }
+  write_scenario_copy(scenario, map_hash, folder, run_folder(number));
   const std::string output = folder.path() + "/" + kFlightOutput;
   if (!folder.folder().make(kFlightOutput)) {
     throw InputError(fmt::format("{}: cannot make the folder", output));

@@ -73,8 +73,8 @@ class Campaign {
   Plan plan_;
   std::string scenario_path_;
   std::string scenario_text_;
-  /// By path, as scenarios have it.
-  std::map<std::string, std::shared_ptr<const SurfelMap>> maps_;
+  /// Of maps by `Scenario::map_name`; empty for made-up worlds.
+  std::map<std::string, std::string> map_hashes_;
   std::map<std::string, std::uint64_t> inputs_;  ///< Hashes of other files, by path.
 };
 

@@ -222,6 +222,8 @@ class SettingsReader : public SettingsVisitor {
 
   /// True if the file has this key in the present section (for settings with alternatives).
   [[nodiscard]] bool has(std::string_view name) const;
+  /// True if it has, and keys of its own below it.
+  [[nodiscard]] bool is_section(std::string_view name) const;
 
   /// Line of each key that was read, by its full name such as "vehicle.start.position" or
   /// "lidars[0].model"; for messages about values that only make sense together.

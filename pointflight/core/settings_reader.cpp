@@ -238,6 +238,11 @@ bool SettingsReader::has(std::string_view name) const {
   return parent[std::string(name)].IsDefined();
 }
 
+bool SettingsReader::is_section(std::string_view name) const {
+  const YAML::Node& parent = document_->levels.back().node;
+  return parent[std::string(name)].IsDefined() && parent[std::string(name)].IsMap();
+}
+
 void SettingsReader::require(std::string_view name, bool fine, std::string_view what) {
   if (fine) return;
   const Document::Level& level = document_->levels.back();

@@ -5,11 +5,13 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
+#include <functional>
 #include <unordered_set>
 #include <utility>
 
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/input_error.hpp"
+#include "pointflight/core/math.hpp"
 #include "pointflight/core/random.hpp"
 #include "pointflight/fidelity/scene_renderer.hpp"
 #include "pointflight/geometry/internal/grid_cells.hpp"
@@ -87,6 +89,18 @@ class Surveyor {
             options_.shake * Vector3d(n[0], n[1], n[2])};
   }
 
+  /// What they have drifted by when a share of the walk is over, world: two waves that end as they
+  /// began, in directions of their own.
+  [[nodiscard]] Vector3d drift(double share) const {
+    const RandomStream random(options_.seed, StreamId::kSurvey, survey_draws::kDrift);
+    const auto [a, b] = random.uniform2(0);
+    const auto [c, d] = random.uniform2(1);
+    const Vector3d slow = unit_direction(2.0 * kPi * a, 0.5 * b - 0.25);
+    const Vector3d fast = unit_direction(2.0 * kPi * c, 0.5 * d - 0.25);
+    return options_.drift *
+           (math::sin(kPi * share) * slow + 0.4 * math::sin(3 * kPi * share) * fast);
+  }
+
  private:
   SceneRenderer renderer_;
   Lidar lidar_;
@@ -96,11 +110,13 @@ class Surveyor {
 
 class SurveyInMemory : public SurveyReader {
  public:
-  explicit SurveyInMemory(const Survey& survey) : survey_(survey) {}
+  explicit SurveyInMemory(const Survey& survey, std::function<bool(std::size_t scan)> chosen = {})
+      : survey_(survey), chosen_(std::move(chosen)) {}
 
   bool read(std::vector<SurveyRay>& batch) override {
     batch.clear();
     for (; batch.empty() && next_ < survey_.scans.size(); ++next_) {
+      if (chosen_ && !chosen_(next_)) continue;
       for (const SurveyShot& shot : survey_.scans[next_]) {
         const Pose pose =
             pose_on(survey_.poses,
@@ -110,13 +126,33 @@ class SurveyInMemory : public SurveyReader {
     }
     return !batch.empty();
   }
+  [[nodiscard]] std::size_t scan() const override { return next_ - 1; }
   [[nodiscard]] double share_read() const override {
     return static_cast<double>(next_) / static_cast<double>(survey_.scans.size());
   }
 
  private:
   const Survey& survey_;
+  std::function<bool(std::size_t scan)> chosen_;
   std::size_t next_ = 0;
+};
+
+class ScansInMemory : public SurveySource {
+ public:
+  explicit ScansInMemory(const Survey& survey) : survey_(survey) {}
+
+  [[nodiscard]] std::size_t scan_count() const override { return survey_.scans.size(); }
+  [[nodiscard]] std::string name(std::size_t scan) const override {
+    return fmt::format("scan {}", scan);
+  }
+  [[nodiscard]] Pose pose(std::size_t scan) const override { return survey_.poses[scan].pose; }
+  [[nodiscard]] std::unique_ptr<SurveyReader> open(
+      const std::function<bool(std::size_t scan)>& chosen) const override {
+    return std::make_unique<SurveyInMemory>(survey_, chosen);
+  }
+
+ private:
+  const Survey& survey_;
 };
 
 class ThinnedCloud : public CloudReader {
@@ -174,7 +210,10 @@ Survey make_survey(const ExactScene& scene,
            "surveying " + scene.name,
            static_cast<double>(i) / static_cast<double>(survey.walk.size()));
     const TimedPose& truth = survey.walk[i];
-    survey.poses.push_back({truth.time, truth.pose * surveyor.shake(i)});
+    Pose believed = truth.pose * surveyor.shake(i);
+    believed.translation +=
+        surveyor.drift(static_cast<double>(i) / static_cast<double>(survey.walk.size() - 1));
+    survey.poses.push_back({truth.time, believed});
     survey.scans.push_back(surveyor.take(i, truth.time, T_world_sensor, executor));
   }
   return survey;
@@ -182,6 +221,10 @@ Survey make_survey(const ExactScene& scene,
 
 std::unique_ptr<SurveyReader> rays_of(const Survey& survey) {
   return std::make_unique<SurveyInMemory>(survey);
+}
+
+std::unique_ptr<SurveySource> scans_of(const Survey& survey) {
+  return std::make_unique<ScansInMemory>(survey);
 }
 
 void write_survey(const Survey& survey, const std::string& folder, const Progress& progress) {

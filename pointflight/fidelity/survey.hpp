@@ -40,6 +40,9 @@ Survey make_survey(const ExactScene& scene,
 /// Its rays as the surveyor has them; the survey must outlive the reader.
 std::unique_ptr<SurveyReader> rays_of(const Survey& survey);
 
+/// The same as scans; the survey must outlive it.
+std::unique_ptr<SurveySource> scans_of(const Survey& survey);
+
 /// Writes `scans/NNNNNN.pcd` (returns: x y z in the sensor frame, m, and time since the scan's
 /// start, s), `free/NNNNNN.pcd` (the same of shots without a return, up to where all is free) and
 /// `poses.tum` (believed, of the scans' starts) into a folder that is there. Throws InputError.

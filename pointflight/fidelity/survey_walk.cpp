@@ -141,8 +141,9 @@ std::vector<TimedPose> make_walk(const ExactScene& scene,
                                  const SceneTree& tree,
                                  const SurveyOptions& options,
                                  Duration scan_period) {
-  const Way way(scene, tree, options);
-  const std::vector<Vector3d> corners = way.corners(options.seconds * options.speed);
+  const std::vector<Vector3d> corners =
+      options.way.empty() ? Way(scene, tree, options).corners(options.seconds * options.speed)
+                          : options.way;
   std::vector<double> reached = {0.0};  // s
   for (std::size_t i = 1; i < corners.size(); ++i) {
     reached.push_back(reached.back() + (corners[i] - corners[i - 1]).norm() / options.speed);

@@ -11,7 +11,23 @@
 
 namespace pointflight::picture {
 
-std::unique_ptr<Canvas> map_page(const SurfelMap& map, const std::string& title) {
+namespace {
+
+void draw_way(Canvas& canvas, const Page& page, const MapWay& way) {
+  std::vector<std::pair<double, double>> line;
+  for (const Vector3d& p : way.points_world) line.push_back(page.on_top(p));
+  canvas.line(line, 5.0, kPaper, 0.8);
+  canvas.line(line, 2.4, way.color);
+  canvas.ring(line.front().first, line.front().second, 5.0, 2.4, way.color);
+  canvas.dot(line.back().first, line.back().second, 5.0, way.color);
+  canvas.text(line.back().first + 7.0, line.back().second + 4.0, way.label, kLabelText, kInk);
+}
+
+}  // namespace
+
+std::unique_ptr<Canvas> map_page(const SurfelMap& map,
+                                 const std::string& title,
+                                 std::span<const MapWay> ways) {
   constexpr double kHeader = kTopMargin + 76.0;
   const MapLayers layers(map);
   Aabb bounds = map.bounds_world();
@@ -37,6 +53,7 @@ std::unique_ptr<Canvas> map_page(const SurfelMap& map, const std::string& title)
     if (*views.assumed.at(x, y) == z) return kAssumedColor;
     return color_at(static_cast<double>(z));
   });
+  for (const MapWay& way : ways) draw_way(*canvas, page, way);
   const double usual = usual_density(views.density);
   paint(*canvas, page.side, views.density, [&](float n, int, int y) -> std::optional<Color> {
     if (n <= 0.0f) return std::nullopt;
@@ -81,8 +98,11 @@ std::unique_ptr<Canvas> map_page(const SurfelMap& map, const std::string& title)
   return canvas;
 }
 
-void draw_map(const SurfelMap& map, const std::string& title, const std::string& path) {
-  map_page(map, title)->save(path);
+void draw_map(const SurfelMap& map,
+              const std::string& title,
+              const std::string& path,
+              std::span<const MapWay> ways) {
+  map_page(map, title, ways)->save(path);
 }
 
 }  // namespace pointflight::picture

@@ -14,9 +14,19 @@
 /// Each writes a PNG; throws InputError if it cannot.
 namespace pointflight::picture {
 
+/// A way in the picture of a map.
+struct MapWay {
+  std::vector<Vector3d> points_world;  ///< Corners, m; a ring at the first, a disc at the last.
+  std::string label;                   ///< At its end.
+  Color color;                         ///< Of the line.
+};
+
 /// A top and a side view of a map, coloured by height. A ceiling over most of it is left out of the
-/// top view.
-void draw_map(const SurfelMap& map, const std::string& title, const std::string& path);
+/// top view, which `ways` are drawn into.
+void draw_map(const SurfelMap& map,
+              const std::string& title,
+              const std::string& path,
+              std::span<const MapWay> ways = {});
 
 /// What a picture of a world shows.
 struct WorldPicture {
@@ -61,7 +71,9 @@ void draw_lidar(const LidarSettings& lidar, const std::string& path);
 /// The page of `draw_overview`, for tests of what is written on it.
 std::unique_ptr<Canvas> overview_page(const SurfelMap& map, const RunPicture& run);
 /// The page of `draw_map`.
-std::unique_ptr<Canvas> map_page(const SurfelMap& map, const std::string& title);
+std::unique_ptr<Canvas> map_page(const SurfelMap& map,
+                                 const std::string& title,
+                                 std::span<const MapWay> ways = {});
 /// The page of `draw_lidar`.
 std::unique_ptr<Canvas> lidar_page(const LidarSettings& lidar);
 

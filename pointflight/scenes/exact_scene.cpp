@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -277,26 +276,6 @@ void ExactScene::tag_from(std::size_t first, const std::string& tag, float densi
   is_target.resize(count, target);
 }
 
-namespace {
-
-/// "warehouse" or "warehouse:7", the seed; nothing for other names.
-std::optional<ExactScene> made_world(const std::string& name) {
-  const std::size_t colon = name.find(':');
-  WorldOptions options{name.substr(0, colon), 1, {}};
-  if (WorldKind::table().find(options.name) == nullptr) return std::nullopt;
-  if (colon != std::string::npos) {
-    const char* end = name.data() + name.size();
-    const auto read = std::from_chars(name.data() + colon + 1, end, options.seed);
-    if (read.ec != std::errc() || read.ptr != end) {
-      throw InputError(
-          fmt::format("'{}': a seed is a whole number, as in {}:7", name, options.name));
-    }
-  }
-  return make_world(options);
-}
-
-}  // namespace
-
 std::vector<std::pair<std::string, std::string>> scene_names() {
   std::vector<std::pair<std::string, std::string>> names = {
       {"hall", "45 x 20 x 8 m: pillars, tables, pipes, 2 cm rods, 5 cm partitions, a ladder"},
@@ -311,7 +290,7 @@ ExactScene load_scene(const std::string& name_or_path) {
   if (name_or_path == "hall" || name_or_path == "forest") return shipped(name_or_path);
   if (name_or_path == "yard") return make_yard_scene();
   if (auto small = make_small_scene(name_or_path)) return std::move(*small);
-  if (auto world = made_world(name_or_path)) return std::move(*world);
+  if (const auto world = world_named(name_or_path)) return make_world(*world);
   std::error_code ignored;
   if (!fs::is_regular_file(name_or_path, ignored)) {
     std::string known;

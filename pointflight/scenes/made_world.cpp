@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
 
 #include "pointflight/core/input_error.hpp"
 
@@ -22,6 +23,19 @@ std::string names_of(const std::vector<WorldParameter>& parameters) {
 }
 
 }  // namespace
+
+std::optional<WorldOptions> world_named(const std::string& name) {
+  const std::size_t colon = name.find(':');
+  WorldOptions options{name.substr(0, colon), 1, {}};
+  if (WorldKind::table().find(options.name) == nullptr) return std::nullopt;
+  if (colon == std::string::npos) return options;
+  const char* end = name.data() + name.size();
+  const auto read = std::from_chars(name.data() + colon + 1, end, options.seed);
+  if (read.ec != std::errc() || read.ptr != end) {
+    throw InputError(fmt::format("'{}': a seed is a whole number, as in {}:7", name, options.name));
+  }
+  return options;
+}
 
 WorldValues values_of(const WorldOptions& options) {
   const WorldKind& kind = kind_of(options.name);

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -69,6 +70,10 @@ struct WorldOptions {
   std::uint64_t seed = 1;                ///< Of everything that differs.
   std::map<std::string, double> chosen;  ///< Parameters that are not drawn.
 };
+
+/// What "street" or "street:7" (a seed) names; nothing if it names no kind of world. Throws
+/// InputError if what is behind the colon is no seed.
+std::optional<WorldOptions> world_named(const std::string& name);
 
 /// What the options come to. Throws InputError for names that are not known and values out of
 /// range.

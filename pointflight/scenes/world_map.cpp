@@ -4,25 +4,39 @@
 
 namespace pointflight {
 
-ImportedMap make_world_map(const WorldOptions& options,
-                           double resolution,
+std::string name_of(const WorldMapOptions& options) {
+  std::string name = fmt::format("{}:{}", options.world.name, options.world.seed);
+  for (const auto& [parameter, value] : options.world.chosen) {
+    name += fmt::format(" {}={}", parameter, value);
+  }
+  return fmt::format("{} at {} m", name, options.resolution);
+}
+
+ImportedMap make_world_map(const WorldMapOptions& options,
                            const Executor& executor,
                            const Progress& progress) {
-  const ExactScene scene = make_world(options);
+  const ExactScene scene = make_world(options.world);
   SceneSampling sampling;
   sampling.points_per_cell = 6.0;
-  sampling.resolution = resolution;
+  sampling.resolution = options.resolution;
   sampling.density_min = 0.0;
-  sampling.seed = options.seed;
+  sampling.seed = options.world.seed;
   ImportOptions import;
-  import.resolution = resolution;
+  import.resolution = options.resolution;
   import.outliers.enabled = false;  // there are none
   return build_map(
-      {fmt::format("world {}, seed {}", options.name, options.seed)},
+      {fmt::format("world {}, seed {}", options.world.name, options.world.seed)},
       [&](std::size_t) { return sampled_cloud(scene, sampling); },
       import,
       executor,
       progress);
+}
+
+std::shared_ptr<const SurfelMap> open_world_map(const WorldMapOptions& options,
+                                                const Executor& executor,
+                                                const Progress& progress) {
+  const ImportedMap made = make_world_map(options, executor, progress);
+  return SurfelMap::from_bytes(map_bytes(made.tree, made.description), name_of(options));
 }
 
 }  // namespace pointflight

@@ -7,12 +7,25 @@
 
 namespace pointflight {
 
+/// A world and the resolution of its map.
+struct WorldMapOptions {
+  WorldOptions world;
+  double resolution = 0.1;  ///< m
+};
+
+/// "street:7 at 0.1 m", with the parameters that were chosen.
+std::string name_of(const WorldMapOptions& options);
+
 /// The map of a perfect scan of a world: its surfaces are sampled evenly, six points a square of
-/// the resolution (m), without noise. Glass is not there. The same options and resolution are the
+/// the resolution, without noise. Glass is not there. The same options and resolution are the
 /// same bytes. Throws InputError as `make_world` does.
-ImportedMap make_world_map(const WorldOptions& options,
-                           double resolution,
+ImportedMap make_world_map(const WorldMapOptions& options,
                            const Executor& executor,
                            const Progress& progress = {});
+
+/// The same in memory.
+std::shared_ptr<const SurfelMap> open_world_map(const WorldMapOptions& options,
+                                                const Executor& executor,
+                                                const Progress& progress = {});
 
 }  // namespace pointflight

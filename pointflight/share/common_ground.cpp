@@ -43,6 +43,7 @@ std::string text_of(Settings settings) {
 std::string rest_of(Scenario scenario) {
   scenario.path.clear();
   scenario.map.clear();
+  scenario.world.reset();
   scenario.map_hash.clear();
   scenario.seed = 0;
   scenario.duration = 0.0;

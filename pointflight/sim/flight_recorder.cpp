@@ -122,7 +122,7 @@ FlightRecorder::FlightRecorder(const std::string& folder,
       is_shared_(simulation.ends_by_agreement()),
       events_(path_for("events.csv")) {
   if (!is_shared_) folder_.forget_killed();  // nobody goes on from it
-  write_scenario_copy(simulation.scenario(), simulation.map(), folder_, folder_.path());
+  write_scenario_copy(simulation.scenario(), simulation.map().hash(), folder_, folder_.path());
   const OutputSetup& output = simulation.scenario().output;
   events_.write(
       "time,event,vehicle,partner,vehicle_x,vehicle_y,vehicle_z,place_x,place_y,place_z,"

@@ -87,7 +87,7 @@ std::string summary_json(const Simulation& simulation) {
   const std::string reason = reason_of(simulation.end());
   if (!reason.empty()) json["end_reason"] = reason;
   json["seed"] = scenario.seed;
-  json["map"] = fs::path(scenario.map).filename().string();
+  json["map"] = scenario.world ? scenario.map_name() : fs::path(scenario.map).filename().string();
   json["map_bytes"] = simulation.map().file_size();
   json["map_hash"] = simulation.map().hash();
   // divided and not multiplied: 0.3 and not 0.30000000000000004

@@ -162,8 +162,33 @@ void describe_output(SettingsVisitor& v, OutputSetup& s) {
           s.obstacle_rate);
 }
 
+struct WorldValueKeys {
+  std::string key;  ///< Name of the parameter.
+  double value = 0.0;
+};
+
+void describe_world(SettingsVisitor& v, WorldMapOptions& s) {
+  const std::vector<std::string_view> names = WorldKind::table().names();
+  v.choice(required({"world", "", "name of a kind"}), s.world.name, names);
+  auto seed = static_cast<std::int64_t>(s.world.seed);
+  v.value({"seed", "", "which world of this kind; not the run's seed", 0, 9e15}, seed);
+  s.world.seed = static_cast<std::uint64_t>(seed);
+  v.value({"resolution", "m", "of its map", 0.02, 1.0}, s.resolution);
+  v.section({"set", "", "parameters that the seed does not draw (`pointflight world show NAME`)"},
+            [&](SettingsVisitor& w) {
+              std::vector<WorldValueKeys> values;
+              for (const auto& [name, value] : s.world.chosen) values.push_back({name, value});
+              w.others({"", "", ""}, {.one = "value"}, values, [](auto& u, WorldValueKeys& one) {
+                u.value(required({"value", "", "of the parameter"}), one.value);
+              });
+              s.world.chosen.clear();
+              for (const WorldValueKeys& one : values) s.world.chosen[one.key] = one.value;
+            });
+}
+
 Scenario read(SettingsReader& reader, const std::string& path) {
   Scenario scenario;
+  if (reader.is_section("map")) scenario.world.emplace();
   for (const char* key : {"vehicle", "lidars", "sensors", "mission", "commands", "faults"}) {
     scenario.is_short = scenario.is_short || reader.has(key);
   }
@@ -171,6 +196,7 @@ Scenario read(SettingsReader& reader, const std::string& path) {
   reader.finish();
   scenario.path = path;
   scenario.lines = reader.lines();
+  if (scenario.world) scenario.at("map", [&] { return values_of(scenario.world->world); });
   return scenario;
 }
 
@@ -182,7 +208,12 @@ Registry<ScenarioSection>& scenario_sections() {
 }
 
 void describe(SettingsVisitor& v, Scenario& s) {
-  v.value(required({"map", "", ".pfmap to fly in"}), s.map);
+  if (s.world) {
+    v.section({"map", "", "a made-up world to fly in"},
+              [&](SettingsVisitor& w) { describe_world(w, *s.world); });
+  } else {
+    v.value(required({"map", "", ".pfmap to fly in; or keys of a made-up world, `map.`"}), s.map);
+  }
   v.value({"map_hash", "", "of the map; another one is refused; empty: any will do"}, s.map_hash);
   v.value({"seed", "", "of everything random", 0, 9e15}, s.seed);
   v.value({"duration", "s", "0: as long as the mission takes", 0, kLongestRun}, s.duration);
@@ -291,14 +322,21 @@ ObstacleWorld Scenario::obstacle_world(std::shared_ptr<const SurfelMap> map) con
   return world;
 }
 
-std::shared_ptr<const SurfelMap> Scenario::open_map() const {
-  auto opened = at("map", [&] { return SurfelMap::open(resolve_path(map, folder())); });
+std::string Scenario::map_name() const {
+  return world ? name_of(*world) : map;
+}
+
+std::shared_ptr<const SurfelMap> Scenario::open_map(const Progress& progress) const {
+  auto opened = at("map", [&] {
+    return world ? open_world_map(*world, Executor(), progress)
+                 : SurfelMap::open(resolve_path(map, folder()));
+  });
   if (map_hash.empty() || map_hash == opened->hash()) return opened;
   throw InputError(fmt::format(
       "{}: map_hash: {} is another map than this scenario was flown in (its hash is {}, "
       "not {}); give that one, or take the key away",
       location("map_hash"),
-      map,
+      map_name(),
       opened->hash(),
       map_hash));
 }
@@ -330,6 +368,8 @@ std::string scenario_reference() {
   }
   SettingsTable table;
   describe(table, defaults);
+  WorldMapOptions world;  // instead of a path
+  table.section({"map", "", ""}, [&](SettingsVisitor& w) { describe_world(w, world); });
   return table.text();
 }
 

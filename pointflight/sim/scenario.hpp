@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -12,6 +13,7 @@
 #include "pointflight/core/time.hpp"
 #include "pointflight/lidar/return_model.hpp"
 #include "pointflight/map/surfel_map.hpp"
+#include "pointflight/scenes/world_map.hpp"
 #include "pointflight/sim/command_script.hpp"
 #include "pointflight/sim/faults.hpp"
 #include "pointflight/sim/scenario_section.hpp"
@@ -126,6 +128,8 @@ struct Scenario {
   std::string path;  ///< Of the file; relative paths in it are taken from its folder.
   std::map<std::string, int> lines;  ///< Line of each key, for messages.
   std::string map;                   ///< Path of the .pfmap, as the file has it.
+  /// The made-up world that is flown in instead of a file; `map` is empty then.
+  std::optional<WorldMapOptions> world;
   std::string map_hash;   ///< Of the map it was flown in (SurfelMap::hash); empty: any will do.
   std::int64_t seed = 1;  ///< Of everything random.
   double duration = 0.0;  ///< s; 0: as long as the mission takes.
@@ -168,8 +172,12 @@ struct Scenario {
   /// What its obstacles are made from; the scenario must outlive it. Nothing is kept free.
   [[nodiscard]] ObstacleWorld obstacle_world(std::shared_ptr<const SurfelMap> map) const;
 
-  /// Opens the map. Throws InputError if it is another than `map_hash` says.
-  [[nodiscard]] std::shared_ptr<const SurfelMap> open_map() const;
+  /// Opens the map, or makes the one of its world (3 s of a room to 30 s of a forest at 0.1 m).
+  /// Throws InputError if it is another than `map_hash` says.
+  [[nodiscard]] std::shared_ptr<const SurfelMap> open_map(const Progress& progress = {}) const;
+
+  /// What it flies in, for messages and summaries: the map's path, or the name of its world.
+  [[nodiscard]] std::string map_name() const;
 };
 
 /// The one list of keys of a scenario file: reader, `scenario new` and docs/scenario.md use it.

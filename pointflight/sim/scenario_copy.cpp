@@ -153,14 +153,16 @@ std::vector<std::string> files_of(const Scenario& scenario) {
 }
 
 void write_scenario_copy(const Scenario& scenario,
-                         const SurfelMap& map,
+                         const std::string& map_hash,
                          OutputFolder& folder,
                          const std::string& final_folder) {
   Scenario copy = scenario;
   Inputs inputs(scenario.folder(), folder);
   take_files(copy, inputs);
-  copy.map = link_to_map(resolve_path(scenario.map, scenario.folder()), folder, final_folder);
-  copy.map_hash = map.hash();
+  if (!scenario.world) {
+    copy.map = link_to_map(resolve_path(scenario.map, scenario.folder()), folder, final_folder);
+  }
+  copy.map_hash = map_hash;
   OutputFile file(folder.file("scenario.yaml"));
   file.write(
       "# As flown; every key: docs/scenario.md. Again: pointflight fly scenario.yaml -o RUN\n" +

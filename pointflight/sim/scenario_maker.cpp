@@ -55,12 +55,13 @@ std::string box_text(const Aabb& box) {
 }
 
 MadeScenario make_scenario(const ScenarioRequest& wish, const Executor& executor) {
-  const auto map = SurfelMap::open(wish.map_path);
+  const std::shared_ptr<const SurfelMap>& map = wish.map;
   const VehicleSettings airframe = load_vehicle(wish.vehicle);
   load_lidar(wish.lidar);  // an unknown sensor is said before the search
   MadeScenario made;
   Scenario& scenario = made.scenario;
   scenario.map = wish.map_key;
+  scenario.world = wish.world;
   VehicleSetup& flown = scenario.vehicles.front();
   flown.model = wish.vehicle;
   flown.lidars.front().model = wish.lidar;
@@ -82,7 +83,7 @@ MadeScenario make_scenario(const ScenarioRequest& wish, const Executor& executor
     throw InputError(fmt::format(
         "{}: no free place for a vehicle of radius {:.2f} m was found{}; write start and "
         "mission.waypoints yourself",
-        wish.map_path,
+        scenario.map_name(),
         radius,
         wish.bounds ? fmt::format(" between {} (the map lies between {}; `map import "
                                   "--shift` moves it)",

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -11,15 +12,16 @@ namespace pointflight {
 
 /// What a scenario is made up from.
 struct ScenarioRequest {
-  std::string map_path;              ///< Is opened.
-  std::string map_key;               ///< What the scenario says.
-  std::string lidar = "mid360";      ///< Name or path of a sensor file.
-  std::string vehicle = "quad_330";  ///< Name or path of a vehicle file.
-  double length = 60.0;              ///< Of the mission, if the map allows, m.
-  double speed = 2.0;                ///< m/s
-  std::optional<Vector3d> start;     ///< World, m; else a free position.
-  std::optional<Aabb> bounds;        ///< World, m: start and waypoints lie inside.
-  bool mission = true;               ///< Else nothing is looked for if there is a start.
+  std::shared_ptr<const SurfelMap> map;  ///< Where.
+  std::string map_key;                   ///< What the scenario says: its path.
+  std::optional<WorldMapOptions> world;  ///< Instead of a path: the world that the map is of.
+  std::string lidar = "mid360";          ///< Name or path of a sensor file.
+  std::string vehicle = "quad_330";      ///< Name or path of a vehicle file.
+  double length = 60.0;                  ///< Of the mission, if the map allows, m.
+  double speed = 2.0;                    ///< m/s
+  std::optional<Vector3d> start;         ///< World, m; else a free position.
+  std::optional<Aabb> bounds;            ///< World, m: start and waypoints lie inside.
+  bool mission = true;                   ///< Else nothing is looked for if there is a start.
 };
 
 /// A scenario that was made up.

@@ -37,6 +37,72 @@ TEST(WorldProgram, ListsAndShowsAndMakes) {
   EXPECT_EQ(scan.code, 0) << scan.err;
 }
 
+TEST(WorldProgram, TasksAreScenariosThatFly) {
+  const TemporaryFolder folder;
+  const std::string tasks = "world tasks indoor_1 --seed 2 --count 1 --resolution 0.2";
+  const Result found = run(fmt::format("{} --json --scenarios {}", tasks, folder.path()));
+  ASSERT_EQ(found.code, 0) << found.err;
+  const auto json = nlohmann::json::parse(found.out);
+  ASSERT_EQ(json["tasks"].size(), 3u);
+  EXPECT_GT(json["explore"]["flyable"], 0.6);
+  EXPECT_GE(json["tasks"][0]["length"], json["tasks"][0]["straight"]);
+  expect_contains(run(tasks).out, "medium_1");
+  // and as they are flown: the world is made again, to the same bytes
+  const std::string flown = folder / "run";
+  const Result flight =
+      run(fmt::format("fly {} -o {} --no-scans --json", folder / "easy_1.yaml", flown));
+  ASSERT_EQ(flight.code, 0) << flight.err;
+  const auto summary = nlohmann::json::parse(flight.out);
+  EXPECT_EQ(summary["end"], "completed");
+  EXPECT_EQ(summary["map"], "indoor_1:2 at 0.2 m");
+  EXPECT_EQ(summary["vehicles"][0]["collisions"], 0);
+  const std::string copy = read_file(flown + "/scenario.yaml");
+  expect_contains(copy, "world: indoor_1");
+  expect_contains(copy, summary["map_hash"].get<std::string>());
+  EXPECT_EQ(run(fmt::format("picture {} -o {}", flown, folder / "again.png")).code, 0);
+  // scenarios of others stay
+  expect_user_error(run(fmt::format("{} --scenarios {}", tasks, folder.path())), "--force");
+}
+
+TEST(WorldProgram, FliesAWorldByItsName) {
+  const TemporaryFolder folder;
+  const Result made =
+      run(fmt::format("scenario new simple_garage:3 -o {} --length 10", folder / "garage.yaml"));
+  ASSERT_EQ(made.code, 0) << made.err;
+  expect_contains(read_file(folder / "garage.yaml"), "world: simple_garage");
+  const std::string key = fmt::format("{}", folder / "key.yaml");
+  const auto error_with = [&](const std::string& keys) {
+    testing::write_file(key, "map: {" + keys + "}\n");
+    return run("scenario check " + key);
+  };
+  expect_user_error(error_with("world: office"), "key.yaml:1: map.world: 'office'");
+  expect_user_error(error_with("seed: 3"), "map.world");
+  expect_user_error(error_with("world: mine, size: 3"), "map.size");
+  expect_user_error(error_with("world: mine, resolution: 9"), "map.resolution");
+  expect_user_error(error_with("world: mine, set: {width: 90}"), "width is 90");
+  expect_user_error(run("fly mine:x -o " + (folder / "run")), "a seed is a whole number");
+}
+
+TEST(WorldProgram, Slow_ASurveyIsAMapWithScans) {
+  const TemporaryFolder folder;
+  const std::string map = folder / "s.pfmap";
+  const std::string scans = folder / "scans";
+  const Result made = run(
+      fmt::format("world make indoor_1 -o {} --survey --walk 15 --resolution 0.1 --lidar os1_32 "
+                  "--scans {}",
+                  map,
+                  scans));
+  ASSERT_EQ(made.code, 0) << made.err;
+  expect_contains(made.err, "of the survey's rays");
+  EXPECT_EQ(run(fmt::format("map info {} --verify", map)).code, 0);
+  // what a user makes of the same scans is nearly the same map
+  const Result imported =
+      run(fmt::format("map import --scans {0}/scans --poses {0}/poses.tum -o {1} --resolution 0.1",
+                      scans,
+                      folder / "i.pfmap"));
+  EXPECT_EQ(imported.code, 0) << imported.err;
+}
+
 TEST(WorldProgram, SaysWhatIsWrong) {
   const TemporaryFolder folder;
   const std::string map = folder / "a.pfmap";

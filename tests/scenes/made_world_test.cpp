@@ -125,8 +125,8 @@ TEST(MadeWorlds, ScenesKnowThemByName) {
 
 TEST(MadeWorlds, MapsAreTheSameBytesByAnyNumberOfThreads) {
   const WorldOptions options{"indoor_1", 5, {}};
-  const ImportedMap one = make_world_map(options, 0.2, Executor(1));
-  const ImportedMap two = make_world_map(options, 0.2, Executor(2));
+  const ImportedMap one = make_world_map({options, 0.2}, Executor(1));
+  const ImportedMap two = make_world_map({options, 0.2}, Executor(2));
   EXPECT_EQ(map_bytes(one.tree, one.description), map_bytes(two.tree, two.description));
   EXPECT_GT(one.report.surfels, 5000u);
 }

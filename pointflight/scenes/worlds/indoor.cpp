@@ -165,15 +165,15 @@ Aabb build_indoor_3(SceneBuilder& to, const WorldValues& values) {
       const double until = is_left ? low : 21.0;
       if (i > 0) {
         std::vector<parts::Opening> through;
-        if (to.chance(0.5)) through.push_back({3.0, 4.1, 0.0, 2.1});
+        if (to.chance(0.5)) through.push_back({3.0, 4.2, 0.0, 2.1});
         parts::add_wall(to, {{from, y}, {until, y}, 0, 3, 0.1, through});
       }
       const double x = is_left ? low : high;
-      const double at = to.between(0.6, step - 1.7);
-      const parts::Opening door{at, at + 1.0, 0.0, 2.1};
+      const double at = to.between(0.6, step - 1.9);
+      const parts::Opening door{at, at + 1.2, 0.0, 2.1};
       const parts::Wall wall{{x, y}, {x, y + step}, 0, 3, 0.1, {door}};
       parts::add_wall(to, wall);
-      const double open = to.between(0.5, 1.9);
+      const double open = draw_door_angle(to);
       parts::add_door(to, wall, door, is_left ? open : -open);
       const double middle = 0.5 * (from + until);
       const auto placed = to.at({middle, y + 0.5 * step, 0}, to.chance(0.5) ? 0.0 : 0.5 * kPi);

@@ -59,11 +59,11 @@ struct OfficePlace {
 /// Walls, door and furniture; some walls to the corridor are glass.
 void add_office(SceneBuilder& to, const OfficePlace& at) {
   const double top = at.z + kStorey - 0.3;
-  std::vector<parts::Opening> openings = {{0.4, 1.35, 0.0, 2.1}};
-  if (to.chance(0.4)) openings.push_back({1.6, at.width - 0.4, 0.1, 2.4, true});
+  std::vector<parts::Opening> openings = {{0.4, 1.6, 0.0, 2.1}};
+  if (to.chance(0.4)) openings.push_back({1.8, at.width - 0.4, 0.1, 2.4, true});
   const parts::Wall front{{at.x, at.y}, {at.x + at.width, at.y}, at.z, top, 0.12, openings};
   parts::add_wall(to, front);
-  const double open = to.between(0.6, 2.2);
+  const double open = draw_door_angle(to);
   if (to.chance(0.8)) parts::add_door(to, front, openings.front(), at.is_far ? open : -open);
   const double y_low = at.is_far ? at.y + 0.1 : 0.2;
   const double y_high = at.is_far ? kOfficeDeep - 0.2 : at.y - 0.1;

@@ -38,6 +38,13 @@ void add_lamps(SceneBuilder& to, const Aabb& room, int rows, int columns) {
   }
 }
 
+double draw_door_angle(SceneBuilder& to) {
+  const bool is_ajar = to.chance(0.15);
+  const double wide = to.between(1.2, 2.0);
+  const double little = to.between(0.3, 0.8);
+  return is_ajar ? little : wide;
+}
+
 void add_workplace(SceneBuilder& to) {
   parts::add_desk(to);
   {

@@ -28,9 +28,9 @@ void add_house_walls(SceneBuilder& to, double z, bool is_ground) {
   parts::add_wall(to, {{kHouseX, 0}, {kHouseX, kHouseY}, z, top, 0.3, side});
   // rooms: a wall across with a wide opening, one along with a door
   parts::add_wall(to, {{7.2, 0}, {7.2, kHouseY}, z, top, 0.12, {{3.6, 4.8, 0.0, 2.1}}});
-  const parts::Wall along{{7.2, 5.0}, {kHouseX, 5.0}, z, top, 0.12, {{0.6, 1.5, 0.0, 2.05}}};
+  const parts::Wall along{{7.2, 5.0}, {kHouseX, 5.0}, z, top, 0.12, {{0.6, 1.7, 0.0, 2.1}}};
   parts::add_wall(to, along);
-  parts::add_door(to, along, along.openings.front(), to.between(0.5, 2.0));
+  parts::add_door(to, along, along.openings.front(), to.between(1.2, 2.0));
 }
 
 void furnish_house(SceneBuilder& to) {
