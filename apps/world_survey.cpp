@@ -26,6 +26,10 @@ void add_world_survey_flags(CLI::App& app, WorldSurveyFlags& flags) {
       ->check(within(10.0, 2000.0))
       ->needs(survey)
       ->capture_default_str();
+  app.add_option("--speed", flags.speed, "At which it is carried, m/s")
+      ->check(within(0.1, 20.0))
+      ->needs(survey)
+      ->capture_default_str();
   app.add_option("--drift", flags.drift, "Error of its estimated positions halfway, m")
       ->check(within(0.0, 1.0))
       ->needs(survey)
@@ -45,6 +49,7 @@ EditedMap survey_world(const WorldOptions& options,
   const LidarSettings lidar = load_lidar(flags.lidar);
   SurveyOptions walk;
   walk.seed = options.seed;
+  walk.speed = flags.speed;
   walk.drift = flags.drift;
   report(progress, "planning the way", 0.0);
   walk.way = plan_survey_way(scene, flags.length, executor);

@@ -17,11 +17,12 @@ struct WorldSurveyFlags {
   bool on = false;
   std::string lidar = "mid360";
   double length = 150.0;  ///< Of the walk, about, m.
+  double speed = 1.0;     ///< m/s
   double drift = 0.02;    ///< m
   std::string scans;      ///< Folder for the scans; empty: they are not kept.
 };
 
-/// --survey, --lidar, --walk, --drift, --scans.
+/// --survey, --lidar, --walk, --speed, --drift, --scans.
 void add_world_survey_flags(CLI::App& app, WorldSurveyFlags& flags);
 
 /// Carries a LiDAR through the world, and makes the map of what it saw as `map import --scans`

@@ -87,17 +87,17 @@ TEST(WorldProgram, Slow_ASurveyIsAMapWithScans) {
   const TemporaryFolder folder;
   const std::string map = folder / "s.pfmap";
   const std::string scans = folder / "scans";
-  const Result made = run(
-      fmt::format("world make indoor_1 -o {} --survey --walk 15 --resolution 0.1 --lidar os1_32 "
-                  "--scans {}",
-                  map,
-                  scans));
+  const Result made =
+      run(fmt::format("world make indoor_1 -o {} --survey --speed 10 --resolution 0.15 "
+                      "--scans {}",
+                      map,
+                      scans));
   ASSERT_EQ(made.code, 0) << made.err;
   expect_contains(made.err, "of the survey's rays");
   EXPECT_EQ(run(fmt::format("map info {} --verify", map)).code, 0);
   // what a user makes of the same scans is nearly the same map
   const Result imported =
-      run(fmt::format("map import --scans {0}/scans --poses {0}/poses.tum -o {1} --resolution 0.1",
+      run(fmt::format("map import --scans {0}/scans --poses {0}/poses.tum -o {1} --resolution 0.15",
                       scans,
                       folder / "i.pfmap"));
   EXPECT_EQ(imported.code, 0) << imported.err;
