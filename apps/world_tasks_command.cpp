@@ -26,10 +26,10 @@ using Json = nlohmann::ordered_json;
 
 struct TaskFlags {
   WorldMapOptions made;
-  std::vector<std::string> chosen;  ///< --set
-  double radius = 0.3;              ///< m
-  int count = 3;                    ///< Of each difficulty.
-  std::string scenarios;            ///< Folder; empty: none are written.
+  std::vector<std::string> chosen;        ///< --set
+  double radius = SpaceOptions{}.radius;  ///< m
+  int count = 3;                          ///< Of each difficulty.
+  std::string scenarios;                  ///< Folder; empty: none are written.
   std::string png;
   bool json = false;
   bool force = false;
@@ -218,7 +218,9 @@ void add_world_tasks_command(CLI::App& world) {
   app->add_option("--count", flags->count, "Of each difficulty")
       ->check(CLI::Range(1, 40))
       ->capture_default_str();
-  app->add_option("--radius", flags->radius, "Of what flies, m; shipped vehicles have 0.26 or less")
+  app->add_option("--radius",
+                  flags->radius,
+                  "Of what flies, m, with 0.09 m for the grid; shipped vehicles have 0.26 or less")
       ->check(within(0.05, 1.0))
       ->capture_default_str();
   app->add_option(

@@ -115,6 +115,7 @@ std::vector<Vector3d> plan_survey_way(const ExactScene& scene,
                                       double length,
                                       const Executor& executor) {
   SpaceOptions options;
+  options.radius = 0.25;
   options.low = 1.2;
   options.high = 1.8;
   options.cell = 0.2;

@@ -12,7 +12,7 @@ namespace pointflight {
 
 /// What flies, and where.
 struct SpaceOptions {
-  double radius = 0.3;      ///< Of what flies, m.
+  double radius = 0.35;     ///< Of what flies, with reserve for what a cell leaves open, m.
   double low = 1.0;         ///< Least height above what is below, m.
   double high = 2.5;        ///< Greatest, m.
   double cell = 0.1;        ///< Of the grid, m; larger in large scenes.
@@ -24,12 +24,14 @@ struct SpaceOptions {
 /// Distances hold to within a cell. The same for any number of threads.
 class SceneSpace {
  public:
+  /// A cell by its number along x, y, z.
   using Index3 = std::array<int, 3>;
   static constexpr int kReach = 20;  ///< Cells up to which distances are told apart.
 
   /// Throws InputError if nothing of `options.radius` fits anywhere at flight height.
   SceneSpace(const ExactScene& scene, const SpaceOptions& options, const Executor& executor);
 
+  /// As they were given, with the width of cells as it is.
   [[nodiscard]] const SpaceOptions& options() const { return options_; }
   [[nodiscard]] double cell() const { return options_.cell; }  ///< m
   [[nodiscard]] const Index3& size() const { return size_; }   ///< Cells along x, y, z.

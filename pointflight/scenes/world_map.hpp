@@ -9,7 +9,7 @@ namespace pointflight {
 
 /// A world and the resolution of its map.
 struct WorldMapOptions {
-  WorldOptions world;
+  WorldOptions world;       ///< Which.
   double resolution = 0.1;  ///< m
 };
 

@@ -20,10 +20,10 @@ std::string_view name_of(Difficulty difficulty);
 struct WorldTask {
   static constexpr double kRoomAtEnds = 0.6;  ///< m
 
-  Difficulty difficulty = Difficulty::kEasy;
-  Vector3d start;         ///< World, m.
-  Vector3d goal;          ///< World, m.
-  double straight = 0.0;  ///< Distance from one to the other, m.
+  Difficulty difficulty = Difficulty::kEasy;  ///< Among the tasks of its world.
+  Vector3d start;                             ///< World, m.
+  Vector3d goal;                              ///< World, m.
+  double straight = 0.0;                      ///< Distance from one to the other, m.
   /// Of a shortest way at flight height that is free of collisions, m. Found on a grid and then
   /// straightened: the true shortest way may be some 5 per cent shorter.
   double length = 0.0;
