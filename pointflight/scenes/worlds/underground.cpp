@@ -160,13 +160,13 @@ Aabb build_cave(SceneBuilder& to, const WorldValues& values) {
     const double size = to.between(3.5, 5.5);
     const double tall = to.between(4.0, 7.5);
     passages.push_back({here - Vector2d(1.0, 0.5), here + Vector2d(1.0, 0.5), size, tall});
-    passages.push_back({before, here, to.between(2.2, 2.8), to.between(2.8, 3.6)});
+    passages.push_back({before, here, to.between(2.6, 3.2), to.between(3.0, 3.8)});
     before = here;
   }
   // a second way round
-  passages.push_back({{8.0, 27.0}, {45.0, 27.5}, 2.4, 3.0});
-  passages.push_back({{8.0, 27.0}, passages.front().from, 2.3, 3.0});
-  passages.push_back({{45.0, 27.5}, before, 2.3, 3.0});
+  passages.push_back({{8.0, 27.0}, {45.0, 27.5}, 2.8, 3.2});
+  passages.push_back({{8.0, 27.0}, passages.front().from, 2.7, 3.2});
+  passages.push_back({{45.0, 27.5}, before, 2.7, 3.2});
   const double phase = to.between(0.0, 6.0);
   const Burrow burrow(passages, 0.24, 0.35, phase);
   burrow.add(to, box_of({-2, 0, 0}, {54, 34, 8}), 0.22);
