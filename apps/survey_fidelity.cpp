@@ -12,11 +12,11 @@
 #include "pointflight/fidelity/survey.hpp"
 #include "pointflight/fidelity/survey_report.hpp"
 #include "pointflight/fidelity/survey_way.hpp"
+#include "pointflight/geometry/polyline.hpp"
 #include "pointflight/io/pcd_writer.hpp"
 #include "pointflight/lidar/lidar.hpp"
 #include "pointflight/map/import/map_builder.hpp"
 #include "pointflight/scenes/made_world.hpp"
-#include "pointflight/scenes/space_ways.hpp"
 #include "pointflight/survey/survey_map.hpp"
 
 namespace pointflight::apps {
@@ -202,7 +202,7 @@ void measure_surveyed(const ExactScene& scene,
   SurveyOptions walk = flags.walk;
   if (WorldKind::table().find(scene.name) != nullptr) {
     walk.way = plan_survey_way(scene, walk.seconds * walk.speed, executor);
-    walk.seconds = length_of_way(walk.way) / walk.speed;
+    walk.seconds = length_of(walk.way) / walk.speed;
   }
   const Survey survey = make_survey(scene, tree, load_lidar(flags.lidar), walk, executor, progress);
   if (!flags.out.empty()) write_out(scene, survey, flags, progress);

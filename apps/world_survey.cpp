@@ -8,7 +8,7 @@
 #include "apps/terminal.hpp"
 #include "pointflight/fidelity/survey.hpp"
 #include "pointflight/fidelity/survey_way.hpp"
-#include "pointflight/scenes/space_ways.hpp"
+#include "pointflight/geometry/polyline.hpp"
 #include "pointflight/survey/survey_map.hpp"
 
 namespace pointflight::apps {
@@ -53,7 +53,7 @@ EditedMap survey_world(const WorldOptions& options,
   walk.drift = flags.drift;
   report(progress, "planning the way", 0.0);
   walk.way = plan_survey_way(scene, flags.length, executor);
-  walk.seconds = length_of_way(walk.way) / walk.speed;
+  walk.seconds = length_of(walk.way) / walk.speed;
   const SceneTree tree(scene);
   const Survey survey = make_survey(scene, tree, lidar, walk, executor, progress);
   if (!flags.scans.empty()) write_survey(survey, flags.scans, progress);
@@ -64,7 +64,7 @@ EditedMap survey_world(const WorldOptions& options,
   end_progress();
   log(fmt::format("{} scans along {:.0f} m; of the survey's rays {:.1f} % are right in the map",
                   survey.scans.size(),
-                  length_of_way(walk.way),
+                  length_of(walk.way),
                   100.0 * made.after.right_share()));
   return std::move(made.map);
 }

@@ -12,6 +12,7 @@
 #include "apps/terminal.hpp"
 #include "apps/world_flags.hpp"
 #include "pointflight/core/constants.hpp"
+#include "pointflight/core/input_error.hpp"
 #include "pointflight/core/math.hpp"
 #include "pointflight/core/number_text.hpp"
 #include "pointflight/core/output_file.hpp"
@@ -139,7 +140,9 @@ void write_scenarios(const std::vector<NamedTask>& tasks, const TaskFlags& flags
     paths.push_back(fmt::format("{}/{}.yaml", flags.scenarios, named.name));
   }
   check_outputs(paths, {}, flags.force);
-  std::filesystem::create_directories(flags.scenarios);
+  std::error_code error;
+  std::filesystem::create_directories(flags.scenarios, error);
+  if (error) throw InputError(fmt::format("{}: {}", flags.scenarios, error.message()));
   OutputSet set;
   for (std::size_t i = 0; i < tasks.size(); ++i) {
     const WorldTask& task = tasks[i].task;

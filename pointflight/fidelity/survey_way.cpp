@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 
+#include "pointflight/geometry/polyline.hpp"
 #include "pointflight/scenes/space_ways.hpp"
 
 namespace pointflight {
@@ -125,7 +126,7 @@ std::vector<Vector3d> plan_survey_way(const ExactScene& scene,
   double reach = std::clamp(0.7 * area_of(space, ways) / length, kNearest, kFarthest);
   for (;;) {
     std::vector<Vector3d> way = way_with(space, ways, start, reach);
-    if (length_of_way(way) <= 1.1 * length || reach >= kFarthest) return way;
+    if (length_of(way) <= 1.1 * length || reach >= kFarthest) return way;
     reach *= 1.4;
   }
 }

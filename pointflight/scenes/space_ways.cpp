@@ -5,6 +5,8 @@
 #include <cmath>
 #include <utility>
 
+#include "pointflight/geometry/polyline.hpp"
+
 namespace pointflight {
 namespace {
 
@@ -135,19 +137,9 @@ std::vector<Vector3d> SpaceWays::way_back(const std::vector<std::uint32_t>& cost
 
 std::vector<Vector3d> straightened(const SceneSpace& space, const std::vector<Vector3d>& way) {
   const double radius = space.options().radius;
-  const auto is_free = [&](std::size_t from, std::size_t to) {
+  return with_fewer_corners(way, [&](std::size_t from, std::size_t to) {
     return space.clearance(way[from], way[to]) >= radius;
-  };
-  std::vector<Vector3d> kept = {way.front()};
-  for (std::size_t at = 0; at + 1 < way.size();) {
-    std::size_t next = at + 1;
-    for (std::size_t step = way.size() - 1 - at; step > 0; step /= 2) {
-      while (next + step < way.size() && is_free(at, next + step)) next += step;
-    }
-    kept.push_back(way[next]);
-    at = next;
-  }
-  return kept;
+  });
 }
 
 std::vector<Vector3d> with_room(const SceneSpace& space, std::vector<Vector3d> way, double room) {
@@ -172,12 +164,6 @@ std::vector<Vector3d> with_room(const SceneSpace& space, std::vector<Vector3d> w
     }
   }
   return way;
-}
-
-double length_of_way(const std::vector<Vector3d>& way) {
-  double length = 0.0;
-  for (std::size_t i = 1; i < way.size(); ++i) length += (way[i] - way[i - 1]).norm();
-  return length;
 }
 
 }  // namespace pointflight

@@ -55,7 +55,4 @@ std::vector<Vector3d> straightened(const SceneSpace& space, const std::vector<Ve
 /// more room, up to `room` (m): a shortest way touches every edge that it turns around.
 std::vector<Vector3d> with_room(const SceneSpace& space, std::vector<Vector3d> way, double room);
 
-/// m
-double length_of_way(const std::vector<Vector3d>& way);
-
 }  // namespace pointflight

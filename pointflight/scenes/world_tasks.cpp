@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "pointflight/core/random.hpp"
+#include "pointflight/geometry/polyline.hpp"
 #include "pointflight/scenes/space_ways.hpp"
 
 namespace pointflight {
@@ -66,7 +67,7 @@ class Pairs {
     if (cost[to] == SpaceWays::kUnreached || task.straight < kStraightMin) return std::nullopt;
     task.passage = 2.0 * static_cast<double>(width[to]);
     const std::vector<Vector3d> shortest = straightened(space_, ways_.way_back(cost, to));
-    task.length = length_of_way(shortest);
+    task.length = length_of(shortest);
     task.way = with_room(space_, shortest, WorldTask::kRoomAtEnds);
     return task;
   }

@@ -172,7 +172,7 @@ struct Scenario {
   /// What its obstacles are made from; the scenario must outlive it. Nothing is kept free.
   [[nodiscard]] ObstacleWorld obstacle_world(std::shared_ptr<const SurfelMap> map) const;
 
-  /// Opens the map, or makes the one of its world (3 s of a room to 30 s of a forest at 0.1 m).
+  /// Opens the map, or makes the one of its world, which takes seconds.
   /// Throws InputError if it is another than `map_hash` says.
   [[nodiscard]] std::shared_ptr<const SurfelMap> open_map(const Progress& progress = {}) const;
 

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <deque>
 
+#include "pointflight/geometry/polyline.hpp"
 #include "pointflight/world/clearance.hpp"
 
 namespace pointflight {
@@ -271,27 +272,10 @@ std::optional<std::size_t> in_largest_part(const FreeSpaceGrid& grid,
 std::vector<Vector3d> straightened(const SurfelMap& map,
                                    const TourOptions& options,
                                    const std::vector<Vector3d>& path) {
-  std::vector<Vector3d> kept = {path.front()};
-  std::size_t at = 0;
-  const auto is_free = [&](std::size_t from, std::size_t to) {
+  return with_fewer_corners(path, [&](std::size_t from, std::size_t to) {
     return clearance_along(map, path[from], path[to], options.radius, 2.0 * options.margin) >=
            options.margin;
-  };
-  while (at + 1 < path.size()) {
-    std::size_t reach = at + 1;
-    for (std::size_t step = path.size() - 1 - at; step > 0; step /= 2) {
-      while (reach + step < path.size() && is_free(at, reach + step)) reach += step;
-    }
-    kept.push_back(path[reach]);
-    at = reach;
-  }
-  return kept;
-}
-
-double length_of(const std::vector<Vector3d>& path) {
-  double length = 0.0;
-  for (std::size_t i = 1; i < path.size(); ++i) length += (path[i] - path[i - 1]).norm();
-  return length;
+  });
 }
 
 /// A tour among usable cells: from one end to the other, then to what is farthest from both, ...

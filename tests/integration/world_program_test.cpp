@@ -60,6 +60,8 @@ TEST(WorldProgram, TasksAreScenariosThatFly) {
   expect_contains(copy, "world: indoor_1");
   expect_contains(copy, summary["map_hash"].get<std::string>());
   EXPECT_EQ(run(fmt::format("picture {} -o {}", flown, folder / "again.png")).code, 0);
+  expect_user_error(run(fmt::format("{} --scenarios {}", tasks, folder / "easy_1.yaml/x")),
+                    "easy_1.yaml");
   // scenarios of others stay
   expect_user_error(run(fmt::format("{} --scenarios {}", tasks, folder.path())), "--force");
 }

@@ -10,6 +10,7 @@
 
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/random.hpp"
+#include "pointflight/geometry/polyline.hpp"
 #include "pointflight/scenes/made_world.hpp"
 #include "pointflight/scenes/scene_builder.hpp"
 #include "pointflight/scenes/scene_tree.hpp"
@@ -104,8 +105,8 @@ TEST(SpaceWays, ShortestAndWidestAreThoseOfTheDoor) {
   const double away = std::hypot(1.0, 5.0 - door);
   const double turn = kPi - 2.0 * (std::atan2(1.0, 5.0 - door) - std::asin(radius / away));
   const double shortest = 2.0 * std::sqrt(away * away - radius * radius) + radius * turn;
-  EXPECT_GT(length_of_way(way), shortest);
-  EXPECT_LT(length_of_way(way), 1.07 * shortest);
+  EXPECT_GT(length_of(way), shortest);
+  EXPECT_LT(length_of(way), 1.07 * shortest);
   EXPECT_NEAR(static_cast<double>(ways.widest_from(start)[goal]), 0.5 * door, space.cell());
   // not reached within a metre
   EXPECT_EQ(ways.shortest_from(start, 10 * SpaceWays::kStep)[goal], SpaceWays::kUnreached);
