@@ -30,7 +30,7 @@ else()
 endif()
 
 # sleef, xxhash and lzf come without a CMake package of a stable name: linked as plain libraries.
-foreach(library sleef xxhash lzf lzma hwy md zstd lz4 z zip sqlite3)
+foreach(library sleef xxhash lzf lzma hwy md zstd lz4 z zip sqlite3 tinyxml2)
   find_library(POINTFLIGHT_${library} ${library} REQUIRED)
 endforeach()
 

@@ -80,7 +80,7 @@ found=$(grep -rnE 'remove_all|(fs|filesystem)::(remove|rename)\(|std::(remove|re
 [ -z "$found" ] || { echo "removes or renames files beside core/folder and core/locked_file:"; breach "$found"; }
 
 # Public headers: std and Eigen only, so that a user needs no other headers.
-found=$(grep -rnE '#include <(fmt|yaml-cpp|nlohmann|tbb|oneapi|nanoflann|xxhash|lzf|liblzf|assimp|Random123|hwy|lzma|boost|zip\.h|sqlite3)' \
+found=$(grep -rnE '#include <(fmt|yaml-cpp|nlohmann|tbb|oneapi|nanoflann|xxhash|lzf|liblzf|assimp|Random123|hwy|lzma|boost|zip\.h|sqlite3|tinyxml2)' \
         pointflight --include='*.hpp' | grep -vE 'io/byte_cursor.hpp|-inl.hpp|share/dds/|ros/ros[12]/')
 [ -z "$found" ] || { echo "third-party headers in public headers:"; breach "$found"; }
 

@@ -30,23 +30,15 @@ struct Format {
 
 // every format that `map import` reads
 constexpr Format kFormats[] = {
-    {".pcd", open_pcd},
-    {".ply", open_ply, ply_has_faces},
-    {".xyz", open_xyz},
-    {".txt", open_xyz},
-    {".csv", open_xyz},
-    {".asc", open_xyz},
-    {".pts", open_pts},
-    {".ptx", open_ptx},
-    {".las", open_las},
-    {".bin", open_kitti_bin},
-    {".npy", open_npy},
-    {".npz", open_npz},
-    {".obj", open_obj_points, obj_has_faces},
-    {".stl", nullptr},
-    {".off", nullptr},
-    {".dae", nullptr},
-    {".gltf", nullptr},
+    {".pcd", open_pcd},       {".ply", open_ply, ply_has_faces},
+    {".xyz", open_xyz},       {".txt", open_xyz},
+    {".csv", open_xyz},       {".asc", open_xyz},
+    {".pts", open_pts},       {".ptx", open_ptx},
+    {".las", open_las},       {".e57", open_e57},
+    {".bin", open_kitti_bin}, {".npy", open_npy},
+    {".npz", open_npz},       {".obj", open_obj_points, obj_has_faces},
+    {".stl", nullptr},        {".off", nullptr},
+    {".dae", nullptr},        {".gltf", nullptr},
     {".glb", nullptr},
 };
 
@@ -61,10 +53,6 @@ constexpr Refusal kRefusals[] = {
      "",
      "LAZ is compressed; unpack it first: laszip -i {0} -o cloud.las (LAStools), or "
      "pdal translate {0} cloud.las"},
-    {".e57",
-     "ASTM-E57",
-     "E57 is not read; convert it first: pdal translate {0} cloud.las, or save it as LAS or PLY in "
-     "CloudCompare"},
 };
 
 [[noreturn]] void refuse(const Refusal& refusal, const std::string& name) {
@@ -106,6 +94,7 @@ std::string format_by_content(const MappedFile& file) {
     if (!refusal.begin.empty() && begins_with(refusal.begin)) refuse(refusal, file.path());
   }
   if (begins_with("LASF")) return ".las";
+  if (begins_with("ASTM-E57")) return ".e57";
   if (begins_with("\x93NUMPY")) return ".npy";
   if (begins_with("PK\x03\x04")) return ".npz";
   if (begins_with("ply\n") || begins_with("ply\r")) return ".ply";
@@ -145,9 +134,10 @@ CloudSource CloudSource::from_stream(int descriptor,
   if (const Refusal* refusal = find_refusal(source.format_)) refuse(*refusal, "-");
   const Format* known = find_format(source.format_);
   if (!format.empty() && (known == nullptr || known->open == nullptr || source.format_ == ".obj")) {
-    throw InputError(fmt::format(
-        "--format {}: standard input is read as one of pcd ply xyz txt csv asc pts ptx las bin npy",
-        excerpt(format)));
+    throw InputError(
+        fmt::format("--format {}: standard input is read as one of pcd ply xyz txt csv asc pts ptx "
+                    "las e57 bin npy",
+                    excerpt(format)));
   }
   source.spool_ = spool(descriptor, source.name_, folder, progress);
   const MappedFile file = source.map_file();

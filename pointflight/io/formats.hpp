@@ -52,6 +52,10 @@ std::unique_ptr<CloudReader> open_npz(MappedFile file);
 /// ASPRS LAS 1.0 to 1.4, uncompressed, point formats 0 to 10.
 std::unique_ptr<CloudReader> open_las(MappedFile file);
 
+/// ASTM E57 1.0: the points of all its scans, Cartesian or spherical, each in its scan's pose;
+/// pictures are left out.
+std::unique_ptr<CloudReader> open_e57(MappedFile file);
+
 /// Resource limits for the import of a mesh: a damaged file can demand unbounded memory or time.
 struct MeshLimits {
   double cpu_seconds;        ///< Of the process that reads it.

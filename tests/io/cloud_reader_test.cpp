@@ -377,8 +377,8 @@ TEST(Mesh, APlyWithFacesIsAMesh) {
 
 TEST(CloudReader, UnknownExtensionsNameTheKnownOnes) {
   const TemporaryFolder folder;
-  write_file(folder / "a.e57", "x");
-  expect_contains(error_of([&] { open_cloud(folder / "a.e57"); }), "pdal translate");
+  write_file(folder / "a.laz", "x");
+  expect_contains(error_of([&] { open_cloud(folder / "a.laz"); }), "pdal translate");
   write_file(folder / "a.shp", "x");
   expect_contains(error_of([&] { open_cloud(folder / "a.shp"); }), ".pcd .ply .xyz");
   expect_contains(error_of([&] { open_cloud(folder / "absent.pcd"); }), "No such file");
