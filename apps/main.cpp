@@ -60,6 +60,7 @@ int run(int argc, char** argv) {
   add_scenario_command(app, exit_code);
   add_fly_command(app, exit_code);
   add_scan_command(app, exit_code);
+  add_raycast_command(app, exit_code);
   add_lidar_command(app, exit_code);
   add_vehicle_command(app, exit_code);
   add_picture_command(app, exit_code);

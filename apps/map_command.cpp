@@ -123,12 +123,17 @@ struct SurfelCount {
   std::uint64_t surfels = 0;
   std::uint64_t planar = 0;
   std::uint64_t assumed = 0;
+  std::uint64_t clear = 0;  ///< Let beams through.
+  std::uint64_t labelled = 0;
 
   explicit SurfelCount(const SurfelMap& map) {
     map.for_each_surfel([&](const Vector3d&, const Vector3d&, double, std::uint32_t word) {
       ++surfels;
       planar += is_planar(map.words()[word]) ? 1 : 0;
-      assumed += map.is_assumed(word) ? 1 : 0;
+      const SurfelNote note = map.notes().of(word);
+      assumed += note.is_assumed ? 1 : 0;
+      clear += note.opacity != Opacity::kOpaque ? 1 : 0;
+      labelled += note.label.kind != 0 ? 1 : 0;
     });
   }
   [[nodiscard]] double planar_share() const {
@@ -151,6 +156,8 @@ nlohmann::ordered_json info_json(const SurfelMap& map,
   json["max"] = {b.max.x(), b.max.y(), b.max.z()};
   json["planar_share"] = count.planar_share();
   json["assumed"] = count.assumed;
+  json["labelled"] = count.labelled;
+  json["letting_through"] = count.clear;
   json["fitted_scans"] = fitted_scans(map).size();
   json["bytes"] = map.file_size();
   json["bytes_per_surfel"] = count.bytes_each(map);
@@ -192,6 +199,12 @@ void print_info(const SurfelMap& map, const SurfelCount& count, const InfoFlags&
              map.reflectivity_per_intensity() > 0.0
                  ? fmt::format(", reflectivity is {:.4g} of it", map.reflectivity_per_intensity())
                  : "");
+  if (count.labelled > 0) {
+    fmt::print("  labels      {:.1f} % of the surfels, {} classes\n",
+               100.0 * static_cast<double>(count.labelled) / static_cast<double>(count.surfels),
+               map.notes().class_names().size() - 1);
+  }
+  if (count.clear > 0) fmt::print("  opacity     {} surfels let beams through\n", count.clear);
   if (known != nullptr) {
     fmt::print(
         "  seen space  {:.0f} % of the box of map and survey, {:.0f} % unknown (cells of {:.2g} "

@@ -168,7 +168,7 @@ void add_scan_command(CLI::App& parent, int& /*exit_code*/) {
   app->add_flag("--truth",
                 flags->truth,
                 "The PCD also says what the simulator knows of each point: true_range incidence "
-                "depth deskewed_x deskewed_y deskewed_z surfel sub_ray sub_rays")
+                "depth deskewed_x deskewed_y deskewed_z surfel thing sub_ray sub_rays assumed class")
       ->needs(output);
   app->add_flag("--mark-unknown",
                 flags->mark_unknown,

@@ -113,17 +113,20 @@ void judge(const std::shared_ptr<const SurfelMap>& map,
     if (!flags.json) {
       const std::string thin = flags.thin > 0.0 ? fmt::format("thinned to {:.3g} m", flags.thin)
                                                 : std::string("all points");
-      print_survey_report(fmt::format("{} surveyed by {} for {:.4g} s, {}, map at {:.3g} m{}, {} "
-                                      "beams, {}",
-                                      scene.name,
-                                      flags.lidar,
-                                      flags.walk.seconds,
-                                      thin,
-                                      map->resolution(),
-                                      own != nullptr ? " fitted to its rays" : "",
-                                      kJudge,
-                                      name),
-                          report);
+      print_survey_report(
+          fmt::format("{} surveyed by {} for {:.4g} s, {}, map at {:.3g} m{}, {} "
+                      "beams, {}",
+                      scene.name,
+                      flags.lidar,
+                      flags.walk.seconds,
+                      thin,
+                      map->resolution(),
+                      own == nullptr               ? ""
+                      : map->notes().has_opacity() ? " fitted to its rays, with opacity"
+                                                   : " fitted to its rays",
+                      kJudge,
+                      name),
+          report);
     }
     if (!flags.json && own != nullptr && &name == &flags.renderers.back()) {
       fmt::print("survey's own rays, beam: {}\n\n", about_rays(*own));
@@ -186,8 +189,11 @@ void add_survey_flags(CLI::App& app, SurveyFlags& flags) {
       ->check(within(0.0, 0.0) | within(1e-3, 10.0))
       ->capture_default_str()
       ->needs(survey);
-  app.add_flag("--fit", flags.fit, "Also fit the map to the survey's rays, and judge that")
-      ->needs(survey);
+  auto* fit =
+      app.add_flag("--fit", flags.fit, "Also fit the map to the survey's rays, and judge that")
+          ->needs(survey);
+  app.add_flag("--opacity", flags.opacity, "Find out which surfels let beams through, too")
+      ->needs(fit);
   app.add_option(
          "--survey-out", flags.out, "Folder for cloud.pcd, scans/, free/ and poses.tum of each")
       ->needs(survey);
@@ -216,12 +222,14 @@ void measure_surveyed(const ExactScene& scene,
     const auto bare = bare_map(scene.name, cloud, options, executor, progress);
     judge(bare, scene, beams, seen, flags, nullptr, executor, cases);
     if (!flags.fit) continue;
+    FitOptions fit;
+    fit.opacity = flags.opacity;
     FitReport report;
     ClosingReport closed;
     const EditedMap fitted = fit_and_close(
         *bare,
         [&] { return rays_of(survey); },
-        {},
+        fit,
         ClosingOptions{},
         {},
         executor,

@@ -19,6 +19,7 @@ struct SurveyFlags {
   SurveyOptions walk;
   double thin = 0.05;  ///< m; 0: all points.
   bool fit = false;
+  bool opacity = false;  ///< Of fitted maps.
   std::string out;  ///< Folder for the survey itself.
   // shared with the other kind of `fidelity`; nothing: not given
   std::string lidar = "mid360";
@@ -29,7 +30,7 @@ struct SurveyFlags {
   bool json = false;
 };
 
-/// --survey, --seconds, --shake, --tilt, --thin, --fit, --survey-out.
+/// --survey, --seconds, --shake, --tilt, --thin, --fit, --opacity, --survey-out.
 void add_survey_flags(CLI::App& app, SurveyFlags& flags);
 
 /// Walks a LiDAR through the scene, maps what it saw and judges the map by an OS1-32 at positions

@@ -180,6 +180,10 @@ void add_fit_flags(CLI::App& app, FitFlags& flags, bool required) {
                flags.no_assume,
                "Leave holes in floors and walls open that no ray went through")
       ->needs(scans);
+  app.add_flag("--opacity",
+               flags.opacity,
+               "Find out which surfels (leaves, nets, panes) let a share of the beams through")
+      ->needs(scans);
   app.add_option(
          "--leak-weight",
          flags.leak_weight,
@@ -222,6 +226,7 @@ std::string about_rays(const OwnRays& rays) {
 
 FitOptions fit_options(const FitFlags& flags) {
   FitOptions options;
+  options.opacity = flags.opacity;
   options.leak_weight = flags.leak_weight;
   return options;
 }
@@ -259,6 +264,9 @@ void print_fit(const FitReport& report, const OwnRays& after) {
   log(fmt::format("ghosts        {} surfels of what moved removed, {} that only stood in the way",
                   report.ghosts.size(),
                   report.blamed));
+  if (report.clear > 0) {
+    log(fmt::format("opacity       {} surfels let beams through", report.clear));
+  }
 }
 
 void check_signal(const FitFlags& flags, const SurveySource& survey) {

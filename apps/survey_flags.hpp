@@ -35,6 +35,7 @@ struct FitFlags : ScansFlags {
   std::string signal_of;
   double signal_limit = 0.0;  ///< 0: found.
   bool no_assume = false;
+  bool opacity = false;
 };
 
 /// Those of a survey, --free, --no-assume, --leak-weight, --export-ghosts, --signal-of,

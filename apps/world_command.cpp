@@ -1,8 +1,10 @@
 #include <fmt/format.h>
 
 #include <chrono>
+#include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -113,10 +115,20 @@ void show_world(WorldFlags& flags) {
   }
 }
 
+void write_truth(const WorldMapOptions& options, const std::string& path) {
+  const std::string text = world_truth(options, make_world(options.world));
+  OutputFile file(path);
+  file.write(std::as_bytes(std::span(text)));
+  file.commit();
+}
+
 void make_world_file(WorldFlags& flags) {
   const auto start = std::chrono::steady_clock::now();
   read_chosen(flags.chosen, flags.options);
-  check_outputs({flags.output, flags.png}, {}, flags.force);
+  const std::string truth =
+      std::filesystem::path(flags.output).replace_extension(".truth").string();
+  if (truth == flags.output) throw InputError(flags.output + ": its truth has this name; .pfmap");
+  check_outputs({flags.output, truth, flags.png}, {}, flags.force);
   values_of(flags.options);  // refuses what is wrong before anything begins
   OutputFile output(flags.output);
   const Executor executor(flags.threads);
@@ -126,15 +138,17 @@ void make_world_file(WorldFlags& flags) {
     std::optional<double> resolution;
     if (flags.has_resolution) resolution = flags.resolution;
     const PictureFolder scans(flags.survey.scans, flags.force);
-    const EditedMap made =
-        survey_world(flags.options, flags.survey, resolution, executor, progress);
+    EditedMap made = survey_world(flags.options, flags.survey, resolution, executor, progress);
     surfels = made.surfels;
+    flags.resolution = made.description.resolution;
+    set_world(made.description, {flags.options, flags.resolution});
     write_map(std::move(output), made.tree, made.description);
   } else {
     const ImportedMap made = make_world_map({flags.options, flags.resolution}, executor, progress);
     surfels = made.report.surfels;
     write_map(std::move(output), made.tree, made.description);
   }
+  write_truth({flags.options, flags.resolution}, truth);
   end_progress();
   if (!flags.png.empty()) {
     const picture::WorldPicture picture = picture_of(SurfelMap::open(flags.output), flags.options);

@@ -45,6 +45,8 @@ enum class StreamId : std::uint32_t {
   kLidarDeskewing = 34,   ///< entity: vehicle << 8 | lidar, index: draw * 6 + component
   kLearning = 35,         ///< free positions; index: draw
   kPlaces = 36,           ///< of made-up worlds; index: draw
+  kSeeThrough = 37,       ///< entity: draw << 28 | vehicle << 8 | lidar, index: scan << 32 | beam
+  kReflectivity = 38,     ///< of things in made-up worlds; entity: of the world, index: thing
   kTest = 1000,           ///< inputs of tests and benchmarks
 };
 

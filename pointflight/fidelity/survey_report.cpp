@@ -54,7 +54,8 @@ double foliage_distance(const Patches& patches, std::vector<float> Patch::*range
 }  // namespace
 
 bool is_foliage(const std::string& tag) {
-  constexpr std::array<std::string_view, 5> kKinds = {"leaf", "needle", "grass", "net", "bush"};
+  constexpr std::array<std::string_view, 6> kKinds = {
+      "leaf", "leaves", "needle", "grass", "net", "bush"};
   return std::any_of(
       kKinds.begin(), kKinds.end(), [&](std::string_view kind) { return tag.starts_with(kind); });
 }

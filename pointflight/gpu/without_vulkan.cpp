@@ -39,7 +39,7 @@ std::unique_ptr<Renderer> make_gpu_paper_renderer(const Scene& /*scene*/) {
 }
 
 std::unique_ptr<Renderer> make_automatic_renderer(const Scene& scene) {
-  return make_renderer("beam", scene);
+  return Choice<RendererKind>("beam")->make(scene);  // `make_renderer` goes on behind surfels
 }
 
 std::vector<std::string> take_gpu_notices() {

@@ -136,6 +136,7 @@ RayBatch Lidar::batch_of(const Aimed& aimed) const {
   batch.time = aimed.snapshot ? middle : aimed.request.start;
   batch.time_offsets = aimed.offsets;
   batch.image_resolution = settings_.image_resolution_deg * kDegree;
+  batch.draws = {aimed.request.seed, sensor_, aimed.request.index};
   return batch;
 }
 

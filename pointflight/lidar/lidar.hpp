@@ -30,8 +30,9 @@ struct ScanRequest {
   std::uint64_t seed = 0;   ///< Of all noise and of which beams come back.
   /// Points get `is_unknown` by it; null: they do not.
   const KnownSpace* known = nullptr;
-  /// What is rendered, if it has assumed surfels: points on them get `PointTruth::is_assumed` and,
-  /// if `known` is there, `is_unknown`.
+  /// What is rendered, if it says more of its surfels (`SurfelMap::notes`): points get
+  /// `PointTruth::part_of` and, on assumed ones, `is_assumed` and, if `known` is there,
+  /// `is_unknown`.
   const SurfelMap* map = nullptr;
   bool truth = false;            ///< `Scan::truth` is wanted.
   std::span<const Body> bodies;  ///< What moves in the map, without what carries the sensor.

@@ -98,14 +98,16 @@ void add_truth(std::span<const Return> returns,
     }
     const double cosine = std::clamp(static_cast<double>(made.origin.cos_incidence), 0.0, 1.0);
     const bool is_false = made.parts == 0;
-    scan.truth.push_back({made.true_range,
-                          is_false ? 0.0f : static_cast<float>(math::acos(cosine)),
-                          made.depth,
-                          (T_start_seen * point.position_sensor.cast<double>()).cast<float>(),
-                          made.origin.surfel,
-                          made.origin.sub_ray,
-                          made.parts,
-                          !is_false && is_assumed(map, made.origin.surfel)});
+    scan.truth.push_back(
+        {made.true_range,
+         is_false ? 0.0f : static_cast<float>(math::acos(cosine)),
+         made.depth,
+         (T_start_seen * point.position_sensor.cast<double>()).cast<float>(),
+         made.origin.surfel,
+         made.origin.sub_ray,
+         made.parts,
+         !is_false && is_assumed(map, made.origin.surfel),
+         is_false || map == nullptr ? SurfelLabel{} : map->notes().label(made.origin.surfel)});
   }
 }
 

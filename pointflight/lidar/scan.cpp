@@ -20,12 +20,12 @@ constexpr std::size_t kFloats = 6;
 /// A point's truth as files have it.
 struct TruthRow {
   float true_range, incidence, depth, deskewed[3];
-  std::uint32_t surfel;
+  std::uint32_t surfel, thing;
   std::uint16_t sub_ray, sub_rays;
-  std::uint8_t assumed;
+  std::uint8_t assumed, kind;
 };
-constexpr std::size_t kTruthSize = 33;  // without what the compiler adds
-static_assert(offsetof(TruthRow, assumed) + 1 == kTruthSize);
+constexpr std::size_t kTruthSize = 38;  // without what the compiler adds
+static_assert(offsetof(TruthRow, kind) + 1 == kTruthSize);
 
 /// Bytes per point.
 constexpr std::size_t row_size(const ScanMarks& marks) {
@@ -39,9 +39,11 @@ TruthRow row_of(const PointTruth& truth) {
           truth.depth,
           {truth.deskewed.x(), truth.deskewed.y(), truth.deskewed.z()},
           truth.surfel,
+          truth.part_of.thing,
           truth.sub_ray,
           truth.sub_rays,
-          static_cast<std::uint8_t>(truth.is_assumed ? 1 : 0)};
+          static_cast<std::uint8_t>(truth.is_assumed ? 1 : 0),
+          truth.part_of.kind};
 }
 
 PointTruth truth_of(const TruthRow& row) {
@@ -52,7 +54,8 @@ PointTruth truth_of(const TruthRow& row) {
           row.surfel,
           row.sub_ray,
           row.sub_rays,
-          row.assumed != 0};
+          row.assumed != 0,
+          {row.kind, row.thing}};
 }
 
 /// How far deskewing leaves a point off its beam at most, m: six deviations of half of what a whole
@@ -81,9 +84,11 @@ std::vector<PcdField> scan_fields(const ScanMarks& marks) {
     fields.push_back({name, 'F', 4});
   }
   fields.push_back({"surfel", 'U', 4});
+  fields.push_back({"thing", 'U', 4});
   fields.push_back({"sub_ray", 'U', 2});
   fields.push_back({"sub_rays", 'U', 2});
   fields.push_back({"assumed", 'U', 1});
+  fields.push_back({"class", 'U', 1});
   return fields;
 }
 

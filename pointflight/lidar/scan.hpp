@@ -48,6 +48,7 @@ struct PointTruth {
   std::uint16_t sub_ray = 0;         ///< Which sub-ray of the beam hit it.
   std::uint16_t sub_rays = 0;        ///< How many sub-rays are in the pulse; 0: a false return.
   bool is_assumed = false;           ///< `SurfelMap::is_assumed` of that surfel.
+  SurfelLabel part_of;               ///< What that surfel is a part of, if its map says.
 };
 
 /// What the points of a scan say beyond what all do.
@@ -83,8 +84,8 @@ struct Scan {
 /// What files have of each point, in this order and without padding: x y z intensity range time
 /// (float32; time in seconds after the scan's start), ring (uint16), label (uint16) and, where the
 /// scan marks them, unknown (uint8: 0, 1), echo (uint8: 0 to 2) and `PointTruth` (true_range
-/// incidence depth deskewed_x deskewed_y deskewed_z, float32; surfel, uint32; sub_ray and sub_rays,
-/// uint16; assumed, uint8).
+/// incidence depth deskewed_x deskewed_y deskewed_z, float32; surfel and thing, uint32; sub_ray and
+/// sub_rays, uint16; assumed and class, uint8).
 std::vector<PcdField> scan_fields(const ScanMarks& marks);
 
 /// Bytes of a point with these fields.

@@ -232,6 +232,12 @@ void set_section(MapDescription& description, const char* name, std::vector<std:
   if (!bytes.empty()) description.extra.push_back({name, std::move(bytes)});
 }
 
+void set_reflectivity(MapDescription& description, double per_intensity) {
+  std::vector<std::byte> bytes(per_intensity > 0.0 ? sizeof per_intensity : 0);
+  if (!bytes.empty()) std::memcpy(bytes.data(), &per_intensity, sizeof per_intensity);
+  set_section(description, kReflectivitySection, std::move(bytes));
+}
+
 void set_levels(MapDescription& description, const IntensityLevels& levels) {
   description.intensity_offset = levels.of_code[0];
   // what a reader makes of it that does not know the section
@@ -328,10 +334,8 @@ void SurfelMap::attach(std::span<const std::byte> bytes, const std::string& name
     known_ = KnownSpace::from_section(known);
     if (!known_) corrupt(KnownSpace::kSection, known);
   }
-  assumed_ = section(kAssumedSection);
-  if (!assumed_.empty() && assumed_.size() != (words_.size() + 7) / 8) {
-    corrupt(kAssumedSection, assumed_);
-  }
+  notes_ = SurfelNotes(
+      words_.size(), [this](std::string_view name) { return section(name); }, corrupt);
   levels_ = IntensityLevels::linear(properties_.intensity_offset, properties_.intensity_step);
   if (const auto levels = section(kLevelsSection); !levels.empty()) {
     if (levels.size() != sizeof levels_.of_code) corrupt(kLevelsSection, levels);

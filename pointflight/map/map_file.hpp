@@ -21,6 +21,9 @@
 ///   ...         section: known_space  which space a survey saw (known_space.hpp); optional
 ///   ...         section: reflectivity  f64: reflectivity per unit of intensity; optional
 ///   ...         section: assumed    a bit per word: surfels that no survey saw; optional
+///   ...         section: labels     u32[]: class << 24 | thing of each word; optional
+///   ...         section: classes    text: names of these classes, a line each; optional
+///   ...         section: opacity    u8[]: which beams come back from each word; optional
 ///   ...         section: fitted     u64[]: the scans that it was fitted to; optional
 ///   ...         section: levels     f32[256]: intensity of each byte, if steps are not equal;
 ///   optional
@@ -87,6 +90,9 @@ struct MapDescription : MapProperties {
 
 /// Puts an extra section in place of one of the same name; empty bytes remove it.
 void set_section(MapDescription& description, const char* name, std::vector<std::byte> bytes);
+
+/// Says what reflectivity a unit of the map's intensity stands for; 0: that it is not known.
+void set_reflectivity(MapDescription& description, double per_intensity);
 
 /// Says what the codes of intensities stand for.
 void set_levels(MapDescription& description, const IntensityLevels& levels);

@@ -14,6 +14,7 @@
 #include "pointflight/map/bvh8.hpp"
 #include "pointflight/map/intensity_levels.hpp"
 #include "pointflight/map/known_space.hpp"
+#include "pointflight/map/surfel_notes.hpp"
 #include "pointflight/map/surfel_scale.hpp"
 
 namespace pointflight {
@@ -50,9 +51,6 @@ inline std::string_view section_name(const MapSection& section) {
 
 /// Name of the section that says what reflectivity an intensity stands for.
 inline constexpr char kReflectivitySection[] = "reflectivity";
-
-/// Name of the section that marks surfels that no survey saw: for word w bit w % 8 of byte w / 8.
-inline constexpr char kAssumedSection[] = "assumed";
 
 /// Name of the section with the scans that the map was fitted to (fitted_scans.hpp): u64[].
 inline constexpr char kFittedSection[] = "fitted";
@@ -138,15 +136,13 @@ class SurfelMap {
            resolution() * (Vector3d(leaf.x, leaf.y, leaf.z) + center_voxels(word).cast<double>());
   }
 
+  /// What it says of surfels beside shape and intensity.
+  [[nodiscard]] const SurfelNotes& notes() const { return notes_; }
   /// True if some surfels are marked as assumed.
-  [[nodiscard]] bool has_assumed() const { return !assumed_.empty(); }
+  [[nodiscard]] bool has_assumed() const { return notes_.has_assumed(); }
   /// True of a surfel that no survey saw: it closes a hole in a plane that was seen around it.
   /// False of `kNoSurfel` and whatever else is no index.
-  [[nodiscard]] bool is_assumed(std::uint32_t word) const {
-    const std::size_t byte = word / 8;
-    return byte < assumed_.size() &&
-           (assumed_[byte] & (std::byte{1} << (word % 8))) != std::byte{0};
-  }
+  [[nodiscard]] bool is_assumed(std::uint32_t word) const { return notes_.is_assumed(word); }
 
   /// What the codes of intensities stand for.
   [[nodiscard]] const IntensityLevels& intensity_levels() const { return levels_; }
@@ -190,7 +186,7 @@ class SurfelMap {
   std::span<const Bvh8Node> nodes_;
   std::span<const SurfelWord> words_;
   std::span<const std::uint8_t> intensity_;
-  std::span<const std::byte> assumed_;
+  SurfelNotes notes_;
   std::string_view metadata_;
   std::optional<KnownSpace> known_;
   MapProperties properties_;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <utility>
 #include <variant>
 
 #include "pointflight/core/argument.hpp"
@@ -11,6 +12,7 @@
 #include "pointflight/render/internal/expanded_job.hpp"
 #include "pointflight/render/internal/job_check.hpp"
 #include "pointflight/render/internal/paper_renderer.hpp"
+#include "pointflight/render/internal/see_through_renderer.hpp"
 #include "pointflight/render/internal/sub_ray_renderer.hpp"
 
 namespace pointflight {
@@ -126,8 +128,14 @@ Hit Renderer::trace(const Ray& ray) const {
   return hit;
 }
 
+std::unique_ptr<Renderer> make_renderer(const RendererKind& kind, const Scene& scene) {
+  std::unique_ptr<Renderer> made = kind.make(scene);  // which refuses a scene without a map
+  if (!scene.map->notes().has_opacity()) return made;
+  return std::make_unique<SeeThroughRenderer>(std::move(made), scene);
+}
+
 std::unique_ptr<Renderer> make_renderer(const std::string& name, const Scene& scene) {
-  return Choice<RendererKind>(name)->make(scene);  // which refuses a scene without a map
+  return make_renderer(*Choice<RendererKind>(name), scene);
 }
 
 }  // namespace pointflight

@@ -25,6 +25,13 @@ struct Scene {
   std::shared_ptr<const SurfelMap> map;  ///< Never null.
 };
 
+/// Where the draws of a scan's beams are in a run's random streams.
+struct BeamDraws {
+  std::uint64_t seed = 0;    ///< The run's.
+  std::uint32_t entity = 0;  ///< Vehicle << 8 | sensor, below 2^28.
+  std::uint64_t scan = 0;    ///< Its number, below 2^32.
+};
+
 /// The rays of one scan and what a renderer that makes images needs to lay them out.
 struct RayBatch {
   std::span<const Ray> rays;  ///< World; those of a snapshot may differ in origin.
@@ -44,6 +51,9 @@ struct RayBatch {
   SimTime time;                            ///< What `time_offsets` count from.
   std::span<const Duration> time_offsets;  ///< Of each ray, or empty: all at `time`.
   SimTime snapshot_time;                   ///< Of `T_world_sensor`: for renderers of images.
+
+  /// By which beams come back from what lets some through (`Opacity`).
+  BeamDraws draws;
 
   /// When a ray leaves: its bodies are where they are then.
   [[nodiscard]] SimTime time_of(std::size_t ray) const {
@@ -128,8 +138,12 @@ struct RendererKind {
   bool one_pose = false;  ///< All rays of a scan leave from one pose: `Renderer::is_snapshot`.
 };
 
-/// Makes a renderer by name ("beam", "paper") for a scene. Throws InputError that lists the names,
-/// and std::invalid_argument if the scene has no map.
+/// Makes a renderer of a kind for a scene. If the map has surfels that let beams through
+/// (`SurfelNotes::has_opacity`), its beams go on behind them. Throws InputError, and
+/// std::invalid_argument if the scene has no map.
+std::unique_ptr<Renderer> make_renderer(const RendererKind& kind, const Scene& scene);
+
+/// The same by name ("beam", "paper"). Throws InputError that lists the names.
 std::unique_ptr<Renderer> make_renderer(const std::string& name, const Scene& scene);
 
 }  // namespace pointflight

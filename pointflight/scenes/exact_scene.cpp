@@ -20,6 +20,7 @@
 #include "pointflight/geometry/rotation.hpp"
 #include "pointflight/io/byte_cursor.hpp"
 #include "pointflight/scenes/made_world.hpp"
+#include "pointflight/scenes/scene_class.hpp"
 
 namespace pointflight {
 namespace {
@@ -193,10 +194,9 @@ class SampledCloud : public CloudReader {
                  sampling.points_per_cell / (sampling.resolution * sampling.resolution));
     double owed = 0.0;  // carried over, so that many small shapes get their share
     for (std::size_t i = 0; i < scene.geometry.shapes.size(); ++i) {
-      // a dense cloud of all shapes would make panes of glass opaque, which they are not
-      // (SceneTree)
-      const bool is_glass = scene.tags[scene.shape_tag[i]] == "glass";
-      const double thin = is_glass ? 0.0
+      // without their notes panes and water would be opaque, which they are not (SceneTree)
+      const bool is_mirror = opacity_of_class(scene.tags[scene.shape_tag[i]]) != Opacity::kOpaque;
+      const double thin = is_mirror && !sampling.with_mirrors ? 0.0
                           : scene.shape_density.empty()
                               ? 1.0
                               : static_cast<double>(scene.shape_density[i]);
@@ -213,6 +213,7 @@ class SampledCloud : public CloudReader {
     while (batch.size() < kBatch && shape_ < counts_.size()) {
       const std::uint64_t count =
           std::min<std::uint64_t>(kBatch - batch.size(), counts_[shape_] - done_);
+      const float intensity = has_intensity() ? 100.0f * scene_.shape_reflectivity[shape_] : 0.0f;
       sample_shape(scene_.geometry.shapes[shape_],
                    static_cast<std::uint32_t>(shape_),
                    done_,
@@ -221,7 +222,7 @@ class SampledCloud : public CloudReader {
                    sampling_.seed,
                    [&](const Vector3d& p) {
                      if (!sampling_.one_per_cell || is_first_in_cell(p)) {
-                       batch.push_back({p, 0.0f});
+                       batch.push_back({p, intensity});
                      }
                    });
       done_ += count;
@@ -234,7 +235,7 @@ class SampledCloud : public CloudReader {
     return !batch.empty();
   }
 
-  [[nodiscard]] bool has_intensity() const override { return false; }
+  [[nodiscard]] bool has_intensity() const override { return !scene_.shape_reflectivity.empty(); }
   [[nodiscard]] double share_read() const override {
     return total_ == 0 ? 1.0 : static_cast<double>(read_) / static_cast<double>(total_);
   }

@@ -19,6 +19,8 @@ struct ExactScene {
   std::vector<std::uint16_t> shape_tag;  ///< Of each shape, an index in `tags`.
   /// Of each shape the number of the thing that it is a part of; empty: not known.
   std::vector<std::uint32_t> shape_object;
+  /// Diffuse reflectivity of each shape, 0 to 1; empty: not known.
+  std::vector<float> shape_reflectivity;
   /// Points of each shape relative to the rest of the cloud; empty: all 1.
   std::vector<float> shape_density;
   std::vector<bool> is_target;  ///< Of each shape: small scenes aim their beams at these.
@@ -57,11 +59,14 @@ struct SceneSampling {
   double density_min = 2000.0;   ///< At least so many a square metre.
   double noise = 0.0;            ///< Deviation along the surface normal, m.
   std::uint64_t seed = 1;        ///< Of where the points lie.
+  /// Glass and water have points as well: of maps that know what they are (`Opacity`).
+  bool with_mirrors = false;
   /// Of the points in a cube of the resolution only the first is kept, as maps are often thinned.
   bool one_per_cell = false;
 };
 
-/// Streams the points of a sampled scene; the scene must outlive it.
+/// Streams the points of a sampled scene, with the reflectivity in percent as intensity if it is
+/// known; the scene must outlive it.
 std::unique_ptr<CloudReader> sampled_cloud(const ExactScene& scene, const SceneSampling& sampling);
 
 }  // namespace pointflight

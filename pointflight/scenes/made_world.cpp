@@ -81,17 +81,4 @@ ExactScene make_world(const WorldOptions& options) {
   return scene;
 }
 
-const std::vector<std::string>& scene_classes() {
-  static const std::vector<std::string> all = {
-      "wall",         "floor",       "ceiling", "ground",  "road",   "sidewalk",   "roof",
-      "column",       "beam",        "arch",    "vault",   "stairs", "balustrade", "railing",
-      "window frame", "glass",       "door",    "pipe",    "table",  "desk",       "chair",
-      "swivel chair", "monitor",     "shelf",   "cabinet", "sofa",   "bed",        "ladder",
-      "tree",         "bush",        "log",     "rock",    "grass",  "car",        "truck",
-      "forklift",     "person",      "pallet",  "box",     "rack",   "scaffold",   "pylon",
-      "wire",         "streetlight", "crane",   "girder",  "rebar",  "machine",    "container",
-      "lamp",         "sign",        "water",   "bench",   "net",    "cable",      "rail"};
-  return all;
-}
-
 }  // namespace pointflight

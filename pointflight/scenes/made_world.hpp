@@ -81,7 +81,4 @@ WorldValues values_of(const WorldOptions& options);
 /// The scene; `name` is the world's. Throws InputError as above.
 ExactScene make_world(const WorldOptions& options);
 
-/// What the things in worlds may be: the tags of their surfaces.
-const std::vector<std::string>& scene_classes();
-
 }  // namespace pointflight

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "pointflight/geometry/rotation.hpp"
+#include "pointflight/scenes/scene_class.hpp"
 
 namespace pointflight {
 
@@ -23,10 +24,14 @@ SceneBuilder::Placed SceneBuilder::at(const Vector3d& position, double yaw) {
 }
 
 void SceneBuilder::begin(const std::string& name) {
+  part(name);
+  ++object_;
+}
+
+void SceneBuilder::part(const std::string& name) {
   auto at = std::find(scene_.tags.begin(), scene_.tags.end(), name);
   if (at == scene_.tags.end()) at = scene_.tags.insert(scene_.tags.end(), name);
   tag_ = static_cast<std::uint16_t>(at - scene_.tags.begin());
-  ++object_;
 }
 
 void SceneBuilder::add(const Shape& shape) {
@@ -110,6 +115,15 @@ ExactScene SceneBuilder::finish(const Aabb& free) {
   scene_.shape_density.assign(scene_.geometry.shapes.size(), 1.0f);
   scene_.is_target.assign(scene_.geometry.shapes.size(), false);
   scene_.free = free;
+  const RandomStream random(seed_, StreamId::kReflectivity, stream_);
+  for (std::size_t i = 0; i < scene_.geometry.shapes.size(); ++i) {
+    const std::uint8_t kind = class_number(scene_.tags[scene_.shape_tag[i]]);
+    const SceneClass& row = scene_classes()[kind == 0 ? 0U : kind - 1U];
+    // all of a thing that is of one class has the same
+    const std::uint64_t thing = std::uint64_t{scene_.shape_object[i]} << 8 | kind;
+    const auto drawn = static_cast<float>(random.uniform(thing));
+    scene_.shape_reflectivity.push_back(row.dark + drawn * (row.bright - row.dark));
+  }
   return std::move(scene_);
 }
 

@@ -19,7 +19,7 @@ class SceneBuilder {
  public:
   /// `stream`: which draws of the seed.
   explicit SceneBuilder(std::uint64_t seed, std::uint32_t stream = 0)
-      : random_(seed, StreamId::kForest, 1 + stream) {}
+      : random_(seed, StreamId::kForest, 1 + stream), stream_(stream), seed_(seed) {}
 
   /// Uniform draws, one after the other: never two in one expression, whose order is the
   /// compiler's.
@@ -48,6 +48,8 @@ class SceneBuilder {
 
   /// Shapes from here on are one thing of this class (`scene_classes`).
   void begin(const std::string& name);
+  /// Shapes from here on are of this class, but of the same thing.
+  void part(const std::string& name);
 
   /// Surfaces, m, in the present frame.
   ///@{
@@ -88,6 +90,8 @@ class SceneBuilder {
   std::uint64_t next_ = 0;
   ExactScene scene_;
   std::vector<Pose> frames_ = {Pose{}};
+  std::uint32_t stream_;
+  std::uint64_t seed_;
   std::uint16_t tag_ = 0;
   std::uint32_t object_ = 0;
 };

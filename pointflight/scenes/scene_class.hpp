@@ -7,6 +7,8 @@
 #include <string_view>
 #include <vector>
 
+#include "pointflight/map/surfel_notes.hpp"
+
 namespace pointflight {
 
 /// A row of the table of classes. New ones go to its end: maps and data sets have their numbers.
@@ -19,6 +21,8 @@ struct SceneClass {
   /// libraries have of such surfaces.
   float dark;
   float bright;
+  /// Its surfaces cover part of a beam: leaves, nets, wires.
+  bool is_thin = false;
 };
 
 /// All of them. Their numbers count from 1: 0 is a surface that nothing is known of.
@@ -26,6 +30,10 @@ std::span<const SceneClass> scene_classes();
 
 /// Number of a class by its name; 0 if it is none of them.
 std::uint8_t class_number(std::string_view name);
+
+/// `Opacity` of a class's surfaces that does not hang on their shape: glass is a pane, water is
+/// water, all others are opaque.
+std::uint8_t opacity_of_class(std::string_view name);
 
 /// Names by their numbers, empty that of 0: what a map says of its labels.
 std::vector<std::string> class_names();

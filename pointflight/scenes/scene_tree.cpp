@@ -3,12 +3,12 @@
 #include <cmath>
 
 #include "pointflight/core/math.hpp"
+#include "pointflight/scenes/scene_class.hpp"
 
 namespace pointflight {
 namespace {
 
-constexpr double kGlassCosine = 0.9659;  // 15 degrees
-constexpr double kBehindGlass = 1e-4;    // m
+constexpr double kBehindGlass = 1e-4;  // m
 
 /// Point `i` of `count` spread evenly over the unit sphere (Fibonacci's spiral).
 Vector3d spread_direction(std::size_t i, std::size_t count) {
@@ -25,7 +25,7 @@ Vector3d unit_direction(double azimuth, double elevation) {
 }
 
 SceneTree::SceneTree(const ExactScene& scene) : scene_(scene), tree_(scene.geometry.shapes) {
-  for (const std::string& tag : scene.tags) is_glass_.push_back(tag == "glass");
+  for (const std::string& tag : scene.tags) mirrors_.push_back(opacity_of_class(tag));
 }
 
 std::optional<ShapeTree::Hit> SceneTree::intersect(const Vector3d& origin,
@@ -35,17 +35,19 @@ std::optional<ShapeTree::Hit> SceneTree::intersect(const Vector3d& origin,
   for (int i = 0; i < kPanes; ++i) {
     const Vector3d from = origin + passed * direction;
     auto met = tree_.intersect(from, direction);
-    if (!met || !is_glass_[scene_.shape_tag[met->shape]]) {
-      if (met) met->range += passed;
-      return met;
-    }
+    if (!met) return std::nullopt;
     const Vector3d normal =
         normal_at(scene_.geometry.shapes[met->shape], from + met->range * direction);
-    if (std::abs(normal.dot(direction)) >= kGlassCosine) {
-      met->range += passed;
+    const auto fate = Opacity::fate(mirrors_[scene_.shape_tag[met->shape]],
+                                    static_cast<float>(std::abs(normal.dot(direction))),
+                                    0.0);
+    if (fate == Opacity::Fate::kLost) return std::nullopt;
+    passed += met->range;
+    if (fate == Opacity::Fate::kReturns) {
+      met->range = passed;
       return met;
     }
-    passed += met->range + kBehindGlass;
+    passed += kBehindGlass;
   }
   return std::nullopt;
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <vector>
 
@@ -9,7 +10,8 @@
 namespace pointflight {
 
 /// What a LiDAR's beams hit in a scene. Shapes with the tag "glass" send a beam back within 15
-/// degrees of their normal and are not there for any other: what a pane does to 905 nm.
+/// degrees of their normal and are not there for any other: what a pane does to 905 nm. Those with
+/// the tag "water" send back the same beams, and no other comes back from there or behind.
 class SceneTree {
  public:
   /// Refers to the scene, which must outlive the tree and stay as it is.
@@ -25,7 +27,7 @@ class SceneTree {
  private:
   const ExactScene& scene_;
   ShapeTree tree_;
-  std::vector<bool> is_glass_;  ///< Of each tag.
+  std::vector<std::uint8_t> mirrors_;  ///< `Opacity` of each tag: pane, water, opaque.
 };
 
 /// Unit vector, rad.

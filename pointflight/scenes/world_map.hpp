@@ -1,5 +1,9 @@
 #pragma once
 
+#include <memory>
+#include <optional>
+#include <string>
+
 #include "pointflight/core/parallel.hpp"
 #include "pointflight/core/progress.hpp"
 #include "pointflight/map/import/map_builder.hpp"
@@ -17,8 +21,11 @@ struct WorldMapOptions {
 std::string name_of(const WorldMapOptions& options);
 
 /// The map of a perfect scan of a world: its surfaces are sampled evenly, six points a square of
-/// the resolution, without noise. Glass is not there. The same options and resolution are the
-/// same bytes. Throws InputError as `make_world` does.
+/// the resolution, without noise; intensities are reflectivities in percent. It says what its
+/// surfels are parts of and which beams they let through (`note_surfaces`), and which world it is
+/// of
+/// (`world_of`). The same options and resolution are the same bytes. Throws InputError as
+/// `make_world` does.
 ImportedMap make_world_map(const WorldMapOptions& options,
                            const Executor& executor,
                            const Progress& progress = {});
@@ -27,5 +34,14 @@ ImportedMap make_world_map(const WorldMapOptions& options,
 std::shared_ptr<const SurfelMap> open_world_map(const WorldMapOptions& options,
                                                 const Executor& executor,
                                                 const Progress& progress = {});
+
+/// Says in a map's metadata which world it is of.
+void set_world(MapDescription& description, const WorldMapOptions& options);
+/// The world that a map is of, as its metadata say; nothing if they do not.
+std::optional<WorldMapOptions> world_of(const SurfelMap& map);
+
+/// What is known of a world, as JSON: kind, seed, parameters, classes with their numbers in
+/// ADE20K, and each thing's number, class, reflectivity and box (m).
+std::string world_truth(const WorldMapOptions& options, const ExactScene& scene);
 
 }  // namespace pointflight

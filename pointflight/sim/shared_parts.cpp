@@ -9,7 +9,7 @@ SharedParts::SharedParts(std::shared_ptr<const SurfelMap> map, std::string folde
 
 std::shared_ptr<const Renderer> SharedParts::renderer(const Choice<RendererKind>& kind) {
   auto& made = renderers_[&*kind];
-  if (!made) made = kind->make(Scene{map_});
+  if (!made) made = make_renderer(*kind, Scene{map_});
   return made;
 }
 

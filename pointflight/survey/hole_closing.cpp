@@ -79,7 +79,9 @@ EditedMap tiled(const SurfelMap& map,
                            (cell.center_world.array() <= box.max.array()).all();
     if (!is_inside || taken.has_near(cell.center_world)) continue;
     taken.add(cell.center_world);
-    all.add(cell.center_world, tile_of(cell), {marks_of(map, cell.beside).intensity, true});
+    SurfelMarks marks = marks_of(map, cell.beside);
+    marks.note.is_assumed = true;
+    all.add(cell.center_world, tile_of(cell), marks);
   }
   return all.build(description_of(map), true, "the map", executor);
 }

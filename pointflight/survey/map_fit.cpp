@@ -15,6 +15,7 @@
 #include "pointflight/survey/internal/ray_fate.hpp"
 #include "pointflight/survey/internal/reshaped_surfel.hpp"
 #include "pointflight/survey/internal/surfel_blame.hpp"
+#include "pointflight/survey/opacity_fit.hpp"
 #include "pointflight/survey/surfel_changes.hpp"
 #include "pointflight/survey/surfel_evidence.hpp"
 #include "pointflight/survey/survey_hits.hpp"
@@ -197,6 +198,10 @@ EditedMap fit_map(const SurfelMap& map,
       known->add([&](const Vector3d& center) { return old->known(center); });
     }
     set_section(fitted.description, KnownSpace::kSection, known->section());
+  }
+  if (fit.opacity) {
+    const OpacityOptions chosen{.right = fit.right};
+    report.clear = fit_opacity(fitted, survey, chosen, executor, progress);
   }
   return fitted;
 }

@@ -35,6 +35,7 @@ struct FitOptions {
   double blame_share = 0.9;
   int blame_passes = 2;  ///< How often pass 2 is made; each sees what the one before has changed.
   bool known_space = true;  ///< Write down which space the rays crossed.
+  bool opacity = false;     ///< Last, find out which surfels let beams through (`fit_opacity`).
 };
 
 /// How a survey's rays fare in a map.
@@ -60,6 +61,7 @@ struct FitReport {
   OwnRays between;               ///< After pass 1.
   std::uint64_t unseen = 0;      ///< Surfels that no ray hit, left as they were.
   std::uint64_t blamed = 0;      ///< Removed by pass 2.
+  std::uint64_t clear = 0;       ///< Surfels that let beams through.
   std::vector<Vector3d> ghosts;  ///< Centres of the surfels of what moved, removed by pass 1.
   /// How often a ray hit more surfels than fit in its list, and was ended there.
   std::uint64_t overflows = 0;

@@ -28,6 +28,9 @@ struct SurfelRow {
   float intensity;
   std::uint32_t word;
   std::uint8_t assumed;
+  std::uint8_t kind;
+  std::uint8_t opacity;
+  std::uint32_t thing;
 };
 
 std::shared_ptr<MapObject> open_map(const std::string& path) {
@@ -112,11 +115,29 @@ py::array_t<SurfelRow> surfels_of(const MapObject& object) {
       }
       row.word = static_cast<std::uint32_t>(word);
       row.intensity = map.intensity(row.word);
-      row.assumed = map.is_assumed(row.word) ? 1 : 0;
+      const SurfelNote note = map.notes().of(row.word);
+      row.assumed = note.is_assumed ? 1 : 0;
+      row.kind = note.label.kind;
+      row.thing = note.label.thing;
+      row.opacity = note.opacity;
     });
   }
   const auto count = static_cast<py::ssize_t>(rows.size());
   return array_of(std::move(rows), {count});
+}
+
+/// Classes and things of surfels by their words.
+py::tuple labels_of(const MapObject& object, const Array<std::uint32_t>& words) {
+  if (words.ndim() != 1) throw py::value_error("surfels: (n,) is wanted");
+  std::vector<std::uint8_t> kinds;
+  std::vector<std::uint32_t> things;
+  for (py::ssize_t i = 0; i < words.shape(0); ++i) {
+    const SurfelLabel label = object.map->notes().label(words.at(i));
+    kinds.push_back(label.kind);
+    things.push_back(label.thing);
+  }
+  const py::ssize_t count = words.shape(0);
+  return py::make_tuple(array_of(std::move(kinds), {count}), array_of(std::move(things), {count}));
 }
 
 /// (k, 3); none if no position is free.
@@ -153,7 +174,27 @@ py::array_t<double> tour_of(const MapObject& object,
 }  // namespace
 
 void add_map(py::module_& module) {
-  PYBIND11_NUMPY_DTYPE(SurfelRow, center, normal, axis, sigmas, intensity, word, assumed);
+  PYBIND11_NUMPY_DTYPE_EX(SurfelRow,
+                          center,
+                          "center",
+                          normal,
+                          "normal",
+                          axis,
+                          "axis",
+                          sigmas,
+                          "sigmas",
+                          intensity,
+                          "intensity",
+                          word,
+                          "word",
+                          assumed,
+                          "assumed",
+                          kind,
+                          "class",
+                          opacity,
+                          "opacity",
+                          thing,
+                          "thing");
   py::class_<MapObject, std::shared_ptr<MapObject>>(module, "Map")
       .def_static("_open", &open_map, py::arg("path"))
       .def_static("_import_clouds",
@@ -180,6 +221,9 @@ void add_map(py::module_& module) {
       .def("__len__", [](const MapObject& m) { return m.map->surfel_count(); })
       .def("_nearest", &nearest_to, py::arg("points"), py::arg("reach"))
       .def("_surfels", &surfels_of)
+      .def_property_readonly("classes",
+                             [](const MapObject& m) { return m.map->notes().class_names(); })
+      .def("_labels", &labels_of, py::arg("surfels"))
       .def("_tour",
            &tour_of,
            py::arg("length"),

@@ -187,7 +187,7 @@ void add_sensor(const std::string& name,
 class PythonRenderer : public Renderer {
  public:
   PythonRenderer(const Scene& scene, Held change)
-      : beams_(make_renderer("beam", scene)), change_(std::move(change)) {}
+      : beams_(Choice<RendererKind>("beam")->make(scene)), change_(std::move(change)) {}
 
  protected:
   void render_one(const RenderJob& job, const Executor& executor) const override {

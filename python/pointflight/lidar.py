@@ -30,7 +30,8 @@ class Scan(np.ndarray):  # type: ignore[type-arg]  # numpy before 1.22 cannot be
 
     x, y, z float32, m in the sensor frame; intensity, range float32; time float32, s after the scan's start; ring,
     label uint16 (0 the map, 65535 a false return). With `truth=True` also what no sensor knows: true_range, incidence,
-    depth, deskewed_x, deskewed_y, deskewed_z float32, surfel uint32, sub_ray, sub_rays uint16, assumed uint8.
+    depth, deskewed_x, deskewed_y, deskewed_z float32, surfel, thing uint32, sub_ray, sub_rays uint16, assumed,
+    class uint8.
     """
 
     beams: int

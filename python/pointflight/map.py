@@ -7,7 +7,7 @@ import json
 import os
 import pickle
 import tempfile
-from typing import Any, Callable, Iterable, Optional, Sequence, Tuple, Union
+from typing import Any, Callable, Iterable, List, Optional, Sequence, Tuple, Union
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -173,6 +173,17 @@ class Map:
 
         center (3,) float64, world, m; normal (3,) and axis (3,) float32, unit vectors, the latter along the longest
         extent; sigmas (3,) float32, m, along the normal, across, and along the axis; intensity float32; word uint32,
-        its index in `words` and in `Hits.surfel`; assumed uint8, 1 if no survey saw it.
+        its index in `words` and in `Hits.surfel`; assumed uint8, 1 if no survey saw it; class uint8 and thing uint32,
+        as `labels`; opacity uint8: so many 255ths of the beams that reach it come back, but 0 is a pane, 1 water.
         """
         return self._handle._surfels()
+
+    @property
+    def classes(self) -> List[str]:
+        """What the numbers of classes mean; the first is empty: not known. Maps of made-up worlds know them."""
+        return self._handle.classes
+
+    def labels(self, surfels: ArrayLike) -> Tuple[NDArray[np.uint8], NDArray[np.uint32]]:
+        """Class (n,), an index in `classes`, and thing (n,) of surfels (n,) by their words: of `Hits.surfel`, say.
+        Surfels of one tree or chair have one thing. Zeros where nothing is known."""
+        return self._handle._labels(np.asarray(surfels, np.uint32))

@@ -1,4 +1,10 @@
+#include <fmt/format.h>
+
+#include <cmath>
 #include <nlohmann/json.hpp>
+#include <sstream>
+#include <string>
+#include <vector>
 
 #include "tests/integration/program.hpp"
 
@@ -11,6 +17,7 @@ using testing::read_file;
 using testing::Result;
 using testing::run;
 using testing::TemporaryFolder;
+using testing::write_file;
 
 TEST(WorldProgram, ListsAndShowsAndMakes) {
   const auto worlds = nlohmann::json::parse(run("world list --json").out);
@@ -103,6 +110,77 @@ TEST(WorldProgram, Slow_ASurveyIsAMapWithScans) {
                       scans,
                       folder / "i.pfmap"));
   EXPECT_EQ(imported.code, 0) << imported.err;
+}
+
+/// Lines of a CSV as words.
+std::vector<std::vector<std::string>> rows_of(const std::string& csv) {
+  std::vector<std::vector<std::string>> rows;
+  std::istringstream lines(csv);
+  for (std::string line; std::getline(lines, line);) {
+    std::vector<std::string>& row = rows.emplace_back();
+    std::istringstream words(line);
+    for (std::string word; std::getline(words, word, ',');) row.push_back(word);
+  }
+  return rows;
+}
+
+TEST(WorldProgram, RaysAreCastIntoMapsAndIntoWhatIsExact) {
+  const TemporaryFolder folder;
+  const std::string map = folder / "office.pfmap";
+  ASSERT_EQ(run("world make large_office -o " + map + " --resolution 0.1").code, 0);
+  std::string rays = "# a fan, as text\n";
+  for (int i = 0; i < 200; ++i) {
+    const double a = 0.0314 * i;
+    rays += fmt::format("20 8 1.5  {} {} {}\n", std::cos(a), std::sin(a), 0.003 * (i % 50));
+  }
+  write_file(folder / "rays.txt", rays);
+  const auto cast = [&](const std::string& words) {
+    const Result result = run("raycast " + words);
+    EXPECT_EQ(result.code, 0) << result.err;
+    return rows_of(result.out);
+  };
+  const std::string file = " " + (folder / "rays.txt");
+  const auto exact = cast(map + file + " --exact");
+  EXPECT_EQ(exact, cast("large_office" + file + " --exact"));
+  const auto in_map = cast(map + file);
+  ASSERT_EQ(exact.size(), 201u);
+  ASSERT_EQ(in_map.size(), 201u);
+  EXPECT_EQ(exact[0][0], "range");
+  std::size_t near = 0;
+  std::size_t same = 0;
+  for (std::size_t i = 1; i < exact.size(); ++i) {
+    if (exact[i][0] == "inf" || in_map[i][0] == "inf") continue;
+    if (std::abs(std::stod(exact[i][0]) - std::stod(in_map[i][0])) > 0.05) continue;
+    ++near;
+    // class and thing, but for where things touch each other
+    same += exact[i][3] == in_map[i][3] && exact[i][4] == in_map[i][4] ? 1 : 0;
+  }
+  EXPECT_GT(near, 140u);
+  EXPECT_GT(static_cast<double>(same), 0.95 * static_cast<double>(near));
+
+  const auto truth = nlohmann::json::parse(read_file(folder / "office.truth"));
+  EXPECT_EQ(truth["world"], "large_office");
+  EXPECT_GT(truth["things"].size(), 50u);
+  EXPECT_EQ(truth["classes"][0]["name"], "wall");
+
+  // the truth of points says the same
+  ASSERT_EQ(run("scan " + map + " --lidar vlp16 --pose 20,8,1.5,0,0,0 --truth -o " +
+                (folder / "scan.pcd"))
+                .code,
+            0);
+  expect_contains(read_file(folder / "scan.pcd").substr(0, 600),
+                  "surfel thing sub_ray sub_rays assumed class");
+
+  expect_user_error(run("raycast large_office " + (folder / "none.txt")), "No such file");
+  write_file(folder / "bad.txt", "1 2 3\n");
+  expect_user_error(run("raycast large_office " + (folder / "bad.txt")), "bad.txt:1: a ray is six");
+  write_file(folder / "bad.txt", "1 2 3 0 0 0\n");
+  expect_user_error(run("raycast large_office " + (folder / "bad.txt")), "has no length");
+  ASSERT_EQ(run("map forest -o " + (folder / "f.pcd") + " --trees 20").code, 0);
+  ASSERT_EQ(run("map import " + (folder / "f.pcd") + " --resolution 0.2 -o " + (folder / "f.pfmap"))
+                .code,
+            0);
+  expect_user_error(run("raycast " + (folder / "f.pfmap") + file + " --exact"), "world make");
 }
 
 TEST(WorldProgram, SaysWhatIsWrong) {

@@ -10,31 +10,14 @@
 #include "pointflight/render/internal/beam_kernel.hpp"
 #include "pointflight/render/internal/cone_kernel.hpp"
 #include "pointflight/render/internal/direction_order.hpp"
+#include "tests/render/even_surfaces.hpp"
 #include "tests/support.hpp"
 
 namespace pointflight {
 namespace {
 
+using testing::EvenSurfaces;
 using testing::map_of;
-
-/// All surfaces give back 0.3 whatever their angle; every echo counts.
-class EvenSurfaces : public EchoReceiver {
- public:
-  explicit EvenSurfaces(bool takes_strongest = false) : takes_strongest_(takes_strongest) {}
-  [[nodiscard]] double reflectivity(const Hit& /*hit*/) const override { return 0.3; }
-  [[nodiscard]] Reflectances reflectances() const override {
-    return {.per_intensity = 0.0f, .same = 0.3f, .usual = nullptr, .least = 0.3f};
-  }
-  [[nodiscard]] bool is_marginal(const Echo& /*echo*/,
-                                 double /*less*/,
-                                 double /*more*/) const override {
-    return false;
-  }
-  [[nodiscard]] bool takes_strongest() const override { return takes_strongest_; }
-
- private:
-  bool takes_strongest_;
-};
 
 /// Beams into a window of the world, in rows, as LiDARs have them; from where a sensor that flies
 /// is, or from one position.

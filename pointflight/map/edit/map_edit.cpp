@@ -72,8 +72,10 @@ EditedMap shifted(const SurfelMap& map, const Vector3d& by, const EditOptions& o
   copy(map.words(), edited.tree.words);
   copy(map.intensity_codes(), edited.tree.intensity);
   edited.description = description_of(map);
-  const auto assumed = map.section(kAssumedSection);
-  set_section(edited.description, kAssumedSection, {assumed.begin(), assumed.end()});
+  for (const char* name : {kAssumedSection, kLabelsSection, kOpacitySection}) {
+    const auto notes = map.section(name);
+    set_section(edited.description, name, {notes.begin(), notes.end()});
+  }
   edited.description.origin_world += by;
   edited.description.bounds_world.min += by;
   edited.description.bounds_world.max += by;
@@ -137,6 +139,40 @@ IntensityLevels join_intensities(const std::vector<PlacedMap>& maps, MapDescript
   return levels;
 }
 
+/// Labels of several maps side by side: things get numbers of their own. If the maps' classes have
+/// other names, or there are more things than numbers, none is kept.
+class JoinedLabels {
+ public:
+  JoinedLabels(const std::vector<PlacedMap>& maps, MapDescription& description) {
+    for (const PlacedMap& placed : maps) {
+      const SurfelNotes& notes = placed.map->notes();
+      first_.push_back(next_);
+      if (!notes.has_labels()) continue;
+      are_kept_ = are_kept_ && (names_.empty() || names_ == notes.class_names());
+      names_ = notes.class_names();
+      std::uint32_t most = 0;
+      for_each_surfel(placed.map->words(), [&](const LeafHeader&, std::size_t word) {
+        most = std::max(most, notes.label(static_cast<std::uint32_t>(word)).thing);
+      });
+      next_ += most + 1;
+      are_kept_ = are_kept_ && next_ <= SurfelLabel::kThings;
+    }
+    set_class_names(description, are_kept_ ? names_ : std::vector<std::string>{});
+  }
+
+  /// Of a surfel of map number `m`.
+  [[nodiscard]] SurfelLabel of(std::size_t m, const SurfelLabel& label) const {
+    if (!are_kept_ || label == SurfelLabel{}) return {};
+    return {label.kind, label.thing + first_[m]};
+  }
+
+ private:
+  std::vector<std::string> names_;
+  std::vector<std::uint32_t> first_;  // number of each map's thing 0
+  std::uint32_t next_ = 0;
+  bool are_kept_ = true;
+};
+
 [[noreturn]] void refuse_width(double resolution) {
   throw InputError(
       fmt::format("the maps lie more than {:.0f} km apart, too far for a resolution of {:.4g} m",
@@ -151,18 +187,15 @@ MapDescription description_of(const SurfelMap& map) {
   static_cast<MapProperties&>(d) = map.properties();
   d.has_intensity = map.has_intensity();
   d.metadata = std::string(map.metadata());
-  for (const char* name :
-       {KnownSpace::kSection, kReflectivitySection, kLevelsSection, kFittedSection}) {
+  for (const char* name : {KnownSpace::kSection,
+                           kReflectivitySection,
+                           kLevelsSection,
+                           kClassesSection,
+                           kFittedSection}) {
     const auto bytes = map.section(name);
     if (!bytes.empty()) d.extra.push_back({name, {bytes.begin(), bytes.end()}});
   }
   return d;
-}
-
-void set_reflectivity(MapDescription& description, double per_intensity) {
-  std::vector<std::byte> bytes(per_intensity > 0.0 ? sizeof per_intensity : 0);
-  if (!bytes.empty()) std::memcpy(bytes.data(), &per_intensity, sizeof per_intensity);
-  set_section(description, kReflectivitySection, std::move(bytes));
 }
 
 void append_note(EditedMap& edited, const std::string& note) {
@@ -254,6 +287,7 @@ EditedMap merge_maps(const std::vector<PlacedMap>& maps,
   for (const PlacedMap& placed : maps) most += count_surfels(*placed.map);
   MapDescription description = description_of(first);
   const IntensityLevels levels = join_intensities(maps, description);
+  const JoinedLabels labels(maps, description);
   const Vector3d base =
       first_stays ? Vector3d(first.origin_world() + T_first.translation)
                   : T_first * (0.5 * (first.bounds_world().min + first.bounds_world().max));
@@ -268,6 +302,7 @@ EditedMap merge_maps(const std::vector<PlacedMap>& maps,
         report(progress, "merging", static_cast<double>(m) / static_cast<double>(maps.size()));
       }
       SurfelMarks marks = marks_of(map, word);
+      marks.note.label = labels.of(m, marks.note.label);
       if (description.has_intensity) {
         marks.intensity = levels.code_of(map.intensity(static_cast<std::uint32_t>(word)));
       }

@@ -36,9 +36,6 @@ struct EditOptions {
 /// intensities stand for, not the marks of surfels, which go with the tree.
 MapDescription description_of(const SurfelMap& map);
 
-/// Says what reflectivity a unit of the map's intensity stands for; 0: that it is not known.
-void set_reflectivity(MapDescription& description, double per_intensity);
-
 /// Appends what was done to the metadata's list "edited".
 void append_note(EditedMap& edited, const std::string& note);
 

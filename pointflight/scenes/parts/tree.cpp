@@ -59,7 +59,9 @@ void add_broadleaf(SceneBuilder& to, const Tree& tree) {
       const double length = to.between(0.2, 0.45) * tree.crown;
       const Vector3d end = foot + length * way;
       to.taper(foot, end, 0.35 * thick, 0.1 * thick);
+      to.part("leaves");
       for (int n = 0; n < leaves; ++n) add_leaf(to, end, 0.4 * tree.crown, tree.leaf);
+      to.part("tree");
     }
   }
 }
@@ -84,10 +86,12 @@ void add_conifer(SceneBuilder& to, const Tree& tree) {
           foot + Vector3d(length * heading.cos, length * heading.sin, -0.18 * length);
       const double thick = std::max(0.006, 0.18 * tree.trunk * (1.0 - share));
       to.taper(foot, tip, thick, 0.3 * thick);
+      to.part("leaves");
       for (int n = 0; n < leaves; ++n) {
         const double at = to.between(0.25, 1.0);
         add_leaf(to, foot + at * (tip - foot), 0.22, 0.7 * tree.leaf);
       }
+      to.part("tree");
     }
   }
 }

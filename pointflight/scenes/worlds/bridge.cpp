@@ -111,11 +111,12 @@ void add_bridge_things(SceneBuilder& to) {
   }
 }
 
-/// A suspension bridge over a river bed. A beam that falls on water gives nothing back but straight
-/// from above: water is left out here.
+/// A suspension bridge over a river.
 Aabb build_bridge(SceneBuilder& to, const WorldValues& values) {
   to.begin("ground");
   to.relief({0, 0}, {kBridgeLong, kBridgeWide}, 0.6, valley);
+  to.begin("water");
+  to.rectangle({12, 0, 0}, {kBridgeLong - 24, 0, 0}, {0, kBridgeWide, 0});
   add_deck(to);
   add_suspension(to, values["tower"], values["hangers"]);
   add_bridge_things(to);
@@ -126,7 +127,7 @@ Aabb build_bridge(SceneBuilder& to, const WorldValues& values) {
 
 WorldKind bridge() {
   return {"bridge",
-          "a suspension bridge: towers, cables, hangers, girders under the deck, a river bed",
+          "a suspension bridge: towers, cables, hangers, girders under the deck, a river",
           {100, 40, 30},
           {{"tower", "above the deck, m", 10.0, 16.0}, {"hangers", "apart, m", 2.0, 4.0}},
           build_bridge,

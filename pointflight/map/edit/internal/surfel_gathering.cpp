@@ -13,22 +13,27 @@ bool before(const BuildSurfel& a, const BuildSurfel& b) {
   return a.morton != b.morton ? a.morton < b.morton : a.word < b.word;
 }
 
-/// A bit for each word of a tree whose voxel (0, 0, 0) is `base` of those that `marked` lie in.
-std::vector<std::byte> bits_of(std::span<const SurfelWord> words,
-                               const std::array<std::int32_t, 3>& base,
-                               std::vector<BuildSurfel> marked) {
-  if (marked.empty()) return {};
-  std::ranges::sort(marked, before);
-  std::vector<std::byte> bits((words.size() + 7) / 8);
+/// A surfel of which something is said.
+struct NotedSurfel {
+  BuildSurfel surfel;
+  SurfelNote note;
+};
+
+/// A note for each word of a tree whose voxel (0, 0, 0) is `base` of those that `noted` lie in.
+std::vector<SurfelNote> notes_of(std::span<const SurfelWord> words,
+                                 const std::array<std::int32_t, 3>& base,
+                                 std::vector<NotedSurfel> noted) {
+  if (noted.empty()) return {};
+  std::ranges::stable_sort(noted, before, &NotedSurfel::surfel);
+  std::vector<SurfelNote> notes(words.size());
   for_each_surfel(words, [&](const LeafHeader& leaf, std::size_t at) {
     PlacedSurfel placed = placed_surfel(leaf, words[at]);
     for (std::size_t axis = 0; axis < 3; ++axis) placed.voxel[axis] += base[axis];
     const BuildSurfel surfel{voxel_key(placed.voxel), placed.word};
-    if (std::ranges::binary_search(marked, surfel, before)) {
-      bits[at / 8] |= std::byte{1} << (at % 8);
-    }
+    const auto found = std::ranges::lower_bound(noted, surfel, before, &NotedSurfel::surfel);
+    if (found != noted.end() && !before(surfel, found->surfel)) notes[at] = found->note;
   });
-  return bits;
+  return notes;
 }
 
 }  // namespace
@@ -46,7 +51,7 @@ PlacedSurfel placed_surfel(const LeafHeader& leaf, SurfelWord word) {
 
 SurfelMarks marks_of(const SurfelMap& map, std::size_t word) {
   return {map.has_intensity() ? map.intensity_codes()[word] : std::uint8_t{0},
-          map.is_assumed(static_cast<std::uint32_t>(word))};
+          map.notes().of(static_cast<std::uint32_t>(word))};
 }
 
 EditedMap SurfelGathering::build(const MapDescription& description,
@@ -87,11 +92,12 @@ EditedMap SurfelGathering::finish(const MapDescription& description,
   edited.surfels = count;
   ScratchArray<BuildSurfel> surfels(scratch_, count);
   ScratchArray<std::uint8_t> intensity(scratch_, description.has_intensity ? count : 0);
-  std::vector<BuildSurfel> assumed;
+  std::vector<NotedSurfel> noted;
   for (std::size_t i = 0; i < count; ++i) {
     surfels[i] = entries_[i].surfel;
     if (description.has_intensity) intensity[i] = entries_[i].marks.intensity;
-    if (entries_[i].marks.is_assumed) assumed.push_back(entries_[i].surfel);
+    const SurfelNote& note = entries_[i].marks.note;
+    if (!note.is_plain()) noted.push_back({entries_[i].surfel, note});
   }
   edited.description.bounds_world = bounds_of(surfels.span(), base_, resolution_);
   TreeInput input{surfels, intensity, {}, resolution_};
@@ -99,9 +105,7 @@ EditedMap SurfelGathering::finish(const MapDescription& description,
     input.low[axis] = static_cast<std::uint32_t>(base[axis] + kMaxVoxel);
   }
   edited.tree = build_bvh8(input, options_.quality, executor, scratch_);
-  set_section(edited.description,
-              kAssumedSection,
-              bits_of(edited.tree.words.span(), base, std::move(assumed)));
+  set_notes(edited.description, notes_of(edited.tree.words.span(), base, std::move(noted)));
   return edited;
 }
 

@@ -16,7 +16,7 @@ namespace pointflight {
 /// What is known of a surfel beside its shape.
 struct SurfelMarks {
   std::uint8_t intensity = 0;  ///< Its code.
-  bool is_assumed = false;     ///< `SurfelMap::is_assumed`
+  SurfelNote note{};           ///< `SurfelMap::notes`
 };
 /// Of a map's surfel.
 SurfelMarks marks_of(const SurfelMap& map, std::size_t word);
