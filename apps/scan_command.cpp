@@ -165,10 +165,11 @@ void add_scan_command(CLI::App& parent, int& /*exit_code*/) {
       flags->output,
       "PCD of the points in the sensor frame: x y z intensity range time ring label; echo, "
       "where beams may have several");
-  app->add_flag("--truth",
-                flags->truth,
-                "The PCD also says what the simulator knows of each point: true_range incidence "
-                "depth deskewed_x deskewed_y deskewed_z surfel thing sub_ray sub_rays assumed class")
+  app->add_flag(
+         "--truth",
+         flags->truth,
+         "The PCD also says what the simulator knows of each point: true_range incidence "
+         "depth deskewed_x deskewed_y deskewed_z surfel thing sub_ray sub_rays assumed class")
       ->needs(output);
   app->add_flag("--mark-unknown",
                 flags->mark_unknown,

@@ -23,7 +23,7 @@ allowed() {
     vehicle) echo "$ground" ;;
     world) echo "$ground map map/import" ;;
     survey) echo "$ground map map/import map/edit render lidar" ;;
-    scenes) echo "$ground map/import" ;;
+    scenes) echo "$ground map/import map" ;;
     fidelity) echo "$ground map render lidar survey scenes" ;;
     sim) echo "$step" ;;
     learn) echo "$step run" ;;

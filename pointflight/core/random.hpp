@@ -47,6 +47,7 @@ enum class StreamId : std::uint32_t {
   kPlaces = 36,           ///< of made-up worlds; index: draw
   kSeeThrough = 37,       ///< entity: draw << 28 | vehicle << 8 | lidar, index: scan << 32 | beam
   kReflectivity = 38,     ///< of things in made-up worlds; entity: of the world, index: thing
+  kSurfaceNotes = 39,     ///< rays through surfels of made-up worlds; index: 2 * ray + 0, 1
   kTest = 1000,           ///< inputs of tests and benchmarks
 };
 

@@ -30,6 +30,7 @@ struct SurfelLabel {
   std::uint8_t kind = 0;    ///< Number of its class; 0: not known.
   std::uint32_t thing = 0;  ///< The same of all surfels of one tree, chair, ...; below `kThings`.
 
+  /// Of the same thing, and of the same class.
   bool operator==(const SurfelLabel&) const = default;
 };
 

@@ -19,8 +19,9 @@ struct SceneClass {
   std::uint16_t ade20k;
   /// Its things' diffuse reflectivities at 905 nm, from and to: assumed, of the order that spectral
   /// libraries have of such surfaces.
-  float dark;
-  float bright;
+  ///@{
+  float dark, bright;
+  ///@}
   /// Its surfaces cover part of a beam: leaves, nets, wires.
   bool is_thin = false;
 };

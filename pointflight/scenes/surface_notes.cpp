@@ -84,7 +84,7 @@ class SurfaceNotes {
   [[nodiscard]] double share_of_hits(const Vector3d& center,
                                      const Surfel& surfel,
                                      std::uint64_t number) const {
-    const RandomStream random(0, StreamId::kSeeThrough, 0);
+    const RandomStream random(0, StreamId::kSurfaceNotes, 0);
     const Matrix3d axes = surfel.axes.cast<double>();
     std::uint64_t hits = 0;
     for (std::uint64_t i = 0; i < kRaysThrough; ++i) {

@@ -1,6 +1,7 @@
 #include "pointflight/render/internal/see_through_renderer.hpp"
 
 #include <algorithm>
+#include <numeric>
 #include <utility>
 #include <vector>
 
@@ -30,8 +31,9 @@ class ThroughJob {
   /// Changes the job's hits or echoes to what comes back.
   void go_on(const Executor& executor) {
     std::vector<BeamOnItsWay> beams;
+    const auto order = job_.batch.order;
     for (std::size_t i = 0; i < job_.batch.size(); ++i) {
-      const auto number = static_cast<std::uint32_t>(i);
+      const auto number = order.empty() ? static_cast<std::uint32_t>(i) : order[i];
       const auto passed = job_.wide ? after_echoes(number) : after_hit(number);
       if (passed) beams.push_back({number, *passed});
     }
@@ -76,7 +78,10 @@ class ThroughJob {
     RayBatch batch = job_.batch;
     batch.aimed = nullptr;
     batch.rays = rays;
-    batch.order = {};
+    // they are in the order of the job's
+    std::vector<std::uint32_t> order(rays.size());
+    std::iota(order.begin(), order.end(), 0u);
+    batch.order = order;
     batch.time_offsets = offsets;
     std::vector<Hit> hits(rays.size());
     behind_.render(batch, hits, executor);
@@ -204,7 +209,10 @@ class SeeThroughRenderer::Through : public Rendering {
 };
 
 SeeThroughRenderer::SeeThroughRenderer(std::unique_ptr<Renderer> front, const Scene& scene)
-    : front_(std::move(front)), behind_(std::make_unique<BeamRenderer>(scene)), map_(scene.map) {}
+    // each ray starts somewhere else: neighbours have no way in common
+    : front_(std::move(front)),
+      behind_(std::make_unique<BeamRenderer>(scene, BeamGrouping::kSingly)),
+      map_(scene.map) {}
 
 std::unique_ptr<Rendering> SeeThroughRenderer::submit(std::span<const RenderJob> jobs,
                                                       const Executor& executor) const {
