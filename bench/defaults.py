@@ -17,8 +17,8 @@ import subprocess
 import sys
 import tempfile
 
-BEGIN = "<!-- bench: defaults -->"
-END = "<!-- bench: end -->"
+from tables import put_into
+
 SECONDS = 2
 
 
@@ -77,14 +77,6 @@ def table(path, maps, sensors, folder):
     return "\n".join(lines)
 
 
-def put_into(file, text):
-    page = pathlib.Path(file).read_text()
-    pattern = re.compile(re.escape(BEGIN) + ".*?" + re.escape(END), re.S)
-    if not pattern.search(page):
-        sys.exit(f"defaults: {file}: has no {BEGIN} ... {END}")
-    pathlib.Path(file).write_text(pattern.sub(lambda _: f"{BEGIN}\n{text}\n{END}", page))
-
-
 def main():
     parser = argparse.ArgumentParser(description="What each shipped LiDAR costs")
     parser.add_argument("program")
@@ -108,7 +100,7 @@ def main():
         text = table(flags.program, maps, sensors, folder)
     print(text)
     if flags.into:
-        put_into(flags.into, text)
+        put_into(flags.into, "defaults", text)
 
 
 if __name__ == "__main__":

@@ -13,14 +13,13 @@ import argparse
 import json
 import os
 import pathlib
-import re
 import subprocess
 import sys
 import tempfile
 import time
 
-BEGIN = "<!-- bench: worlds -->"
-END = "<!-- bench: end -->"
+from tables import put_into
+
 PAPER = (
     "historical_building large_office indoor_2 common_forest simple_garage "
     "simple_forest indoor_1 complex_garage dense_forest indoor_3"
@@ -77,14 +76,6 @@ HEAD = (
 )
 
 
-def put_into(file, text):
-    page = pathlib.Path(file).read_text()
-    pattern = re.compile(re.escape(BEGIN) + ".*?" + re.escape(END), re.S)
-    if not pattern.search(page):
-        sys.exit(f"worlds: {file}: has no {BEGIN} ... {END}")
-    pathlib.Path(file).write_text(pattern.sub(lambda _: f"{BEGIN}\n{text}\n{END}", page))
-
-
 def draw(rows, file):
     import matplotlib
 
@@ -132,7 +123,7 @@ def main():
     text = "\n".join([HEAD] + [line(row) for row in rows])
     print(text)
     if flags.into:
-        put_into(flags.into, text)
+        put_into(flags.into, "worlds", text)
     if flags.png:
         draw(rows, flags.png)
 
