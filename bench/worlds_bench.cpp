@@ -26,7 +26,7 @@ struct Flags {
   std::string world;
   std::string map;
   std::string poses_file;
-  std::vector<std::string> renderers = {"beam", "paper"};
+  std::vector<std::string> renderers = {"beam", "opaque", "paper"};
   std::size_t poses = 10;
   std::uint64_t seed = 1;
   int repeats = 5;
@@ -86,6 +86,13 @@ double peak_megabytes() {
   return kilobytes / 1024.0;
 }
 
+/// "beam" as flights have it; "opaque" is the same without the opacities of surfels, "paper"
+/// without them as well: as the paper has it.
+std::unique_ptr<Renderer> renderer_of(const std::string& name, const Scene& scene) {
+  if (name == "beam") return make_renderer(name, scene);
+  return Choice<RendererKind>(name == "opaque" ? "beam" : name)->make(scene);
+}
+
 nlohmann::ordered_json measure(const Flags& flags, const std::vector<Place>& places) {
   const auto map = SurfelMap::open(flags.map);
   const BeamPlan plan = *table_beams("avia_grid");
@@ -93,10 +100,8 @@ nlohmann::ordered_json measure(const Flags& flags, const std::vector<Place>& pla
   std::vector<Contestant> contestants;
   for (const std::string& name : flags.renderers) {
     for (int threads = 1; threads <= (flags.two_threads ? 2 : 1); ++threads) {
-      contestants.push_back({name,
-                             make_renderer(name, Scene{map}),
-                             threads,
-                             std::vector<double>(places.size(), 1e9)});
+      contestants.push_back(
+          {name, renderer_of(name, Scene{map}), threads, std::vector<double>(places.size(), 1e9)});
     }
   }
   std::vector<Hit> hits(plan.directions_sensor.size());
@@ -151,7 +156,7 @@ int main(int argc, char** argv) {
   app.add_option("map", flags.map, "MAP.pfmap of the world")->required();
   app.add_option("--world", flags.world, "Its name: poses are drawn in its free space");
   app.add_option("--poses", flags.poses_file, "Or the poses that such a run printed");
-  app.add_option("--renderers", flags.renderers, "Some of: beam, paper")->delimiter(',');
+  app.add_option("--renderers", flags.renderers, "Some of: beam, opaque, paper")->delimiter(',');
   app.add_option("--count", flags.poses, "Poses");
   app.add_option("--seed", flags.seed, "Of poses");
   app.add_option("--repeats", flags.repeats, "Each pose is timed so often; the least counts");
