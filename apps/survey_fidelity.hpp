@@ -20,7 +20,7 @@ struct SurveyFlags {
   double thin = 0.05;  ///< m; 0: all points.
   bool fit = false;
   bool opacity = false;  ///< Of fitted maps.
-  std::string out;  ///< Folder for the survey itself.
+  std::string out;       ///< Folder for the survey itself.
   // shared with the other kind of `fidelity`; nothing: not given
   std::string lidar = "mid360";
   std::vector<std::optional<double>> resolutions;
