@@ -177,9 +177,9 @@ TEST(WorldProgram, RaysAreCastIntoMapsAndIntoWhatIsExact) {
   write_file(folder / "bad.txt", "1 2 3 0 0 0\n");
   expect_user_error(run("raycast large_office " + (folder / "bad.txt")), "has no length");
   ASSERT_EQ(run("map forest -o " + (folder / "f.pcd") + " --trees 20").code, 0);
-  ASSERT_EQ(run("map import " + (folder / "f.pcd") + " --resolution 0.2 -o " + (folder / "f.pfmap"))
-                .code,
-            0);
+  ASSERT_EQ(
+      run("map import " + (folder / "f.pcd") + " --resolution 0.2 -o " + (folder / "f.pfmap")).code,
+      0);
   expect_user_error(run("raycast " + (folder / "f.pfmap") + file + " --exact"), "world make");
 }
 
