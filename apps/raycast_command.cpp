@@ -1,9 +1,11 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
-#include <optional>
+#include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "apps/commands.hpp"
@@ -17,7 +19,6 @@
 #include "pointflight/io/byte_cursor.hpp"
 #include "pointflight/io/spool.hpp"
 #include "pointflight/render/ray_casting.hpp"
-#include "pointflight/scenes/scene_class.hpp"
 #include "pointflight/scenes/scene_tree.hpp"
 #include "pointflight/scenes/world_map.hpp"
 
@@ -58,6 +59,10 @@ std::vector<Ray> rays_in(std::string_view text, const std::string& name, double 
         throw InputError(fmt::format(
             "{}:{}: a ray is six numbers, x y z dx dy dz (m, world)", name, lines.number()));
       }
+    }
+    if (!take_word(line).empty()) {
+      throw InputError(
+          fmt::format("{}:{}: more than the six numbers of a ray", name, lines.number()));
     }
     const Vector3d direction(numbers[3], numbers[4], numbers[5]);
     if (direction.norm() < 1e-9) {
@@ -191,7 +196,8 @@ void add_raycast_command(CLI::App& parent, int& /*exit_code*/) {
   add_force_flag(*app, flags->force);
   app->footer(
       "Columns: range (m; inf: nothing), incidence_deg (between ray and normal), reflectivity, "
-      "class, thing.");
+      "class, thing.\n"
+      "Example: echo 10 0 1.5 1 0.2 0 | pointflight raycast street:7 - --exact");
   app->callback([flags] { run_raycast(*flags); });
 }
 

@@ -12,7 +12,7 @@
 #include "pointflight/io/formats.hpp"
 #include "pointflight/io/internal/e57_records.hpp"
 
-// ASTM E2807-11 (E57): scans of points in the scanner's frame, each with its pose.
+// ASTM E2807 (E57): scans of points in the scanner's frame, each with its pose.
 namespace pointflight {
 namespace {
 
@@ -163,7 +163,7 @@ class E57Reader : public CloudReader {
     read_ += static_cast<double>(records_->size());
   }
 
-  /// Of range, azimuth from x to y, elevation above the x-y plane (E2807-11, 4.2).
+  /// Of range, azimuth from x to y, elevation above the x-y plane.
   static Vector3d from_spherical(const Vector3d& p) {
     const auto azimuth = math::sincos(p.y());
     const auto elevation = math::sincos(p.z());

@@ -174,6 +174,8 @@ TEST(WorldProgram, RaysAreCastIntoMapsAndIntoWhatIsExact) {
   expect_user_error(run("raycast large_office " + (folder / "none.txt")), "No such file");
   write_file(folder / "bad.txt", "1 2 3\n");
   expect_user_error(run("raycast large_office " + (folder / "bad.txt")), "bad.txt:1: a ray is six");
+  write_file(folder / "bad.txt", "1 2 3 0 0 1 7\n");
+  expect_user_error(run("raycast large_office " + (folder / "bad.txt")), "more than the six");
   write_file(folder / "bad.txt", "1 2 3 0 0 0\n");
   expect_user_error(run("raycast large_office " + (folder / "bad.txt")), "has no length");
   ASSERT_EQ(run("map forest -o " + (folder / "f.pcd") + " --trees 20").code, 0);

@@ -10,8 +10,8 @@
 
 namespace pointflight {
 
-/// The bytes of an E57 file without the checksums that end each of its pages (ASTM E2807-11, 5.1
-/// to 5.4). Offsets in the file count the checksums (physical), lengths do not (logical).
+/// The bytes of an E57 file without the checksums that end each of its pages (ASTM E2807). Offsets
+/// in the file count the checksums (physical), lengths do not (logical).
 class E57Pages {
  public:
   /// Throws InputError if the file does not begin with an E57 header of version 1.

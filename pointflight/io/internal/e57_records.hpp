@@ -10,7 +10,7 @@
 namespace pointflight {
 
 /// The points of one scan, front to back: packets hold a piece of each field's stream, and not as
-/// many values of one as of another (ASTM E2807-11, 9.3).
+/// many values of one as of another.
 class E57Records {
  public:
   /// `wanted`: numbers of the fields whose values are asked for. `pages` and `scan` must outlive

@@ -10,7 +10,7 @@
 
 namespace pointflight {
 
-/// How the values of a field of points are stored (ASTM E2807-11, 6.3 and 9.6).
+/// How the values of a field of points are stored (ASTM E2807).
 struct E57Field {
   enum class Kind { kInteger, kSingle, kDouble };
 

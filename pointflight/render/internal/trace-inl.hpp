@@ -26,7 +26,7 @@ inline constexpr float kFewVisits = 3.5f;
 
 /// Beams whose origins lie farther apart than so many r are faster by themselves: boxes around all
 /// their ways hold too much. Measured at 0.05 and 0.2 m, with origins in cubes of 0.02 to 3.2 m:
-/// level at a cube of 3 r, twenty times as slow together at one of 16 r.
+/// level at a cube of 3 r, ten to thirty times as slow together at one of 16 r.
 inline constexpr float kWidestSpread = 4.0f;
 
 /// Nodes and leaves of a bundle for each of its beams that take as long as a single ray, which
