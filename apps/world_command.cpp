@@ -18,6 +18,7 @@
 #include "pointflight/core/output_file.hpp"
 #include "pointflight/core/parallel.hpp"
 #include "pointflight/picture/pictures.hpp"
+#include "pointflight/scenes/scene_class.hpp"
 #include "pointflight/scenes/world_map.hpp"
 
 namespace pointflight::apps {
@@ -45,10 +46,18 @@ std::string size_of(const WorldKind& kind) {
 picture::WorldPicture picture_of(std::shared_ptr<const SurfelMap> map,
                                  const WorldOptions& options) {
   const WorldKind& kind = *WorldKind::table().find(options.name);
+  std::vector<picture::Color> colors = {picture::kInk};  // of 0, which nothing is known of
+  for (const SceneClass& of : scene_classes()) {
+    const auto part = [&](int shift) {
+      return static_cast<double>(of.color >> shift & 255u) / 255;
+    };
+    colors.push_back({part(16), part(8), part(0)});
+  }
   return {std::move(map),
           fmt::format("{}, seed {}", kind.name, options.seed),
           kind.view.from,
-          kind.view.to};
+          kind.view.to,
+          std::move(colors)};
 }
 
 /// All of them on a sheet.

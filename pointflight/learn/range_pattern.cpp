@@ -125,6 +125,10 @@ void RangePattern::measure(const Renderer& renderer,
       jobs[i].batch.order = beams_->order;
       jobs[i].batch.T_world_sensor = pair.now;
       jobs[i].batch.range_max = range_max_;
+      if (draws_of) {
+        const ScanAddress at = draws_of(vehicles[first + i]);
+        jobs[i].batch.draws = {at.seed, at.sensor, at.scan};
+      }
       if (wants_hits) {
         jobs[i].hits = std::span(hits).subspan(i * beams, beams);
       } else {

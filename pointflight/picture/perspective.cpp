@@ -18,10 +18,12 @@ constexpr double kHidden = 0.3;                // m behind what is seen
 
 }  // namespace
 
-Perspective::Perspective(const SurfelMap& map, const Aabb& shown, double cut, const Frame& frame)
+Perspective::Perspective(
+    const SurfelMap& map, const Aabb& shown, double cut, const Frame& frame, int samples)
     : frame_(frame),
-      columns_(static_cast<int>(frame.width)),
-      rows_(static_cast<int>(frame.height)) {
+      samples_(samples),
+      columns_(samples * static_cast<int>(frame.width)),
+      rows_(samples * static_cast<int>(frame.height)) {
   Aabb box = shown;
   box.max.z() = std::max(box.min.z() + 0.5, std::min(box.max.z(), cut));
   const Vector3d target = 0.5 * (box.min + box.max);
@@ -52,10 +54,12 @@ Perspective::Perspective(const SurfelMap& map,
                          const Eye& eye,
                          double cut,
                          const Frame& frame,
-                         const MovingThings& things)
+                         const MovingThings& things,
+                         int samples)
     : frame_(frame),
-      columns_(static_cast<int>(frame.width)),
-      rows_(static_cast<int>(frame.height)),
+      samples_(samples),
+      columns_(samples * static_cast<int>(frame.width)),
+      rows_(samples * static_cast<int>(frame.height)),
       eye_(eye.position),
       focal_(0.5 * frame.width / std::tan(0.5 * eye.field_deg * kDegree)),
       middle_(0.5 * frame.width, 0.5 * frame.height) {
@@ -72,17 +76,17 @@ void Perspective::look(const Vector3d& target) {
   axes_.row(2) = ahead;
 }
 
+Vector3d Perspective::direction(double x, double y) const {
+  return (axes_.transpose() * Vector3d(x - middle_.x(), y - middle_.y(), focal_)).normalized();
+}
+
 /// Some rows at a time: a page's rays together would take more memory than a flight.
 void Perspective::render(const SurfelMap& map, double cut, const MovingThings& things) {
   constexpr float kFarthest = 2000.0f;  // m
   constexpr std::size_t kRowsAtOnce = 32;
   const auto columns = static_cast<std::size_t>(columns_);
   const std::size_t count = columns * static_cast<std::size_t>(rows_);
-  ranges_.assign(count, -1.0f);
-  cosines_.resize(count);
-  heights_.resize(count);
-  labels_.assign(count, kMapLabel);
-  assumed_.assign(count, false);
+  seen_.assign(count, {});
   // not owned: it outlives the renderer
   const std::shared_ptr<const SurfelMap> shared(std::shared_ptr<void>(), &map);
   const auto renderer = make_renderer("beam", Scene{shared});
@@ -97,11 +101,9 @@ void Perspective::render(const SurfelMap& map, double cut, const MovingThings& t
     hits.assign(now, {});
     for (std::size_t i = 0; i < now; ++i) {
       const std::size_t row = (first + i) / columns;
-      const auto x = static_cast<double>((first + i) % columns);
-      const auto y = static_cast<double>(row);
-      const Vector3d d =
-          (axes_.transpose() * Vector3d(x + 0.5 - middle_.x(), y + 0.5 - middle_.y(), focal_))
-              .normalized();
+      const std::size_t column = (first + i) % columns;
+      const Vector3d d = direction((static_cast<double>(column) + 0.5) / samples_,
+                                   (static_cast<double>(row) + 0.5) / samples_);
       const double above = d.z() < 0.0 ? std::max(0.0, (cut - eye_.z()) / d.z()) : 0.0;
       before[i] = std::isfinite(above) ? static_cast<float>(above) : 0.0f;
       rays[i].origin_world = eye_ + static_cast<double>(before[i]) * d;
@@ -111,17 +113,19 @@ void Perspective::render(const SurfelMap& map, double cut, const MovingThings& t
     RayBatch batch;
     batch.rays = rays;
     batch.range_max = kFarthest;
+    batch.draws.scan = first;  // else rows repeat what glass and leaves let through
     batch.bodies = things.bodies;
     batch.time = batch.snapshot_time = things.time;
     renderer->render(batch, hits, executor);
     for (std::size_t i = 0; i < now; ++i) {
       if (!hits[i].is_return()) continue;
-      ranges_[first + i] = before[i] + hits[i].range;
-      cosines_[first + i] = hits[i].cos_incidence;
-      heights_[first + i] = static_cast<float>(rays[i].origin_world.z()) +
-                            hits[i].range * rays[i].direction_world.z();
-      labels_[first + i] = hits[i].label;
-      assumed_[first + i] = map.is_assumed(hits[i].surfel);
+      seen_[first + i] = {before[i] + hits[i].range,
+                          hits[i].cos_incidence,
+                          static_cast<float>(rays[i].origin_world.z()) +
+                              hits[i].range * rays[i].direction_world.z(),
+                          hits[i].label,
+                          hits[i].surfel,
+                          map.is_assumed(hits[i].surfel)};
     }
   }
 }
@@ -129,21 +133,40 @@ void Perspective::render(const SurfelMap& map, double cut, const MovingThings& t
 void Perspective::paint(Canvas& canvas,
                         const std::function<Color(double z)>& color_at,
                         const std::function<Color(Label)>& color_of) const {
+  paint_seen(canvas, [&](const Seen& seen, const Vector3d& /*direction*/) {
+    const double light = 0.35 + 0.65 * static_cast<double>(seen.cosine);
+    const bool moves = seen.label != kMapLabel && color_of;
+    const Color c = moves             ? color_of(seen.label)
+                    : seen.is_assumed ? kAssumedColor
+                                      : color_at(static_cast<double>(seen.z));
+    return Color{light * c.r, light * c.g, light * c.b};
+  });
+}
+
+void Perspective::paint_seen(
+    Canvas& canvas, const std::function<Color(const Seen&, const Vector3d&)>& color_of) const {
   canvas.begin_pixels();
-  for (int y = 0; y < rows_; ++y) {
-    for (int x = 0; x < columns_; ++x) {
-      const std::size_t i = static_cast<std::size_t>(y) * static_cast<std::size_t>(columns_) +
-                            static_cast<std::size_t>(x);
-      if (ranges_[i] < 0.0f) continue;
-      const double light = 0.35 + 0.65 * static_cast<double>(cosines_[i]);
-      const bool moves = labels_[i] != kMapLabel && color_of;
-      const Color c = moves         ? color_of(labels_[i])
-                      : assumed_[i] ? kAssumedColor
-                                    : color_at(static_cast<double>(heights_[i]));
+  for (int y = 0; y < rows_ / samples_; ++y) {
+    for (int x = 0; x < columns_ / samples_; ++x) {
+      Color sum{0.0, 0.0, 0.0};
+      int hits = 0;
+      for (int i = 0; i < samples_ * samples_; ++i) {
+        const int row = y * samples_ + i / samples_;
+        const int column = x * samples_ + i % samples_;
+        const Seen& seen =
+            seen_[static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) +
+                  static_cast<std::size_t>(column)];
+        if (seen.range < 0.0f) continue;
+        const Color c =
+            color_of(seen, direction((column + 0.5) / samples_, (row + 0.5) / samples_));
+        sum = {sum.r + c.r, sum.g + c.g, sum.b + c.b};
+        ++hits;
+      }
+      if (hits == 0) continue;
       canvas.put(static_cast<int>(frame_.left) + x,
                  static_cast<int>(frame_.top) + y,
-                 {light * c.r, light * c.g, light * c.b},
-                 1.0);
+                 {sum.r / hits, sum.g / hits, sum.b / hits},
+                 static_cast<double>(hits) / (samples_ * samples_));
     }
   }
   canvas.end_pixels();
@@ -157,11 +180,12 @@ std::optional<Vector3d> Perspective::project(const Vector3d& p_world) const {
 }
 
 bool Perspective::is_hidden(const Vector3d& projected) const {
-  const int x = static_cast<int>(std::floor(projected.x()));
-  const int y = static_cast<int>(std::floor(projected.y()));
+  const int x = static_cast<int>(std::floor(samples_ * projected.x()));
+  const int y = static_cast<int>(std::floor(samples_ * projected.y()));
   if (x < 0 || y < 0 || x >= columns_ || y >= rows_) return true;
-  const float range = ranges_[static_cast<std::size_t>(y) * static_cast<std::size_t>(columns_) +
-                              static_cast<std::size_t>(x)];
+  const float range = seen_[static_cast<std::size_t>(y) * static_cast<std::size_t>(columns_) +
+                            static_cast<std::size_t>(x)]
+                          .range;
   return range >= 0.0f && static_cast<double>(range) < projected.z() - kHidden;
 }
 

@@ -38,18 +38,32 @@ struct MovingThings {
   SimTime time;                  ///< The instant.
 };
 
-/// A map, and what moves in it, as an eye sees it, rendered as scans are: a ray for each pixel.
+/// What an eye sees along one ray.
+struct Seen {
+  float range = -1.0f;               ///< From the eye, m; negative: nothing.
+  float cosine = 0.0f;               ///< |cos| of the angle between ray and surface normal.
+  float z = 0.0f;                    ///< World, m.
+  Label label = kMapLabel;           ///< What it is of.
+  std::uint32_t surfel = kNoSurfel;  ///< Of the map: index in `SurfelMap::words()`.
+  bool is_assumed = false;           ///< No survey saw this surfel.
+};
+
+/// A map, and what moves in it, as an eye sees it, rendered as scans are: a ray for each pixel, or
+/// several.
 class Perspective {
  public:
   /// On the part of the map within `shown`, from the south west and above, filling the frame; what
-  /// lies higher than `cut` (m) is not there.
-  Perspective(const SurfelMap& map, const Aabb& shown, double cut, const Frame& frame);
+  /// lies higher than `cut` (m) is not there. Of each pixel `samples` by `samples` rays: edges are
+  /// the smoother.
+  Perspective(
+      const SurfelMap& map, const Aabb& shown, double cut, const Frame& frame, int samples = 1);
   /// From an eye.
   Perspective(const SurfelMap& map,
               const Eye& eye,
               double cut,
               const Frame& frame,
-              const MovingThings& things);
+              const MovingThings& things,
+              int samples = 1);
 
   /// Draws it, light falling from the eye; `color_at(z)`: of the map at a height
   /// (what is assumed has a colour of its own);
@@ -57,6 +71,11 @@ class Perspective {
   void paint(Canvas& canvas,
              const std::function<Color(double z)>& color_at,
              const std::function<Color(Label)>& color_of = {}) const;
+
+  /// Draws it in the colours that `color_of(seen, direction of the ray)` has for what rays hit, the
+  /// mean of those of a pixel.
+  void paint_seen(Canvas& canvas,
+                  const std::function<Color(const Seen&, const Vector3d&)>& color_of) const;
 
   /// A path through it; what the map hides of it is faint.
   void draw_path(Canvas& canvas, const std::vector<Vector3d>& points, Color color) const;
@@ -70,17 +89,17 @@ class Perspective {
   /// Column, row (pixels) and range (m) of a point; nothing behind the eye.
   [[nodiscard]] std::optional<Vector3d> project(const Vector3d& p_world) const;
   [[nodiscard]] bool is_hidden(const Vector3d& projected) const;
+  /// Of the ray through a position in the picture, pixels; world, unit length.
+  [[nodiscard]] Vector3d direction(double x, double y) const;
 
   Frame frame_;
-  int columns_, rows_;
+  int samples_ = 1;
+  int columns_, rows_;  ///< Of rays.
   Vector3d eye_ = Vector3d::Zero();
   Matrix3d axes_ = Matrix3d::Identity();              ///< Rows: right, down, ahead.
   double focal_ = 1.0;                                ///< Pixels.
   Eigen::Vector2d middle_ = Eigen::Vector2d::Zero();  ///< Where the eye looks straight on, pixels.
-  std::vector<float> ranges_;                         ///< From the eye, m; negative: nothing.
-  std::vector<float> cosines_, heights_;
-  std::vector<Label> labels_;
-  std::vector<bool> assumed_;  ///< Is it a surfel that no survey saw?
+  std::vector<Seen> seen_;                            ///< By rows of rays.
 };
 
 /// Height (m) below which a map has to be cut so that its inside is seen from above: infinite

@@ -34,8 +34,10 @@ struct WorldPicture {
   std::string title;                     ///< Above both views.
   Vector3d from;                         ///< The eye inside, m.
   Vector3d to;                           ///< What it looks at, m.
+  /// By the numbers of the map's classes; surfels of others are coloured by height.
+  std::vector<Color> class_colors = {};
 };
-/// Each from outside, without a ceiling over most of it, and from inside.
+/// Each from outside, without a ceiling over most of it, and from inside, in daylight.
 void draw_worlds(std::span<const WorldPicture> worlds, const std::string& path);
 
 /// Where a scan was taken.

@@ -22,6 +22,7 @@ struct SceneClass {
   ///@{
   float dark, bright;
   ///@}
+  std::uint32_t color;  ///< In pictures: 0xRRGGBB, sRGB.
   /// Its surfaces cover part of a beam: leaves, nets, wires.
   bool is_thin = false;
 };

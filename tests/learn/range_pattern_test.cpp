@@ -2,11 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <vector>
 
 #include "pointflight/learn/flights.hpp"
+#include "tests/map/edited_map.hpp"
 #include "tests/support.hpp"
 
 namespace pointflight {
@@ -161,6 +163,33 @@ TEST(RangePattern, FlightsDrawAnewForEachActionAndEachSeed) {
                                ranges,
                                executor),
                std::invalid_argument);
+}
+
+TEST(RangePattern, WhatLetsBeamsThroughDoesSoAnewForEachAction) {
+  const auto net = testing::opened(testing::noted(*wall(), [](const Vector3d&) {
+    SurfelNote note;
+    note.opacity = Opacity::of_share(0.5);
+    return note;
+  }));
+  Flights flights(net, load_vehicle("quad_330"), 2, {}, RangePattern(ahead(), {}, 12.0f));
+  const Executor executor(1);
+  const auto image = [&] {
+    std::vector<float> ranges(800);
+    flights.measure(std::vector<std::uint32_t>{0, 1}, ranges, executor);
+    return ranges;
+  };
+  for (std::size_t i = 0; i < 2; ++i) {
+    FlightStart start;
+    start.seed = i;
+    flights.place(i, start);
+  }
+  const auto first = image();
+  const auto returned = std::count_if(first.begin(), first.end(), [](float r) { return r < 1.0f; });
+  EXPECT_NEAR(static_cast<double>(returned), 400.0, 85.0);  // six standard deviations
+  EXPECT_FALSE(std::equal(first.begin(), first.begin() + 400, first.begin() + 400));
+  EXPECT_EQ(first, image());
+  flights.step(std::vector<double>(8, 0.0), {}, executor);
+  EXPECT_NE(first, image());
 }
 
 }  // namespace

@@ -22,21 +22,16 @@ using testing::opened;
 EditedMap noted_floor(const std::vector<std::string>& names = {"", "floor", "path"}) {
   ShapeScene scene;
   scene.add_box({0, 0, -0.1}, {4, 2, 0});
-  const auto plain = map_of(scene, 0.1);
-  EditedMap noted = crop_map(
-      *plain, [](const Vector3d&) { return true; }, {}, Executor(1));
-  const auto same = opened(noted);
-  std::vector<SurfelNote> notes(same->words().size());
-  same->for_each_surfel([&](const Vector3d& p, const Vector3d&, double, std::uint32_t word) {
-    SurfelNote& note = notes.at(word);
+  EditedMap floor = testing::noted(*map_of(scene, 0.1), [](const Vector3d& p) {
+    SurfelNote note;
     note.label = {static_cast<std::uint8_t>(p.y() < 1.0 ? 1 : 2),
                   static_cast<std::uint32_t>(std::max(0.0, p.x()))};
     if (p.x() > 2.0) note.opacity = Opacity::of_share(0.5);
     note.is_assumed = p.x() > 3.0;
+    return note;
   });
-  set_notes(noted.description, notes);
-  set_class_names(noted.description, names);
-  return noted;
+  set_class_names(floor.description, names);
+  return floor;
 }
 
 /// All surfels say what `noted_floor` says of positions, moved back by `shift`.

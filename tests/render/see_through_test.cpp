@@ -23,16 +23,11 @@ std::shared_ptr<const SurfelMap> curtains(std::uint8_t opacity) {
     scene.shapes.emplace_back(Triangle{{x, -9, -9}, {x, 9, -9}, {x, 9, 9}});
     scene.shapes.emplace_back(Triangle{{x, -9, -9}, {x, 9, 9}, {x, -9, 9}});
   }
-  const auto plain = testing::map_of(scene, 0.1);
-  EditedMap map = crop_map(
-      *plain, [](const Vector3d&) { return true; }, {}, Executor(1));
-  const auto same = testing::opened(map);
-  std::vector<SurfelNote> notes(same->words().size());
-  same->for_each_surfel([&](const Vector3d& p, const Vector3d&, double, std::uint32_t word) {
-    if (p.x() < 8.0) notes[word].opacity = opacity;
-  });
-  set_notes(map.description, notes);
-  return testing::opened(map);
+  return testing::opened(testing::noted(*testing::map_of(scene, 0.1), [&](const Vector3d& p) {
+    SurfelNote note;
+    if (p.x() < 8.0) note.opacity = opacity;
+    return note;
+  }));
 }
 
 /// Shares of hits at the curtains and at the wall.
