@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <optional>
 #include <span>
@@ -10,6 +11,7 @@
 #include "pointflight/map/surfel_map.hpp"
 #include "pointflight/picture/canvas.hpp"
 #include "pointflight/picture/map_layers.hpp"
+#include "pointflight/render/hit.hpp"
 
 namespace pointflight::picture {
 
