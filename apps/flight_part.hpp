@@ -1,6 +1,7 @@
 #pragma once
 
 #include <chrono>
+#include <memory>
 
 #include "pointflight/run/run_loop.hpp"
 #include "pointflight/sim/scenario.hpp"
@@ -25,6 +26,11 @@ class FlightPart {
   /// What it needs of the scenario, which is flown at `rate` simulated seconds per second (0: as
   /// fast as it goes). Throws InputError.
   virtual void prepare(Scenario& /*scenario*/, double /*rate*/) {}
+  /// Where vehicles start, in the map that is flown in.
+  virtual void place(Scenario& /*scenario*/,
+                     const std::shared_ptr<const SurfelMap>& /*map*/) const {}
+  /// So long its links may keep the run waiting for an answer, s; 0: they do not.
+  [[nodiscard]] virtual double lockstep() const { return 0.0; }
   /// Opens what it writes to or listens to and adds its links to the loop; loop and simulation
   /// outlive the part. Throws InputError.
   virtual void connect(Simulation& /*simulation*/, RunLoop& /*loop*/) {}

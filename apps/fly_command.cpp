@@ -1,33 +1,30 @@
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <optional>
 
 #include "apps/cli.hpp"
 #include "apps/commands.hpp"
 #include "apps/flags.hpp"
 #include "apps/fly_links.hpp"
+#include "apps/fly_report.hpp"
 #include "apps/input_kind.hpp"
 #include "apps/named_map.hpp"
 #include "apps/policy_flags.hpp"
 #include "apps/renderer_flags.hpp"
 #include "apps/ros_flags.hpp"
-#include "apps/run_cost.hpp"
 #include "apps/scenario_command.hpp"
-#include "apps/settings_json.hpp"
 #include "apps/share_flags.hpp"
+#include "apps/sitl_flags.hpp"
 #include "apps/terminal.hpp"
 #include "apps/view_flags.hpp"
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/core/number_text.hpp"
 #include "pointflight/core/resources.hpp"
 #include "pointflight/sim/flight_recorder.hpp"
-#include "pointflight/sim/run_summary.hpp"
 #include "pointflight/sim/scenario_maker.hpp"
 #include "pointflight/sim/start_check.hpp"
 
@@ -60,6 +57,7 @@ struct FlyFlags {
   RendererFlags renderer;
   RosFlags ros;
   ShareFlags share;
+  SitlFlags sitl;
 };
 
 double parse_rate(const std::string& text) {
@@ -155,103 +153,6 @@ Scenario load_input(const FlyFlags& flags, MapPointer& map, const Executor& exec
   return scenario;
 }
 
-/// Which limits cut what was asked for, and for how long.
-void print_limits(const VehicleSummary& s) {
-  std::vector<std::string> reached;
-  const auto add = [&](const char* what, Duration time) {
-    if (time.count() > 0) reached.push_back(fmt::format("{} for {:.2f} s", what, to_seconds(time)));
-  };
-  add("speed", s.speed_limited);
-  add("acceleration", s.acceleration_limited);
-  add("tilt", s.tilt_limited);
-  add("thrust", s.rotors_limited);
-  if (reached.empty()) return;
-  fmt::print("  limits reached    {}\n", fmt::join(reached, ", "));
-}
-
-void print_vehicle(const Simulation& simulation, std::size_t v) {
-  const VehicleSummary& s = simulation.summary(v);
-  const VehicleStatus& status = simulation.status(v);
-  if (simulation.vehicle_count() > 1) fmt::print("{}\n", simulation.vehicle(v).setup().name);
-  fmt::print("  flown             {:.1f} m, up to {:.2f} m/s{}\n",
-             s.distance_flown,
-             s.speed_max,
-             status.crashed ? "; crashed" : "");
-  fmt::print("  scans             {}, {} points of {} beams\n",
-             s.scans,
-             short_count(static_cast<double>(s.points)),
-             short_count(static_cast<double>(s.beams)));
-  fmt::print("  closest approach  {}\n",
-             s.closest_approach ? fmt::format("{} m to {} at {}",
-                                              fixed_text(*s.closest_approach, 2),
-                                              label_name(simulation, s.closest_label),
-                                              point_text(s.closest_position_world))
-                                : std::string("over 10 m"));
-  fmt::print("  collisions        {}\n", s.collisions);
-  fmt::print("  tracking error    {:.0f} mm RMS, {:.0f} mm at most\n",
-             s.tracking_error_rms * 1e3,
-             s.tracking_error_max * 1e3);
-  if (s.off_track.count() > 0) {
-    fmt::print("  off its way       {:.1f} s over 3 m away from where it should be\n",
-               to_seconds(s.off_track));
-  }
-  print_limits(s);
-  if (simulation.vehicle(v).setup().battery) {
-    fmt::print("  battery           {:.2f} Ah used, {:.1f} V now{}{}\n",
-               status.battery.used,
-               status.battery.voltage,
-               s.battery_low ? fmt::format("; low at {:.1f} s", to_seconds(*s.battery_low)) : "",
-               s.battery_empty
-                   ? fmt::format("; rotors off at {:.1f} s", to_seconds(*s.battery_empty))
-                   : "");
-  }
-  if (status.autopilot.rejected > 0) {
-    fmt::print("  commands          {} rejected; the last: {}\n",
-               status.autopilot.rejected,
-               status.autopilot.last_rejection);
-  }
-}
-
-/// What a second of the run cost of this machine.
-void print_cost(const RunCost& cost) {
-  std::vector<std::string> parts;
-  double rest = cost.cores;
-  for (const RunCost::Lidar& lidar : cost.lidars) {
-    rest -= lidar.cores;
-    parts.push_back(fmt::format("{}{} {:.2f}",
-                                lidar.count > 1 ? fmt::format("{} x ", lidar.count) : "",
-                                fs::path(lidar.model).stem().string(),
-                                lidar.cores));
-  }
-  parts.push_back(fmt::format("all else {:.2f}", std::max(0.0, rest)));
-  fmt::print("  cost              {:.2f} of a core for a simulated second: {}\n",
-             cost.cores,
-             fmt::join(parts, ", "));
-}
-
-void print_result(const FlyFlags& flags, const Simulation& simulation, const RunLoop& loop) {
-  const RunCost cost = cost_of(simulation, loop);
-  if (flags.json) {
-    auto json = nlohmann::ordered_json::parse(summary_json(simulation));
-    if (!flags.output.empty()) json["folder"] = flags.output;
-    json["real_time_factor"] = cost.real_time_factor;
-    json["cost"] = json_of(cost);
-    print_json(json);
-    return;
-  }
-  fmt::print("{}\n", flags.output.empty() ? flags.input : flags.output);
-  const std::string reason = reason_of(simulation.end());
-  fmt::print("  end               {}, after {:.1f} s{}\n",
-             to_string(simulation.end()),
-             to_seconds(simulation.time()),
-             reason.empty() ? "" : ": " + reason);
-  for (const std::size_t v : simulation.flying_here()) print_vehicle(simulation, v);
-  fmt::print("  real-time factor  {:.1f}\n", cost.real_time_factor);
-  print_cost(cost);
-  if (flags.output.empty() || flags.no_picture) return;
-  fmt::print("  picture           {}\n", (fs::path(flags.output) / "overview.png").string());
-}
-
 int exit_code_of(RunEnd end) {
   switch (end) {
     case RunEnd::kCompleted:
@@ -272,6 +173,7 @@ std::vector<std::unique_ptr<FlightPart>> parts_of(const FlyFlags& flags, int thr
   std::vector<std::unique_ptr<FlightPart>> parts;
   parts.push_back(std::make_unique<SharePart>(flags.share, flags.output));
   parts.push_back(std::make_unique<PolicyPart>(flags.policy));
+  parts.push_back(std::make_unique<SitlPart>(flags.sitl));
   parts.push_back(std::make_unique<RendererPart>(flags.renderer));
   parts.push_back(std::make_unique<FolderPart>(
       FolderOptions{flags.output, existing, !flags.no_picture}, threads));
@@ -311,8 +213,12 @@ int fly(const FlyFlags& flags) {
   const bool is_live =
       std::any_of(parts.begin(), parts.end(), [&](auto& part) { return part->is_live(scenario); });
   if (flags.rate.empty()) options.rate = is_live ? 1.0 : 0.0;
-  for (const auto& part : parts) part->prepare(scenario, options.rate);
+  for (const auto& part : parts) {
+    part->prepare(scenario, options.rate);
+    options.lockstep = std::max(options.lockstep, part->lockstep());
+  }
   if (!map) map = open_map_of(scenario);
+  for (const auto& part : parts) part->place(scenario, map);
   Simulation simulation(scenario, map, executor);
   say_warnings(simulation, executor);
 
@@ -325,7 +231,9 @@ int fly(const FlyFlags& flags) {
   for (const auto& part : connected) part->report(loop);
   const bool has_failed = std::any_of(
       connected.begin(), connected.end(), [](auto& part) { return part->has_failed(); });
-  if (loop.has_started()) print_result(flags, simulation, loop);
+  if (loop.has_started()) {
+    print_result({flags.input, flags.output, !flags.no_picture, flags.json}, simulation, loop);
+  }
   if (has_failed) return kWrongInput;
   return loop.has_started() ? exit_code_of(end) : kInterrupted;
 }
@@ -393,6 +301,7 @@ void add_fly_command(CLI::App& parent, int& exit_code) {
   add_ros_flags(*app, flags->ros);
   add_view_flags(*app, flags->ros.view);
   add_share_flags(*app, flags->share);
+  add_sitl_flags(*app, flags->sitl);
   app->callback([flags, &exit_code] {
     flags->ros.overwrite = flags->force;
     exit_code = fly(*flags);

@@ -27,6 +27,7 @@ allowed() {
     fidelity) echo "$ground map render lidar survey scenes" ;;
     sim) echo "$step" ;;
     learn) echo "$step run" ;;
+    sitl) echo "$step run" ;;
     run) echo "$step" ;;
     picture) echo "$step run survey fidelity" ;;
     ros/common) echo "$step run" ;;

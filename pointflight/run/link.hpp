@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -44,6 +45,9 @@ class Link : public SampleSink {
   /// answered the sample by an order that is an answer: a planner's command for a scan, a flight
   /// controller's for an IMU sample.
   [[nodiscard]] virtual bool wants_answer(const Sample& /*sample*/) const { return false; }
+  /// While the run waits for this link's answer: returns once one may have come, at the latest
+  /// after so long. False at once: it cannot tell, and will be asked again.
+  virtual bool await_answer(std::chrono::microseconds /*at_most*/) { return false; }
   /// What this link asks for since it was last asked, in order; obeyed between steps.
   virtual std::vector<Order> take_orders() { return {}; }
   /// One of its commands was not taken, and why.

@@ -198,14 +198,17 @@ void RunLoop::after_step(double took) {
   take_orders();
 }
 
-void RunLoop::ask(const Link& link) {
+void RunLoop::ask(Link& link) {
   if (std::find(asked_.begin(), asked_.end(), &link) == asked_.end()) asked_.push_back(&link);
 }
 
 void RunLoop::wait_for_answers() {
   const auto until = Clock::now() + std::chrono::duration<double>(options_.lockstep);
   while (!asked_.empty() && !paused_ && !reset_ && !is_over()) {
-    if (Clock::now() > until) {
+    if (!asked_.front()->await_answer(kAnswerLook)) std::this_thread::sleep_for(kAnswerLook);
+    for (Link* link : links_) link->on_wait(simulation_.time(), Waiting::kForAnswer);
+    take_orders();
+    if (!asked_.empty() && Clock::now() > until) {
       if (unanswered_++ == 0) {
         say(fmt::format("warning: no command within {} s at {:.1f} s; flying on (said once)",
                         options_.lockstep,
@@ -213,9 +216,6 @@ void RunLoop::wait_for_answers() {
       }
       break;
     }
-    std::this_thread::sleep_for(kAnswerLook);
-    for (Link* link : links_) link->on_wait(simulation_.time(), Waiting::kForAnswer);
-    take_orders();
   }
   asked_.clear();
 }

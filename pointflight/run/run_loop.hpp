@@ -119,7 +119,7 @@ class RunLoop {
 
   [[nodiscard]] bool is_over() const;
   void after_step(double took);
-  void ask(const Link& link);
+  void ask(Link& link);
   void wait_for_answers();
   void take_orders();
   void obey(Link& link, const Order& order);
@@ -147,9 +147,9 @@ class RunLoop {
   bool paused_ = false;
   bool step_once_ = false;  ///< While paused: until a scan has come.
   bool reset_ = false;
-  bool ended_ = false;              ///< By an order.
-  std::uint64_t scans_ = 0;         ///< In the step under way.
-  std::vector<const Link*> asked_;  ///< In lockstep: those that have not answered yet.
+  bool ended_ = false;        ///< By an order.
+  std::uint64_t scans_ = 0;   ///< In the step under way.
+  std::vector<Link*> asked_;  ///< In lockstep: those that have not answered yet.
   std::uint64_t unanswered_ = 0;
   bool said_rejected_ = false;
   bool said_dearest_ = false;

@@ -20,7 +20,7 @@ constexpr SceneClass kClasses[] = {
     {"bed", 8, 0.4f, 0.9f, 0xccccde},           {"ladder", 0, 0.4f, 0.7f, 0xf0bf26},
     {"tree", 5, 0.25f, 0.4f, 0x6b4d33},         {"bush", 18, 0.4f, 0.55f, 0x4d7f38, true},
     {"log", 0, 0.25f, 0.45f, 0x735438},         {"rock", 35, 0.2f, 0.4f, 0x8c8780},
-    {"grass", 10, 0.4f, 0.55f, 0x739e40, true}, {"car", 21, 0.05f, 0.8f, 0xb03030},
+    {"grass", 10, 0.4f, 0.55f, 0x739e40, true}, {"car", 21, 0.05f, 0.8f, 0x5b7fa6},
     {"truck", 84, 0.1f, 0.9f, 0xd9d9e0},        {"forklift", 0, 0.2f, 0.6f, 0xf2a60d},
     {"person", 13, 0.1f, 0.7f, 0xe65926},       {"pallet", 0, 0.4f, 0.6f, 0xbf9961},
     {"box", 42, 0.35f, 0.6f, 0xb88c59},         {"rack", 25, 0.2f, 0.5f, 0x3359a6},

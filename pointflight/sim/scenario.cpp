@@ -21,6 +21,9 @@ constexpr Named<ControllerInput> kControllerInputs[] = {{ControllerInput::kTruth
 constexpr Named<LowBatteryReaction> kLowBattery[] = {{LowBatteryReaction::kLand, "land"},
                                                      {LowBatteryReaction::kFall, "fall"},
                                                      {LowBatteryReaction::kReport, "report"}};
+constexpr Named<AutopilotKind> kAutopilots[] = {{AutopilotKind::kOwn, "own"},
+                                                {AutopilotKind::kPx4, "px4"},
+                                                {AutopilotKind::kArduPilot, "ardupilot"}};
 constexpr Named<YawMode> kYawModes[] = {{YawMode::kAlongPath, "along_path"},
                                         {YawMode::kFixed, "fixed"}};
 /// Sections of pointflight's higher floors: no mistake in a program that is built on the core
@@ -90,6 +93,22 @@ void describe_limits(SettingsVisitor& v, LimitSetup& s) {
   v.value({"body_rate_max", "rad/s", "greatest demanded rates", 0, 100}, s.body_rate_max);
 }
 
+void describe_autopilot(SettingsVisitor& v, AutopilotSetup& s) {
+  v.choice({"kind", "", "our own, or a firmware beside the program"}, s.kind, kAutopilots);
+  const bool is_firmware = s.kind != AutopilotKind::kOwn;
+  v.only_if(is_firmware, "a firmware's kind", [&](SettingsVisitor& w) {
+    w.value(
+        {"instance", "", "of the firmware, whose ports follow; -1: the vehicle's number", -1, 200},
+        s.instance);
+    w.value({"wait", "s", "for an answer; then the run goes on without", 0.1, 3600}, s.wait);
+  });
+  v.only_if(s.kind == AutopilotKind::kPx4, "kind: px4", [&](SettingsVisitor& w) {
+    w.value({"vision", "", "it gets odometry as external vision"}, s.vision);
+    w.value({"obstacles", "", "it gets what the first LiDAR sees around it, as OBSTACLE_DISTANCE"},
+            s.obstacles);
+  });
+}
+
 void describe_airframe(SettingsVisitor& v, VehicleSetup& s) {
   v.value({"name", "", "of its files and topics; empty: drone0, drone1, ..."}, s.name);
   v.value({"model", "", "name of a shipped vehicle, or a path"}, s.model);
@@ -105,6 +124,10 @@ void describe_airframe(SettingsVisitor& v, VehicleSetup& s) {
            s.on_collision,
            kReactions);
   v.choice({"controller", "", "vehicle: the one of its file"}, s.controller, "vehicle");
+  v.section({"autopilot", "", "who flies it"}, {.one = "kind"}, [&](SettingsVisitor& w) {
+    describe_autopilot(w, s.autopilot);
+  });
+  v.value({"imu_rate", "Hz", "of its IMU; 0: the vehicle file's", 0, 8000}, s.imu_rate);
   v.value(
       {"control_period",
        "s",

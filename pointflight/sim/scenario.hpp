@@ -79,6 +79,22 @@ enum class ControllerInput {
   kOdometry,  ///< The truth as far off as the odometry that came last was.
 };
 
+/// Who flies a vehicle.
+enum class AutopilotKind {
+  kOwn,        ///< Our autopilot.
+  kPx4,        ///< PX4's firmware beside the program (`Px4Link`).
+  kArduPilot,  ///< ArduPilot's (`ArduPilotLink`).
+};
+
+/// How a firmware flies a vehicle: what links of a run go by.
+struct AutopilotSetup {
+  AutopilotKind kind = AutopilotKind::kOwn;  ///< Who flies it.
+  std::int64_t instance = -1;  ///< Of the firmware: its ports; -1: the vehicle's number.
+  bool vision = false;         ///< It gets odometry (PX4: external vision).
+  bool obstacles = false;      ///< It gets what the first LiDAR sees, by direction.
+  double wait = 10.0;          ///< For an answer, s; then the run goes on without.
+};
+
 /// One vehicle, or several alike.
 struct VehicleSetup {
   std::string name;                   ///< Of its files and topics; empty: "drone<number>".
@@ -92,6 +108,8 @@ struct VehicleSetup {
   std::int64_t seed = -1;       ///< Of its sensors and gusts; -1: the run's.
   CollisionReaction on_collision = CollisionReaction::kReport;  ///< What it does then.
   std::optional<Choice<ControllerKind>> controller;             ///< Instead of its file's.
+  AutopilotSetup autopilot;                                     ///< Who flies it.
+  double imu_rate = 0.0;                                        ///< Of its IMU, Hz; 0: the file's.
   /// Of its controllers, s, whole physics steps, over which rotor commands are held; 0: each step.
   double control_period = 0.0;
   double command_timeout = 0.5;                                   ///< s; 0: commands hold for ever.

@@ -52,6 +52,13 @@ bool is_below_floor(const Renderer& renderer, const Vector3d& p_world) {
   return !vertical_distance(renderer, p_world, -1.0f) && vertical_distance(renderer, p_world, 1.0f);
 }
 
+Vector3d standing_below(const Renderer& renderer, const Solid& hull, const Vector3d& p_world) {
+  constexpr double kAbove = 0.02;  // m: surfels have a thickness
+  const auto ground = vertical_distance(renderer, p_world, -1.0f);
+  if (!ground) return p_world;
+  return p_world + Vector3d(0.0, 0.0, half_extent(hull).z() + kAbove - *ground);
+}
+
 bool is_lost(const SurfelMap& map, const Vector3d& p_world) {
   if (map.surfel_count() == 0) return false;
   const Aabb& b = map.bounds_world();

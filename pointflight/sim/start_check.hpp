@@ -41,6 +41,10 @@ void check_start_is_free(const Scenario& scenario,
 /// is no ground.
 bool is_below_floor(const Renderer& renderer, const Vector3d& p_world);
 
+/// Where a vehicle stands that starts on the ground: on what lies below `p_world`, its hull just
+/// above it; `p_world` itself if nothing does.
+Vector3d standing_below(const Renderer& renderer, const Solid& hull, const Vector3d& p_world);
+
 /// What is odd about where vehicles start, in words for the user with file and line: below the
 /// floor, or landed if there is no ground.
 std::vector<std::string> start_warnings(const Simulation& simulation, const Executor& executor);

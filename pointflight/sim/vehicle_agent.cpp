@@ -249,8 +249,11 @@ bool VehicleAgent::touches_down(const VehicleStatus& status) const {
   }
   const double below = body.p_world.z() - nearest->position_world.z();
   if (below < 0.5 * half_extent(hull_).z() || body.v_world.z() > 0.0) return false;
-  return !status.autopilot.armed ||
-         (gently && std::holds_alternative<LandCommand>(status.autopilot.command));
+  // who sets rotor speeds himself has no other way to say that he lands
+  const Command& told = status.autopilot.command;
+  const bool may_land =
+      std::holds_alternative<LandCommand>(told) || std::holds_alternative<RotorSpeedCommand>(told);
+  return !status.autopilot.armed || (gently && may_land);
 }
 
 VehicleState VehicleAgent::state_after(const VehicleStatus& status, double dt) const {

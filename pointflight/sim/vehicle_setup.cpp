@@ -41,6 +41,7 @@ VehicleSettings settings_of(const Scenario& scenario,
   override_with(setup.limits.climb_acceleration_max, c.climb_acceleration_max);
   override_with(setup.limits.tilt_max_deg, c.tilt_max_deg);
   override_with(setup.limits.body_rate_max, c.body_rate_max);
+  override_with(setup.imu_rate, s.imu.rate);
   if (c.tilt_max_deg > c.kind->tilt_max_deg) {
     throw InputError(
         fmt::format("{}: a tilt of {} degrees; `controller: {}` flies up to {}, geometric beyond",

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "apps/flight_part.hpp"
+#include "pointflight/sitl/px4_link.hpp"
+
+namespace pointflight::apps {
+
+/// Who flies the vehicles, instead of what the scenario says.
+struct SitlFlags {
+  bool px4 = false;
+  std::string address = "127.0.0.1";  ///< That firmwares are listened for at.
+};
+
+/// Adds `--px4` and what belongs to it.
+void add_sitl_flags(CLI::App& app, SitlFlags& flags);
+
+/// Firmwares that fly vehicles: those of the scenario (`autopilot: px4`), or all by a flag.
+class SitlPart : public FlightPart {
+ public:
+  explicit SitlPart(SitlFlags flags) : flags_(std::move(flags)) {}
+
+  [[nodiscard]] bool is_live(const Scenario& scenario) const override;
+  void prepare(Scenario& scenario, double rate) override;
+  void place(Scenario& scenario, const std::shared_ptr<const SurfelMap>& map) const override;
+  [[nodiscard]] double lockstep() const override { return lockstep_; }
+  void connect(Simulation& simulation, RunLoop& loop) override;
+  void report(const RunLoop& loop) const override;
+
+ private:
+  [[nodiscard]] bool is_flown(const VehicleSetup& vehicle) const;
+
+  SitlFlags flags_;
+  double lockstep_ = 0.0;
+  std::vector<std::string> names_;  ///< Of the vehicles of `px4_`.
+  std::vector<std::unique_ptr<Px4Link>> px4_;
+};
+
+}  // namespace pointflight::apps
