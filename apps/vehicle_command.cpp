@@ -10,8 +10,10 @@
 #include "apps/settings_json.hpp"
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/number_text.hpp"
+#include "pointflight/core/output_file.hpp"
 #include "pointflight/core/resources.hpp"
 #include "pointflight/picture/pictures.hpp"
+#include "pointflight/sitl/px4_parameters.hpp"
 #include "pointflight/vehicle/step_response.hpp"
 
 namespace pointflight::apps {
@@ -141,6 +143,26 @@ void show_vehicle(const ShowFlags& flags) {
   if (!flags.picture.empty()) picture::draw_step_responses(s, responses, flags.picture);
 }
 
+struct ParameterFlags {
+  std::string name;
+  std::string output;
+  bool vision = false;
+  bool force = false;
+};
+
+void write_px4_parameters(const ParameterFlags& flags) {
+  const VehicleSettings vehicle = load_vehicle(flags.name);
+  const std::string text = px4_parameter_file(vehicle, flags.vision);
+  if (flags.output.empty()) {
+    fmt::print("{}", text);
+    return;
+  }
+  check_outputs({flags.output}, {vehicle.path}, flags.force);
+  OutputFile file(flags.output);
+  file.write(text);
+  file.commit();
+}
+
 }  // namespace
 
 void add_vehicle_command(CLI::App& parent, int& /*exit_code*/) {
@@ -161,6 +183,15 @@ void add_vehicle_command(CLI::App& parent, int& /*exit_code*/) {
   show->add_flag("--path", flags->path, "Say where its file lies, to copy it");
   add_force_flag(*show, flags->force);
   show->callback([flags] { show_vehicle(*flags); });
+  auto* px4 = app->add_subcommand(
+      "px4-params", "A vehicle as parameters of PX4: rotors, thrust, gains (docs/autopilots.md)");
+  auto parameters = std::make_shared<ParameterFlags>();
+  px4->add_option("name", parameters->name, "A shipped vehicle or the path of a .yaml file")
+      ->required();
+  px4->add_option("-o,--output", parameters->output, "Parameter file; without it: stdout");
+  px4->add_flag("--vision", parameters->vision, "To fly by external vision, without satellites");
+  add_force_flag(*px4, parameters->force);
+  px4->callback([parameters] { write_px4_parameters(*parameters); });
   auto* keys = app->add_subcommand(
       "keys", "All keys of a vehicle file as a Markdown table (docs/vehicles.md)");
   keys->callback([] { print_reference(vehicle_reference()); });

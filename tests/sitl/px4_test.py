@@ -1,0 +1,213 @@
+#!/usr/bin/env python3
+"""PX4's side of `fly --px4`, imitated by a process of its own (px4_stack.py): flights, clocks, and all that goes wrong.
+Arguments: the program, then names of tests."""
+import csv
+import hashlib
+import json
+import math
+import os
+import socket
+import subprocess
+import sys
+import tempfile
+import unittest
+
+from px4_stack import GPS, SENSOR, TRUTH, Peer, Stack, Vehicle
+
+PROGRAM = sys.argv[1]
+# exact enough for a stack without filters worth the name
+SENSORS = """
+sensors:
+  - {kind: gnss, rate: 10, horizontal: 0.01, vertical: 0.01, noise: 0.01, velocity_noise: 0.02, latency: 0}
+  - {kind: barometer, offset: 0, drift: 0, noise: 1}
+  - {kind: magnetometer, hard_iron: 0.1, scale_error: 0, declination_deg: 0, rate: 100}
+"""
+
+
+def vehicle_of(name):
+    """As a user would tell PX4."""
+    text = subprocess.run([PROGRAM, "vehicle", "px4-params", name], check=True, capture_output=True, text=True).stdout
+    parameters = {line.split("\t")[2]: float(line.split("\t")[3]) for line in text.splitlines() if line[0] != "#"}
+    shown = subprocess.run([PROGRAM, "vehicle", "show", name, "--json"], check=True, capture_output=True, text=True)
+    return Vehicle(parameters, json.loads(shown.stdout)["settings"]["mass"])
+
+
+class Flight:
+    """`fly` of a scenario in the made-up hall, and its ports."""
+
+    def __init__(self, folder, extra="", duration=14.0, flags=(), vehicle="", port_offset=None):
+        # an instance whose ports are free
+        self.instance = port_offset if port_offset is not None else free_instance()
+        self.folder = folder
+        scenario = os.path.join(folder, "scenario.yaml")
+        with open(scenario, "w", encoding="utf-8") as file:
+            file.write(f"map: {MAP}\nseed: 3\nduration: {duration}\n"
+                       f"vehicle: {{start: [10, 5, 2], start_yaw_deg: 90, {vehicle}"
+                       f"autopilot: {{kind: px4, instance: {self.instance}, wait: 2}}}}\n"
+                       f"lidars: []\n{extra or SENSORS}")
+        self.out = os.path.join(folder, "run")
+        self.run = subprocess.Popen(
+            [PROGRAM, "fly", scenario, "-o", self.out, "--rate", "max", "--no-picture", "--force", *flags],
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+    @property
+    def port(self):
+        return 4560 + self.instance
+
+    def end(self):
+        _, self.err = self.run.communicate(timeout=120)
+        return self.run.returncode
+
+    def stop(self):
+        self.run.kill()
+        self.run.communicate()
+
+    def truth(self):
+        with open(os.path.join(self.out, "trajectory.csv"), encoding="utf-8") as file:
+            return list(csv.DictReader(file))
+
+
+def free_instance():
+    for instance in range(50, 150):
+        with socket.socket() as s:
+            try:
+                s.bind(("127.0.0.1", 4560 + instance))
+                return instance
+            except OSError:
+                continue
+    raise AssertionError("no free port")
+
+
+def goals(t):
+    """Up 1.5 m, 3 m north, 2 m west with the heading to the north-east, and stay."""
+    if t < 2.0:
+        return None
+    if t < 5.0:
+        return (0.0, 0.0, 1.5, 0.0)
+    if t < 9.0:
+        return (3.0, 0.0, 1.5, 0.0)
+    return (3.0, -2.0, 1.5, math.pi / 4)
+
+
+class Px4Test(unittest.TestCase):
+    def setUp(self):
+        self.folder = tempfile.TemporaryDirectory()
+        self.addCleanup(self.folder.cleanup)
+
+    def flight(self, folder="", **options):
+        flight = Flight(self.folder.name + folder, **options)
+        self.addCleanup(flight.stop)
+        return flight
+
+    def peer(self, flight, *arguments):
+        peer = Peer(flight.port, *arguments)
+        self.addCleanup(peer.socket.close)
+        return peer
+
+    def test_a_stack_of_another_make_flies_by_the_sensors_alone(self):
+        flight = self.flight()
+        peer = self.peer(flight, Stack(vehicle_of("quad_330"), goals))
+        peer.run(100.0)
+        self.assertEqual(flight.end(), 0, flight.err)
+        rows = flight.truth()
+        first, last = rows[0], rows[-1]
+        # from where it stood: 2 m west, 3 m north, 1.5 m up, the heading 45 degrees
+        self.assertAlmostEqual(float(last["px"]) - float(first["px"]), -2.0, delta=0.35)
+        self.assertAlmostEqual(float(last["py"]) - float(first["py"]), 3.0, delta=0.35)
+        self.assertAlmostEqual(float(last["pz"]) - float(first["pz"]), 1.5, delta=0.35)
+        yaw = 2 * math.atan2(float(last["qz"]), float(last["qw"]))
+        self.assertAlmostEqual(math.degrees(yaw) % 360, 45.0, delta=6.0)
+        with open(os.path.join(flight.out, "summary.json"), encoding="utf-8") as file:
+            self.assertEqual(json.load(file)["vehicles"][0]["collisions"], 0)
+        # each 4 ms a HIL_SENSOR, from 4 ms on, each answered
+        self.assertEqual(peer.times, [4000 * (i + 1) for i in range(len(peer.times))])
+        self.assertGreaterEqual(len(peer.times), 3498)
+        self.assertIn("0 waited for in vain", flight.err)
+        self.assertAlmostEqual(peer.counts[TRUTH], 14 * 200, delta=10)
+        self.assertAlmostEqual(peer.counts[GPS], 140, delta=2)
+
+    def test_truth_and_fixes_are_in_px4s_frames(self):
+        flight = self.flight(duration=3.0)
+        peer = self.peer(flight)
+        peer.run(100.0)
+        self.assertEqual(flight.end(), 0, flight.err)
+        truth, gps, sensor = peer.last[TRUTH], peer.last[GPS], peer.last[SENSOR]
+        self.assertAlmostEqual(abs(truth[1]), 1.0, delta=1e-3)  # heads north, level
+        self.assertAlmostEqual(truth[8] * 1e-7, 50 + 5 / 111229, delta=1e-5)  # latitude: y is north
+        self.assertAlmostEqual(truth[9] * 1e-7, 8 + 10 / 71700, delta=1e-5)
+        self.assertAlmostEqual(gps[1] * 1e-7, truth[8] * 1e-7, delta=2e-6)
+        self.assertEqual(gps[11], 3)
+        self.assertAlmostEqual(sensor[3], -9.81, delta=0.3)  # specific force at rest: up, so -z
+        # the field points north and down
+        self.assertGreater(sensor[7], 0.15)
+        self.assertGreater(sensor[9], 0.3)
+        self.assertAlmostEqual(sensor[10], 1013.25 - 0.12 * truth[10] / 1000, delta=0.6)
+
+    def sensors_of(self, mood):
+        flight = self.flight(duration=6.0)
+        peer = self.peer(flight, Stack(vehicle_of("quad_330"), goals), mood)
+        peer.run(100.0)
+        self.assertEqual(flight.end(), 0, flight.err)
+        self.assertEqual(len(peer.times), len(set(peer.times)))
+        return hashlib.sha256(b"".join(peer.sensor_bytes)).hexdigest()
+
+    def test_the_same_actuators_get_the_same_bytes_whatever_the_load(self):
+        self.assertEqual(self.sensors_of(()), self.sensors_of(("late", "junk")))
+
+    def test_one_that_stops_answering_is_said_and_gone_on_without(self):
+        flight = self.flight(duration=4.0)
+        peer = self.peer(flight)
+        peer.run(100.0, silent=((1.0, 1.3),))
+        self.assertEqual(flight.end(), 0, flight.err)
+        self.assertIn("PX4 does not answer; waiting for 2 s", flight.err)
+        self.assertIn("going on at the wall clock's pace", flight.err)
+        self.assertIn("1 waited for in vain", flight.err)
+
+    def test_a_new_firmware_starts_the_run_again(self):
+        flight = self.flight(duration=3.0)
+        first = self.peer(flight)
+        first.run(1.0)
+        first.socket.close()
+        second = self.peer(flight)
+        second.run(100.0)
+        self.assertEqual(flight.end(), 0, flight.err)
+        self.assertIn("PX4 is gone", flight.err)
+        self.assertIn("connected again: from the start", flight.err)
+        self.assertGreater(second.times[0], first.times[-1])
+        self.assertEqual(second.times, sorted(set(second.times)))
+        self.assertGreaterEqual(len(second.times), 740)  # all of the run
+
+    def test_strangers_at_the_port_do_no_harm(self):
+        flight = self.flight(duration=3.0)
+        with socket.create_connection(("127.0.0.1", flight_port(flight)), timeout=20) as s:
+            s.sendall(b"GET / HTTP/1.1\r\n\r\n" + bytes(range(256)) * 300)
+        self.peer(flight).run(100.0)
+        self.assertEqual(flight.end(), 0, flight.err)
+        self.assertIn("bytes of junk", flight.err)
+
+    def test_a_port_in_use_is_said(self):
+        flight = self.flight()
+        self.peer(flight).run(0.1)
+        os.mkdir(self.folder.name + "/other")
+        other = self.flight("/other", port_offset=flight.instance)
+        self.assertEqual(other.end(), 2)
+        self.assertRegex(other.err, r"TCP port \d+ of 127\.0\.0\.1: Address already in use")
+        self.assertEqual(len([line for line in other.err.splitlines() if "port" in line]), 1)
+
+
+def flight_port(flight):
+    """Once it listens."""
+    while True:
+        try:
+            socket.create_connection(("127.0.0.1", flight.port), timeout=5).close()
+            return flight.port
+        except ConnectionRefusedError:
+            continue
+
+
+if __name__ == "__main__":
+    with tempfile.TemporaryDirectory() as maps:
+        MAP = os.path.join(maps, "hall.pfmap")
+        subprocess.run([PROGRAM, "world", "make", "warehouse", "-o", MAP, "--resolution", "0.2"], check=True,
+                       stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+        unittest.main(argv=[sys.argv[0], *sys.argv[2:]])
