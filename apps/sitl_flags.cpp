@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "apps/terminal.hpp"
 #include "pointflight/core/input_error.hpp"
@@ -26,9 +27,8 @@ void add_missing(VehicleSetup& vehicle, const char* kind, const Settings& settin
   if (!has_it) vehicle.sensors.push_back({sensor_kinds().find(kind), settings});
 }
 
-void equip(VehicleSetup& vehicle) {
-  vehicle.landed = true;
-  vehicle.command_timeout = 0.0;  // the link says when nothing comes any more
+/// What PX4 asks of its simulators.
+void equip_for_px4(VehicleSetup& vehicle) {
   if (vehicle.imu_rate <= 0.0) vehicle.imu_rate = kImuRate;
   // a compass that nobody has calibrated would turn the map
   MagnetometerSettings magnetometer;
@@ -39,6 +39,12 @@ void equip(VehicleSetup& vehicle) {
   add_missing(vehicle, "gnss", GnssSettings{});
 }
 
+/// Number of the firmware's instance, which its ports go by.
+std::uint16_t instance_of(const VehicleSetup& vehicle, std::size_t number) {
+  const std::int64_t instance = vehicle.autopilot.instance;
+  return static_cast<std::uint16_t>(instance >= 0 ? static_cast<std::size_t>(instance) : number);
+}
+
 }  // namespace
 
 void add_sitl_flags(CLI::App& app, SitlFlags& flags) {
@@ -46,6 +52,11 @@ void add_sitl_flags(CLI::App& app, SitlFlags& flags) {
                flags.px4,
                "PX4 flies the vehicles: start it with `px4 -i N`, vehicle N waits for it at TCP "
                "port 4560 + N (docs/autopilots.md)");
+  app.add_flag(
+      "--ardupilot",
+      flags.ardupilot,
+      "ArduPilot flies the vehicles: start it with `--model JSON:127.0.0.1 -I N`, vehicle N "
+      "waits for it at UDP port 9002 + 10 N");
   app.add_option("--sitl-address",
                  flags.address,
                  "IPv4 address that flight controllers are listened for at; 0.0.0.0: all of this "
@@ -53,8 +64,17 @@ void add_sitl_flags(CLI::App& app, SitlFlags& flags) {
       ->capture_default_str();
 }
 
-bool SitlPart::is_flown(const VehicleSetup& vehicle) const {
-  return flags_.px4 || vehicle.autopilot.kind != AutopilotKind::kOwn;
+void SitlPart::check() const {
+  if (flags_.px4 && flags_.ardupilot) {
+    throw InputError(
+        "--px4, --ardupilot: one of them for all vehicles, or `autopilot:` of each in a scenario");
+  }
+}
+
+AutopilotKind SitlPart::kind_of(const VehicleSetup& vehicle) const {
+  return flags_.px4         ? AutopilotKind::kPx4
+         : flags_.ardupilot ? AutopilotKind::kArduPilot
+                            : vehicle.autopilot.kind;
 }
 
 bool SitlPart::is_live(const Scenario& scenario) const {
@@ -69,19 +89,21 @@ void SitlPart::prepare(Scenario& scenario, double /*rate*/) {
   scenario.vehicles = scenario.fleet();  // each with an instance of its own
   scenario.is_short = is_single && scenario.vehicles.size() == 1;
   for (VehicleSetup& vehicle : scenario.vehicles) {
+    vehicle.autopilot.kind = kind_of(vehicle);
     if (!is_flown(vehicle)) continue;
-    if (flags_.px4) vehicle.autopilot.kind = AutopilotKind::kPx4;
-    if (vehicle.autopilot.kind == AutopilotKind::kArduPilot) {
-      throw InputError(
-          fmt::format("{}: autopilot: ardupilot is not built yet; px4 is", vehicle.name));
-    }
     if (!vehicle.mission.waypoints.empty() || !vehicle.commands.empty()) {
-      log(fmt::format("note: {} is flown by PX4: its mission and commands are left out",
+      log(fmt::format("note: {} is flown by a firmware: its mission and commands are left out",
                       vehicle.name));
       vehicle.mission.waypoints.clear();
       vehicle.commands.clear();
     }
-    equip(vehicle);
+    vehicle.landed = true;
+    vehicle.command_timeout = 0.0;  // the link says when nothing comes any more
+    if (vehicle.autopilot.kind == AutopilotKind::kPx4) {
+      equip_for_px4(vehicle);
+    } else {
+      vehicle.imu_rate = 1.0 / scenario.physics_step;  // a frame may be a step
+    }
     lockstep_ = std::max(lockstep_, vehicle.autopilot.wait + 2.0);
   }
   scenario.output.trajectory_rate = std::max(scenario.output.trajectory_rate, kOutputRate);
@@ -100,25 +122,45 @@ void SitlPart::place(Scenario& scenario, const std::shared_ptr<const SurfelMap>&
 
 void SitlPart::connect(Simulation& simulation, RunLoop& loop) {
   for (std::size_t i = 0; i < simulation.vehicle_count(); ++i) {
-    const VehicleSetup& vehicle = simulation.vehicle(i).setup();
-    if (vehicle.autopilot.kind != AutopilotKind::kPx4 || !simulation.flies_here(i)) continue;
-    const std::int64_t instance = vehicle.autopilot.instance;
-    const auto number =
-        static_cast<std::uint16_t>(instance >= 0 ? instance : static_cast<std::int64_t>(i));
-    Px4Options options;
-    options.vehicle = i;
-    options.address = flags_.address;
-    options.port = static_cast<std::uint16_t>(Px4Options::kSimulatorPort + number);
-    options.offboard_port = static_cast<std::uint16_t>(Px4Options::kOffboardPort + number);
-    options.has_vision = vehicle.autopilot.vision;
-    options.has_obstacles = vehicle.autopilot.obstacles;
-    options.wait = vehicle.autopilot.wait;
-    options.origin = simulation.scenario().origin;
-    options.log = [](const std::string& line) { log(line); };
-    names_.push_back(vehicle.name);
-    px4_.push_back(std::make_unique<Px4Link>(std::move(options)));
-    loop.add(*px4_.back());
+    if (!simulation.flies_here(i)) continue;
+    const AutopilotKind kind = simulation.vehicle(i).setup().autopilot.kind;
+    if (kind == AutopilotKind::kPx4) add_px4(i, simulation, loop);
+    if (kind == AutopilotKind::kArduPilot) add_ardupilot(i, simulation, loop);
   }
+}
+
+void SitlPart::add_px4(std::size_t number, Simulation& simulation, RunLoop& loop) {
+  const VehicleSetup& vehicle = simulation.vehicle(number).setup();
+  const std::uint16_t instance = instance_of(vehicle, number);
+  Px4Options options;
+  options.vehicle = number;
+  options.address = flags_.address;
+  options.port = static_cast<std::uint16_t>(Px4Options::kSimulatorPort + instance);
+  options.offboard_port = static_cast<std::uint16_t>(Px4Options::kOffboardPort + instance);
+  options.has_vision = vehicle.autopilot.vision;
+  options.has_obstacles = vehicle.autopilot.obstacles;
+  options.wait = vehicle.autopilot.wait;
+  options.origin = simulation.scenario().origin;
+  options.log = [](const std::string& line) { log(line); };
+  px4_names_.push_back(vehicle.name);
+  px4_.push_back(std::make_unique<Px4Link>(std::move(options)));
+  loop.add(*px4_.back());
+}
+
+void SitlPart::add_ardupilot(std::size_t number, Simulation& simulation, RunLoop& loop) {
+  const VehicleSetup& vehicle = simulation.vehicle(number).setup();
+  ArduPilotOptions options;
+  options.vehicle = number;
+  options.address = flags_.address;
+  options.port = static_cast<std::uint16_t>(
+      ArduPilotOptions::kPort + ArduPilotOptions::kPortsApart * instance_of(vehicle, number));
+  options.wait = vehicle.autopilot.wait;
+  options.physics_step = simulation.scenario().physics_step;
+  options.truth = [&simulation, number] { return simulation.status(number).state.body; };
+  options.log = [](const std::string& line) { log(line); };
+  ardupilot_names_.push_back(vehicle.name);
+  ardupilot_.push_back(std::make_unique<ArduPilotLink>(std::move(options)));
+  loop.add(*ardupilot_.back());
 }
 
 void SitlPart::report(const RunLoop& /*loop*/) const {
@@ -126,13 +168,22 @@ void SitlPart::report(const RunLoop& /*loop*/) const {
     const Px4Report& r = px4_[i]->report();
     log(fmt::format(
         "px4: {}: {} HIL_SENSOR sent, {} answers, {} waited for in vain, {} connection{}{}",
-        names_[i],
+        px4_names_[i],
         r.sensors,
         r.answers,
         r.unanswered,
         r.connections,
         r.connections == 1 ? "" : "s",
         r.junk > 0 ? fmt::format(", {} bytes of junk", r.junk) : std::string()));
+  }
+  for (std::size_t i = 0; i < ardupilot_.size(); ++i) {
+    const ArduPilotReport& r = ardupilot_[i]->report();
+    log(fmt::format("ardupilot: {}: {} packets, {} repeated, {} waited for in vain{}",
+                    ardupilot_names_[i],
+                    r.packets,
+                    r.repeated,
+                    r.unanswered,
+                    r.junk > 0 ? fmt::format(", {} datagrams of junk", r.junk) : std::string()));
   }
 }
 

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <thread>
 #include <utility>
 
 #include "pointflight/core/constants.hpp"
@@ -22,7 +21,6 @@ using mavlink::HilSensor;
 constexpr std::uint8_t kSystem = 1;  // as other simulators have it
 constexpr std::uint8_t kComponent = 200;
 constexpr double kGaussPerMicrotesla = 0.01;
-constexpr std::chrono::milliseconds kSilent(1000);  // until users are told
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
 /// Rounded and cut to what the type holds.
@@ -80,6 +78,7 @@ Air standard_air(double pressure) {
 
 Px4Link::Px4Link(Px4Options options)
     : options_(std::move(options)),
+      clock_("PX4", options_.wait, options_.log),
       server_(Socket::listen_tcp(options_.address, options_.port)),
       offboard_(Socket::bind_udp("0.0.0.0", 0)),
       writer_(kSystem, kComponent),
@@ -276,20 +275,11 @@ void Px4Link::take_scan(const ScanSample& sample) {
 
 void Px4Link::on_step(const StepDone& done) {
   if (!firmware_.is_open()) accept();
-  if (!is_answered_ && !out_.empty()) asked_at_ = Clock::now();
+  if (!is_answered_ && !out_.empty()) clock_.ask();
   flush();
   receive();
-  if (!is_locked_) keep_pace(done.time);
-}
-
-/// Until PX4 answers, and while it does not: its start-up must not race through seconds.
-void Px4Link::keep_pace(SimTime now) {
-  if (!std::exchange(is_paced_, true)) {
-    paced_from_ = now;
-    paced_at_ = Clock::now();
-  }
-  std::this_thread::sleep_until(paced_at_ +
-                                std::chrono::duration_cast<Clock::duration>(now - paced_from_));
+  // until it answers, its start must not race through seconds
+  if (!is_locked_) clock_.keep_pace(done.time);
 }
 
 void Px4Link::on_wait(SimTime /*now*/, Waiting why) {
@@ -298,25 +288,19 @@ void Px4Link::on_wait(SimTime /*now*/, Waiting why) {
   if (why == Waiting::kForAnswer) {
     give_up();
   } else {
-    asked_at_ = Clock::now();
-    is_paced_ = false;
+    clock_.ask();
+    clock_.restart_pace();
   }
 }
 
-/// It may be gone, in a debugger, or a flight task that sets no actuators.
+/// Not before an answer is due: a flight task may have stopped to set actuators.
 void Px4Link::give_up() {
-  const auto silent = Clock::now() - asked_at_;
-  if (is_answered_ || silent < kSilent) return;
-  if (!std::exchange(has_said_silent_, true)) {
-    say(fmt::format("PX4 does not answer; waiting for {} s (said once)", options_.wait));
-  }
-  if (silent < std::chrono::duration<double>(options_.wait)) return;
+  if (is_answered_ || !clock_.gives_up()) return;
   ++report_.unanswered;
   is_locked_ = false;
-  is_paced_ = false;
   is_answered_ = true;
+  clock_.restart_pace();
   orders_.emplace_back(AnswerOrder{});
-  say("PX4 has not answered; going on at the wall clock's pace until it does");
 }
 
 bool Px4Link::wants_answer(const Sample& sample) const {
@@ -345,8 +329,7 @@ void Px4Link::accept() {
   truth_interval_.reset();
   is_locked_ = false;
   is_answered_ = true;
-  is_paced_ = false;
-  has_said_silent_ = false;
+  clock_.restart_pace();
   say(report_.connections == 0 ? "PX4 has connected" : "PX4 has connected again: from the start");
   if (report_.connections++ > 0) orders_.emplace_back(ResetOrder{});
 }
@@ -357,7 +340,7 @@ void Px4Link::disconnect(const std::string& why) {
   firmware_.close();
   out_.clear();
   is_locked_ = false;
-  is_paced_ = false;
+  clock_.restart_pace();
   is_answered_ = true;
   is_armed_ = false;
   orders_.emplace_back(VehicleOrder{options_.vehicle, DisarmCommand{}, true});
@@ -417,7 +400,7 @@ void Px4Link::obey(const mavlink::HilActuatorControls& controls) {
 void Px4Link::on_reset(SimTime reached) {
   offset_ = usec(reached);
   truth_.reset();
-  is_paced_ = false;
+  clock_.restart_pace();
   is_armed_ = false;
 }
 

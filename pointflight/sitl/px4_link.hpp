@@ -11,6 +11,7 @@
 
 #include "pointflight/run/link.hpp"
 #include "pointflight/sim/sensor.hpp"
+#include "pointflight/sitl/internal/answer_clock.hpp"
 #include "pointflight/sitl/internal/socket.hpp"
 #include "pointflight/sitl/mavlink.hpp"
 #include "pointflight/sitl/motor_outputs.hpp"
@@ -70,8 +71,6 @@ class Px4Link : public Link {
   [[nodiscard]] const Px4Report& report() const { return report_; }
 
  private:
-  using Clock = std::chrono::steady_clock;
-
   void take_measurement(const Measurement& measurement);
   void take_imu(const ImuSample& sample);
   void take_truth(const StateSample& sample);
@@ -84,10 +83,10 @@ class Px4Link : public Link {
   void receive();
   void obey(const mavlink::HilActuatorControls& controls);
   void give_up();
-  void keep_pace(SimTime now);
   void say(const std::string& line) const;
 
   Px4Options options_;
+  AnswerClock clock_;
   Px4Report report_;
   Socket server_;
   Socket firmware_;
@@ -116,11 +115,6 @@ class Px4Link : public Link {
   bool is_locked_ = false;                       ///< It answers: it is waited for.
   bool is_answered_ = true;                      ///< The last HIL_SENSOR is.
   bool is_armed_ = false;
-  bool has_said_silent_ = false;
-  Clock::time_point asked_at_;  ///< When the last HIL_SENSOR was sent.
-  SimTime paced_from_;          ///< Where the pace of the wall clock was begun ..
-  Clock::time_point paced_at_;  ///< .. and when.
-  bool is_paced_ = false;
 };
 
 }  // namespace pointflight

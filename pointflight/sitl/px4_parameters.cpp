@@ -24,8 +24,9 @@ struct Px4Rotor {
 
 std::vector<Px4Rotor> rotors_of(const VehicleSettings& vehicle) {
   const double ratio = vehicle.rotor.torque_coefficient / vehicle.rotor.thrust_coefficient;
+  const MotorOutputs motors(vehicle);
   std::vector<Px4Rotor> rotors;
-  for (const std::size_t number : MotorOutputs(vehicle).rotors()) {
+  for (const std::size_t number : motors.rotors()) {
     const RotorPlacement& rotor = vehicle.rotors[number];
     // its reaction is against its turn
     rotors.push_back({frd_from_flu(rotor.position), -rotor.yaw_sign * ratio});
@@ -60,8 +61,8 @@ void add_loops(const VehicleSettings& vehicle,
                std::vector<Px4Parameter>& all) {
   struct Axis {
     const char* name;
-    double integral, derivative;         // shares of the proportional gain, as PX4's defaults
-    double least, most, angle_most;      // that PX4 takes
+    double integral, derivative;     // shares of the proportional gain, as PX4's defaults
+    double least, most, angle_most;  // that PX4 takes
   };
   constexpr std::array<Axis, 3> kAxes = {{{"ROLL", 1.33, 0.02, 0.01, 0.5, 12.0},
                                           {"PITCH", 1.33, 0.02, 0.01, 0.6, 12.0},
@@ -74,8 +75,8 @@ void add_loops(const VehicleSettings& vehicle,
     const LoopDesign& loop = i < 2 ? c.roll_pitch : c.yaw;
     const double rate_gain = 2.0 * loop.damping * loop.natural_frequency;
     const double angle_gain = loop.natural_frequency / (2.0 * loop.damping);
-    const double p = std::clamp(
-        rate_gain * vehicle.inertia_diagonal[row] / torque[row], axis.least, axis.most);
+    const double p =
+        std::clamp(rate_gain * vehicle.inertia_diagonal[row] / torque[row], axis.least, axis.most);
     all.push_back({fmt::format("MC_{}RATE_P", axis.name), p});
     all.push_back({fmt::format("MC_{}RATE_I", axis.name), axis.integral * p});
     all.push_back({fmt::format("MC_{}RATE_D", axis.name), axis.derivative * p});
