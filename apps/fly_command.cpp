@@ -173,7 +173,7 @@ std::vector<std::unique_ptr<FlightPart>> parts_of(const FlyFlags& flags, int thr
   std::vector<std::unique_ptr<FlightPart>> parts;
   parts.push_back(std::make_unique<SharePart>(flags.share, flags.output));
   parts.push_back(std::make_unique<PolicyPart>(flags.policy));
-  parts.push_back(std::make_unique<SitlPart>(flags.sitl));
+  parts.push_back(std::make_unique<SitlPart>(flags.sitl, flags.output));
   parts.push_back(std::make_unique<RendererPart>(flags.renderer));
   parts.push_back(std::make_unique<FolderPart>(
       FolderOptions{flags.output, existing, !flags.no_picture}, threads));

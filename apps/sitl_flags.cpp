@@ -39,6 +39,11 @@ void equip_for_px4(VehicleSetup& vehicle) {
   add_missing(vehicle, "gnss", GnssSettings{});
 }
 
+std::string without_slash(std::string path) {
+  while (path.size() > 1 && path.back() == '/') path.pop_back();
+  return path;
+}
+
 /// Number of the firmware's instance, which its ports go by.
 std::uint16_t instance_of(const VehicleSetup& vehicle, std::size_t number) {
   const std::int64_t instance = vehicle.autopilot.instance;
@@ -57,6 +62,11 @@ void add_sitl_flags(CLI::App& app, SitlFlags& flags) {
       flags.ardupilot,
       "ArduPilot flies the vehicles: start it with `--model JSON:127.0.0.1 -I N`, vehicle N "
       "waits for it at UDP port 9002 + 10 N");
+  app.add_option("--start",
+                 flags.start,
+                 "PX4's program (bin/px4 of a build for SITL, or that build's folder): started for "
+                 "each vehicle that PX4 flies, and ended with the flight; works in OUTPUT_px4/N")
+      ->type_name("PX4");
   app.add_option("--sitl-address",
                  flags.address,
                  "IPv4 address that flight controllers are listened for at; 0.0.0.0: all of this "
@@ -84,6 +94,13 @@ bool SitlPart::is_live(const Scenario& scenario) const {
 }
 
 void SitlPart::prepare(Scenario& scenario, double /*rate*/) {
+  const bool has_px4 = std::any_of(
+      scenario.vehicles.begin(), scenario.vehicles.end(), [&](const VehicleSetup& vehicle) {
+        return kind_of(vehicle) == AutopilotKind::kPx4;
+      });
+  if (!flags_.start.empty() && !has_px4) {
+    throw InputError("--start: PX4 flies none of the vehicles; give --px4 or `autopilot: px4`");
+  }
   if (!is_live(scenario)) return;
   const bool is_single = scenario.is_short;
   scenario.vehicles = scenario.fleet();  // each with an instance of its own
@@ -142,9 +159,19 @@ void SitlPart::add_px4(std::size_t number, Simulation& simulation, RunLoop& loop
   options.wait = vehicle.autopilot.wait;
   options.origin = simulation.scenario().origin;
   options.log = [](const std::string& line) { log(line); };
+  const std::size_t child = started_.size();
+  if (!flags_.start.empty()) options.is_gone = [this, child] { return started_[child]->is_gone(); };
   px4_names_.push_back(vehicle.name);
   px4_.push_back(std::make_unique<Px4Link>(std::move(options)));
   loop.add(*px4_.back());
+  if (flags_.start.empty()) return;
+  const std::string folder =
+      fmt::format("{}/{}", output_.empty() ? "px4" : without_slash(output_) + "_px4", instance);
+  started_.push_back(std::make_unique<StartedPx4>(flags_.start,
+                                                  folder,
+                                                  instance,
+                                                  simulation.vehicle(number).settings(),
+                                                  vehicle.autopilot.vision));
 }
 
 void SitlPart::add_ardupilot(std::size_t number, Simulation& simulation, RunLoop& loop) {
@@ -161,6 +188,11 @@ void SitlPart::add_ardupilot(std::size_t number, Simulation& simulation, RunLoop
   ardupilot_names_.push_back(vehicle.name);
   ardupilot_.push_back(std::make_unique<ArduPilotLink>(std::move(options)));
   loop.add(*ardupilot_.back());
+}
+
+bool SitlPart::has_failed() const {
+  return std::any_of(
+      px4_.begin(), px4_.end(), [](const auto& link) { return link->report().is_cut; });
 }
 
 void SitlPart::report(const RunLoop& /*loop*/) const {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "apps/flight_part.hpp"
+#include "apps/sitl_process.hpp"
 #include "pointflight/sitl/ardupilot_link.hpp"
 #include "pointflight/sitl/px4_link.hpp"
 
@@ -15,6 +16,7 @@ namespace pointflight::apps {
 struct SitlFlags {
   bool px4 = false;
   bool ardupilot = false;
+  std::string start;                  ///< PX4's program, to be started; empty: somebody does.
   std::string address = "127.0.0.1";  ///< That firmwares are listened for at.
 };
 
@@ -24,7 +26,9 @@ void add_sitl_flags(CLI::App& app, SitlFlags& flags);
 /// Firmwares that fly vehicles: those of the scenario (`autopilot: px4`), or all by a flag.
 class SitlPart : public FlightPart {
  public:
-  explicit SitlPart(SitlFlags flags) : flags_(std::move(flags)) {}
+  /// `output`: the flight's folder; firmwares that are started get folders beside it.
+  SitlPart(SitlFlags flags, std::string output)
+      : flags_(std::move(flags)), output_(std::move(output)) {}
 
   void check() const override;
   [[nodiscard]] bool is_live(const Scenario& scenario) const override;
@@ -33,6 +37,7 @@ class SitlPart : public FlightPart {
   [[nodiscard]] double lockstep() const override { return lockstep_; }
   void connect(Simulation& simulation, RunLoop& loop) override;
   void report(const RunLoop& loop) const override;
+  [[nodiscard]] bool has_failed() const override;
 
  private:
   [[nodiscard]] AutopilotKind kind_of(const VehicleSetup& vehicle) const;
@@ -43,6 +48,8 @@ class SitlPart : public FlightPart {
   void add_ardupilot(std::size_t number, Simulation& simulation, RunLoop& loop);
 
   SitlFlags flags_;
+  std::string output_;
+  std::vector<std::unique_ptr<StartedPx4>> started_;
   double lockstep_ = 0.0;
   std::vector<std::string> px4_names_;  ///< Of the vehicles of `px4_`.
   std::vector<std::unique_ptr<Px4Link>> px4_;

@@ -405,6 +405,7 @@ void Px4Link::on_reset(SimTime reached) {
 }
 
 void Px4Link::close() {
+  report_.is_cut = is_over();
   flush();
   firmware_.close();
   server_.close();

@@ -32,6 +32,7 @@ struct Px4Options {
   double wait = 10.0;          ///< For an answer, s; then the run goes on without.
   EarthOrigin origin;          ///< Of the world.
   std::function<void(const std::string& line)> log;  ///< For users.
+  std::function<bool()> is_gone;  ///< True once no firmware will come; empty: one always may.
 };
 
 /// What has come of the link.
@@ -41,6 +42,7 @@ struct Px4Report {
   std::uint64_t unanswered = 0;   ///< HIL_SENSORs that an answer was waited for in vain.
   std::uint64_t connections = 0;  ///< Of firmwares.
   std::uint64_t junk = 0;         ///< Bytes that were no message.
+  bool is_cut = false;            ///< The firmware ended before the run did.
 };
 
 /// PX4 flies a vehicle. The link is the server; PX4 connects, and from its first actuator message
@@ -66,6 +68,7 @@ class Px4Link : public Link {
   std::vector<Order> take_orders() override;
   void on_reset(SimTime reached) override;
   void close() override;
+  [[nodiscard]] bool is_over() const override { return options_.is_gone && options_.is_gone(); }
 
   [[nodiscard]] std::uint16_t port() const { return server_.port(); }  ///< That it listens at.
   [[nodiscard]] const Px4Report& report() const { return report_; }
