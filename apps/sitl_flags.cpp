@@ -62,7 +62,7 @@ void add_sitl_flags(CLI::App& app, SitlFlags& flags) {
       flags.ardupilot,
       "ArduPilot flies the vehicles: start it with `--model JSON:127.0.0.1 -I N`, vehicle N "
       "waits for it at UDP port 9002 + 10 N");
-  app.add_option("--start",
+  app.add_option("--px4-start",
                  flags.start,
                  "PX4's program (bin/px4 of a build for SITL, or that build's folder): started for "
                  "each vehicle that PX4 flies, and ended with the flight; works in OUTPUT_px4/N")
@@ -99,7 +99,7 @@ void SitlPart::prepare(Scenario& scenario, double /*rate*/) {
         return kind_of(vehicle) == AutopilotKind::kPx4;
       });
   if (!flags_.start.empty() && !has_px4) {
-    throw InputError("--start: PX4 flies none of the vehicles; give --px4 or `autopilot: px4`");
+    throw InputError("--px4-start: PX4 flies none of the vehicles; give --px4 or `autopilot: px4`");
   }
   if (!is_live(scenario)) return;
   const bool is_single = scenario.is_short;

@@ -10,6 +10,7 @@ import struct
 import subprocess
 import sys
 import tempfile
+import time
 import unittest
 
 from px4_stack import Stack
@@ -32,13 +33,14 @@ class Client:
         packet = struct.pack(f"<HHI{count}H", 29569 if wide else 18458, rate, self.frame,
                              *pulses, *([0] * (count - len(pulses))))
         self.frame += 1
-        for _ in range(150):
+        for _ in range(500):
             try:
                 self.socket.send(packet)
                 return self.read(self.socket.recv(65536))
             except (TimeoutError, ConnectionRefusedError):
                 if self.over():
                     return None
+                time.sleep(0.02)
         raise AssertionError("no answer")
 
     @staticmethod

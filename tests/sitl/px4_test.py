@@ -197,17 +197,17 @@ class Px4Test(unittest.TestCase):
     def test_px4_is_started_and_ended(self):
         body = ("print('mass', os.environ['PX4_PARAM_CA_ROTOR_COUNT'], os.environ['PX4_SYS_AUTOSTART'], flush=True)\n"
                 "Peer(port).run(100.0)\nimport time\ntime.sleep(100)")
-        flight = self.flight(duration=1.0, flags=("--start", self.fake_px4(body)))
+        flight = self.flight(duration=1.0, flags=("--px4-start", self.fake_px4(body)))
         self.assertEqual(flight.end(), 0, flight.err)
         with open(os.path.join(flight.out + "_px4", str(flight.instance), "console.txt"), encoding="utf-8") as file:
             self.assertEqual(file.read(), "mass 4 10016\n")
         self.assertIn("0 waited for in vain", flight.err)
 
     def test_a_px4_that_ends_ends_the_flight(self):
-        flight = self.flight(duration=5.0, flags=("--start", self.fake_px4("Peer(port).run(0.5)\nsys.exit(3)")))
+        flight = self.flight(duration=5.0, flags=("--px4-start", self.fake_px4("Peer(port).run(0.5)\nsys.exit(3)")))
         self.assertEqual(flight.end(), 2)
         self.assertIn("PX4 has ended (exit code 3); its console:", flight.err)
-        other = self.flight(flags=("--start", self.folder.name + "/none"))
+        other = self.flight(flags=("--px4-start", self.folder.name + "/none"))
         self.assertEqual(other.end(), 2)
         self.assertIn("there is no such program", other.err)
 
