@@ -1,6 +1,7 @@
 #include "pointflight/sitl/internal/socket.hpp"
 
 #include <arpa/inet.h>
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
@@ -10,6 +11,7 @@
 
 #include <cerrno>
 #include <cstring>
+#include <thread>
 #include <utility>
 
 #include "pointflight/core/input_error.hpp"
@@ -61,6 +63,28 @@ Socket& Socket::operator=(Socket&& other) noexcept {
 
 Socket Socket::listen_tcp(const std::string& address, std::uint16_t port) {
   return bound(SOCK_STREAM, address, port);
+}
+
+Socket Socket::connect_tcp(const std::string& address,
+                           std::uint16_t port,
+                           std::chrono::seconds at_most) {
+  const sockaddr_in to = address_of(address, port);
+  const auto until = std::chrono::steady_clock::now() + at_most;
+  for (;;) {
+    Socket socket(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
+    const int descriptor = socket.descriptor();
+    const int on = 1;
+    if (descriptor >= 0 &&
+        ::connect(descriptor, reinterpret_cast<const sockaddr*>(&to), sizeof(to)) == 0) {
+      setsockopt(descriptor, IPPROTO_TCP, TCP_NODELAY, &on, sizeof(on));
+      fcntl(descriptor, F_SETFL, O_NONBLOCK);
+      return socket;
+    }
+    if (std::chrono::steady_clock::now() > until) {
+      throw InputError(fmt::format("TCP port {} of {}: {}", port, address, std::strerror(errno)));
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
 }
 
 Socket Socket::bind_udp(const std::string& address, std::uint16_t port) {

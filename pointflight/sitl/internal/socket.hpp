@@ -25,6 +25,10 @@ class Socket {
 
   /// Waits for connections at an IPv4 address. Throws InputError that names the port.
   static Socket listen_tcp(const std::string& address, std::uint16_t port);
+  /// Connects to a server, which may be about to start. Throws InputError after so long.
+  static Socket connect_tcp(const std::string& address,
+                            std::uint16_t port,
+                            std::chrono::seconds at_most);
   /// Receives datagrams at an IPv4 address; port 0: any. Throws InputError that names the port.
   static Socket bind_udp(const std::string& address, std::uint16_t port);
 
