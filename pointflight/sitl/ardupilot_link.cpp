@@ -162,12 +162,13 @@ void ArduPilotLink::obey(const ServoPacket& packet) {
   }
   const double frames = 1.0 / std::max<double>(1.0, packet.rate);
   steps_left_ = std::max(1, static_cast<int>(std::lround(frames / options_.physics_step)));
-  is_waiting_ = false;
+  // an answer that nobody waits for would be taken for the next one
+  const bool is_answer = std::exchange(is_waiting_, false);
   is_locked_ = true;
   if (is_armed) {
-    orders_.emplace_back(
-        VehicleOrder{options_.vehicle, RotorSpeedCommand{motors_->speeds(outputs, true)}, true});
-  } else {
+    const RotorSpeedCommand speeds{motors_->speeds(outputs, true)};
+    orders_.emplace_back(VehicleOrder{options_.vehicle, speeds, is_answer});
+  } else if (is_answer) {
     orders_.emplace_back(AnswerOrder{});
   }
 }

@@ -33,6 +33,7 @@ class Client:
         packet = struct.pack(f"<HHI{count}H", 29569 if wide else 18458, rate, self.frame,
                              *pulses, *([0] * (count - len(pulses))))
         self.frame += 1
+        self.drain()
         for _ in range(500):
             try:
                 self.socket.send(packet)
@@ -42,6 +43,16 @@ class Client:
                     return None
                 time.sleep(0.02)
         raise AssertionError("no answer")
+
+    def drain(self):
+        """On a busy machine a packet that was sent again has two answers."""
+        self.socket.setblocking(False)
+        try:
+            while self.socket.recv(65536):
+                pass
+        except (BlockingIOError, ConnectionRefusedError):
+            pass
+        self.socket.settimeout(1.0)
 
     @staticmethod
     def read(answer):
