@@ -21,10 +21,11 @@ fs::path program_of(const std::string& given) {
   const fs::path path = fs::absolute(given, error);
   const fs::path program = fs::is_directory(path, error) ? path / "bin" / "px4" : path;
   if (!fs::is_regular_file(program, error)) {
-    throw InputError(fmt::format(
-        "--px4-start: {}: there is no such program; give bin/px4 of a build for SITL, or the build's "
-        "folder (build/px4_sitl_default)",
-        program.string()));
+    throw InputError(
+        fmt::format("--px4-start: {}: there is no such program; give bin/px4 of a build for SITL, "
+                    "or the build's "
+                    "folder (build/px4_sitl_default)",
+                    program.string()));
   }
   return program;
 }

@@ -69,6 +69,7 @@ class ArduPilotLink : public Link {
   void close() override { socket_.close(); }
 
   [[nodiscard]] std::uint16_t port() const { return socket_.port(); }  ///< That it listens at.
+  /// So far.
   [[nodiscard]] const ArduPilotReport& report() const { return report_; }
 
  private:

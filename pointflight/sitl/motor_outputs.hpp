@@ -14,6 +14,7 @@ namespace pointflight {
 /// (front right, rear left, front left, rear right), others as their vehicle file does.
 class MotorOutputs {
  public:
+  /// Of a vehicle file, which is not needed afterwards.
   explicit MotorOutputs(const VehicleSettings& vehicle);
 
   /// Rotor (number in the vehicle file) of each output.

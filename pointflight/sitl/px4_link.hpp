@@ -12,8 +12,8 @@
 #include "pointflight/run/link.hpp"
 #include "pointflight/sim/sensor.hpp"
 #include "pointflight/sitl/internal/answer_clock.hpp"
+#include "pointflight/sitl/internal/mavlink.hpp"
 #include "pointflight/sitl/internal/socket.hpp"
-#include "pointflight/sitl/mavlink.hpp"
 #include "pointflight/sitl/motor_outputs.hpp"
 
 namespace pointflight {
@@ -71,6 +71,7 @@ class Px4Link : public Link {
   [[nodiscard]] bool is_over() const override { return options_.is_gone && options_.is_gone(); }
 
   [[nodiscard]] std::uint16_t port() const { return server_.port(); }  ///< That it listens at.
+  /// So far.
   [[nodiscard]] const Px4Report& report() const { return report_; }
 
  private:

@@ -10,8 +10,8 @@ namespace pointflight {
 
 /// A parameter, by PX4's name.
 struct Px4Parameter {
-  std::string name;
-  double value = 0.0;
+  std::string name;         ///< "MPC_THR_HOVER"
+  double value = 0.0;       ///< In PX4's units.
   bool is_integer = false;  ///< INT32; else REAL32.
 };
 

@@ -1,6 +1,6 @@
 // Any bytes as a stream of MAVLink, in pieces of any length: the frames in it do not depend on the
 // pieces, and what is read of them drives motors at speeds that they have.
-#include "pointflight/sitl/mavlink.hpp"
+#include "pointflight/sitl/internal/mavlink.hpp"
 
 #include <algorithm>
 #include <cstdint>

@@ -1,5 +1,5 @@
 // Frames and messages of MAVLink: bytes that others computed, round trips, junk.
-#include "pointflight/sitl/mavlink.hpp"
+#include "pointflight/sitl/internal/mavlink.hpp"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>

@@ -10,7 +10,7 @@
 #include "pointflight/core/hash.hpp"
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/sitl/internal/socket.hpp"
-#include "pointflight/sitl/mavlink.hpp"
+#include "pointflight/sitl/internal/mavlink.hpp"
 
 using namespace pointflight;
 

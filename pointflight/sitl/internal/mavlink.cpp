@@ -1,4 +1,4 @@
-#include "pointflight/sitl/mavlink.hpp"
+#include "pointflight/sitl/internal/mavlink.hpp"
 
 #include <algorithm>
 #include <bit>
