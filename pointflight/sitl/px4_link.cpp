@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <any>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -10,7 +11,6 @@
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/math.hpp"
 #include "pointflight/geometry/rotation.hpp"
-#include "pointflight/sim/navigation_sensors.hpp"
 #include "pointflight/sitl/frames.hpp"
 
 namespace pointflight {
@@ -88,7 +88,16 @@ void Px4Link::open(const RunDescription& run) {
   const VehicleDescription& vehicle = run.vehicles.at(options_.vehicle);
   motors_.emplace(vehicle.settings);
   sensors_ = vehicle.sensors;
-  setups_ = vehicle.setup.sensors;
+  // the scenario's are among those that every vehicle has, which have no name
+  auto setup = vehicle.setup.sensors.begin();
+  for (const std::string& kind : sensors_) {
+    range_finders_.emplace_back();
+    if (kind.empty() || setup == vehicle.setup.sensors.end()) continue;
+    const std::any& settings = (setup++)->settings;
+    if (kind == "range_finder" && settings.has_value()) {
+      range_finders_.back() = std::any_cast<const RangeFinderSettings&>(settings);
+    }
+  }
   const Vector3d rpy = vehicle.settings.imu.rotation_rpy_deg * kDegree;
   q_body_imu_ = quaternion_from_rpy(rpy.x(), rpy.y(), rpy.z());
   for (const LidarDescription& lidar : vehicle.lidars) T_body_lidar_.push_back(lidar.T_body_sensor);
@@ -166,9 +175,7 @@ void Px4Link::take_measurement(const Measurement& measurement) {
     gps.satellites = 12;
     writer_.append(gps, out_);
   } else if (kind == "range_finder") {
-    const auto& settings =
-        std::any_cast<const RangeFinderSettings&>(setups_.at(measurement.sensor).settings);
-    const Vector3d rpy = settings.rotation_rpy_deg * kDegree;
+    const Vector3d rpy = range_finders_.at(measurement.sensor).rotation_rpy_deg * kDegree;
     const Quaterniond q_body_sensor = quaternion_from_rpy(rpy.x(), rpy.y(), rpy.z());
     mavlink::DistanceSensor distance;
     distance.time_boot_ms = static_cast<std::uint32_t>(usec(measurement.time) / 1000);

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "pointflight/run/link.hpp"
-#include "pointflight/sim/sensor.hpp"
+#include "pointflight/sim/navigation_sensors.hpp"
 #include "pointflight/sitl/internal/answer_clock.hpp"
 #include "pointflight/sitl/internal/mavlink.hpp"
 #include "pointflight/sitl/internal/socket.hpp"
@@ -104,8 +104,8 @@ class Px4Link : public Link {
 
   // of the vehicle
   std::optional<MotorOutputs> motors_;
-  std::vector<std::string> sensors_;  ///< Kinds by number.
-  std::vector<SensorSetup> setups_;   ///< The same.
+  std::vector<std::string> sensors_;                ///< Kinds by number.
+  std::vector<RangeFinderSettings> range_finders_;  ///< The same; of others their defaults.
   Quaterniond q_body_imu_ = Quaterniond::Identity();
   std::vector<Pose> T_body_lidar_;
   double band_ = 0.3;  ///< m above and below the body's origin: what stands there is in its way.

@@ -223,7 +223,10 @@ class Peer:
         self.sequence += 1
         if "junk" in self.mood and self.random.random() < 0.3:
             data = bytes(self.random.randrange(256) for _ in range(self.random.randrange(1, 20))) + data
-        self.socket.sendall(data)
+        try:
+            self.socket.sendall(data)
+        except (BrokenPipeError, ConnectionResetError):
+            pass  # `messages` ends
 
     def messages(self):
         """Whole frames that have come; none once the link is closed."""
@@ -241,7 +244,10 @@ class Peer:
                 self.buffer = self.buffer[12 + length:]
                 self.counts[number] = self.counts.get(number, 0) + 1
                 yield number, payload
-            chunk = self.socket.recv(65536)
+            try:
+                chunk = self.socket.recv(65536)
+            except ConnectionResetError:  # it was closed before our last answer was read
+                return
             if not chunk:
                 return
             self.buffer += chunk

@@ -6,13 +6,15 @@ import hashlib
 import json
 import math
 import os
+import re
 import socket
 import subprocess
 import sys
 import tempfile
+import threading
 import unittest
 
-from px4_stack import GPS, SENSOR, TRUTH, Peer, Stack, Vehicle
+from px4_stack import GPS, SENSOR, TRUTH, Peer, Stack, Vehicle, unpack
 
 PROGRAM = sys.argv[1]
 # exact enough for a stack without filters worth the name
@@ -35,14 +37,15 @@ def vehicle_of(name):
 class Flight:
     """`fly` of a scenario in the made-up hall, and its ports."""
 
-    def __init__(self, folder, extra="", duration=14.0, flags=(), vehicle="", port_offset=None):
+    def __init__(self, folder, extra="", duration=14.0, flags=(), text="", port_offset=None):
         # an instance whose ports are free
         self.instance = port_offset if port_offset is not None else free_instance()
         self.folder = folder
         scenario = os.path.join(folder, "scenario.yaml")
         with open(scenario, "w", encoding="utf-8") as file:
-            file.write(f"map: {MAP}\nseed: 3\nduration: {duration}\n"
-                       f"vehicle: {{start: [10, 5, 2], start_yaw_deg: 90, {vehicle}"
+            file.write(text.replace("INSTANCE", str(self.instance)) or
+                       f"map: {MAP}\nseed: 3\nduration: {duration}\n"
+                       f"vehicle: {{start: [10, 5, 2], start_yaw_deg: 90, "
                        f"autopilot: {{kind: px4, instance: {self.instance}, wait: 2}}}}\n"
                        f"lidars: []\n{extra or SENSORS}")
         self.out = os.path.join(folder, "run")
@@ -184,6 +187,68 @@ class Px4Test(unittest.TestCase):
         self.peer(flight).run(100.0)
         self.assertEqual(flight.end(), 0, flight.err)
         self.assertIn("bytes of junk", flight.err)
+
+    def test_vision_ranges_and_obstacles_are_where_they_are(self):
+        """A room of 10 by 8 by 3 m; the vehicle stands at (3, 2) and heads north."""
+        room = os.path.join(self.folder.name, "room.xyz")
+        with open(room, "w", encoding="utf-8") as file:
+            for i in range(101):
+                for k in range(81):
+                    x, y, z = 0.1 * i, 0.1 * k, 0.1 * (k % 31)
+                    file.write(f"{x} {y} 0\n{x} 0 {z}\n{x} 8 {z}\n0 {y} {0.1 * (i % 31)}\n10 {y} {0.1 * (i % 31)}\n")
+        subprocess.run([PROGRAM, "map", "import", room, "-o", room + ".pfmap", "--resolution", "0.2"], check=True,
+                       capture_output=True)
+        flight = self.flight(text=f"""map: {room}.pfmap
+duration: 1.0
+vehicle: {{start: [3, 2, 1], start_yaw_deg: 90, autopilot: {{kind: px4, instance: INSTANCE, vision: true, obstacles: true}}}}
+lidars: [{{model: vlp16}}]
+sensors: [{{kind: range_finder, rotation_rpy_deg: [0, 0, 0], range_min: 0.05}}]
+""")
+        offboard = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.addCleanup(offboard.close)
+        offboard.bind(("127.0.0.1", 14580 + flight.instance))
+        offboard.settimeout(20)
+        peer = self.peer(flight)
+        peer.run(100.0)
+        self.assertEqual(flight.end(), 0, flight.err)
+        vision, distance = peer.last[331], peer.last[132]
+        # north, east, down; level and heading north
+        for axis, wanted in enumerate((2.0, 3.0, -0.28)):
+            self.assertAlmostEqual(vision[1 + axis], wanted, delta=0.05)
+        self.assertAlmostEqual(abs(vision[4]), 1.0, delta=1e-3)
+        self.assertEqual(vision[56:60], (1, 12, 0, 2))  # LOCAL_NED, BODY_FRD, no resets, vision
+        # the range finder looks ahead, at the wall in the north
+        self.assertEqual(distance[6], 0)
+        self.assertAlmostEqual(distance[3] / 100, 6.0, delta=0.15)
+        data = offboard.recv(1000)
+        length = data[1]
+        obstacles = unpack(330, data[10:10 + length])
+        for direction, wanted in ((0, 6.0), (18, 7.0), (36, 2.0), (54, 3.0)):  # clockwise, each 5 degrees
+            self.assertAlmostEqual(obstacles[1 + direction] / 100, wanted, delta=0.15)
+
+    def test_firmwares_and_our_own_autopilot_in_one_run(self):
+        flight = self.flight(text=f"""map: {MAP}
+duration: 6.0
+vehicles:
+  - {{name: own, start: [10, 7, 2], lidars: [], mission: {{waypoints: [[10, 8, 2]]}}}}
+  - {{name: first, start: [10, 5, 2], start_yaw_deg: 90, lidars: [], autopilot: {{kind: px4, instance: INSTANCE}}}}
+  - {{name: second, start: [10, 3, 2], start_yaw_deg: 90, lidars: [], autopilot: {{kind: px4, instance: {free_instance() + 30}}}}}
+""")
+        peers = [self.peer(flight)]
+        with open(os.path.join(self.folder.name, "scenario.yaml"), encoding="utf-8") as file:
+            second = int(re.search(r"second.*instance: (\d+)", file.read())[1])
+        peers.append(Peer(4560 + second))
+        self.addCleanup(peers[1].socket.close)
+        threads = [threading.Thread(target=peer.run, args=(100.0,)) for peer in peers]
+        for thread in threads:
+            thread.start()
+        self.assertEqual(flight.end(), 0, flight.err)
+        for thread in threads:
+            thread.join()
+        self.assertEqual(peers[0].times, peers[1].times)
+        self.assertEqual(flight.err.count("0 waited for in vain"), 2)
+        with open(os.path.join(flight.out, "own", "trajectory.csv"), encoding="utf-8") as file:
+            self.assertAlmostEqual(float(list(csv.DictReader(file))[-1]["py"]), 8.0, delta=0.1)
 
     def fake_px4(self, body):
         """A program in the place of PX4's."""

@@ -10,7 +10,7 @@
 #include <unistd.h>
 
 #include <cerrno>
-#include <cstring>
+#include <system_error>
 #include <thread>
 #include <utility>
 
@@ -20,6 +20,10 @@ namespace pointflight {
 namespace {
 
 constexpr std::size_t kLargest = 65536;  // bytes that are read at once
+
+std::string reason(int error) {
+  return std::generic_category().message(error);
+}
 
 sockaddr_in address_of(const std::string& address, std::uint16_t port) {
   sockaddr_in to{};
@@ -46,7 +50,7 @@ Socket bound(int type, const std::string& address, std::uint16_t port) {
                                  type == SOCK_STREAM ? "TCP" : "UDP",
                                  port,
                                  address,
-                                 std::strerror(errno)));
+                                 reason(errno)));
   }
   return socket;
 }
@@ -81,7 +85,7 @@ Socket Socket::connect_tcp(const std::string& address,
       return socket;
     }
     if (std::chrono::steady_clock::now() > until) {
-      throw InputError(fmt::format("TCP port {} of {}: {}", port, address, std::strerror(errno)));
+      throw InputError(fmt::format("TCP port {} of {}: {}", port, address, reason(errno)));
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
