@@ -69,6 +69,34 @@ TEST(Commands, Slow_ALargeVehicleStaysOnTheGroundThatItHasLandedOn) {
   EXPECT_LT(simulation.status(0).state.rotors[0].speed, 1.0);
 }
 
+TEST(Commands, RotorSpeedsSetItDownAndLiftItAgain) {
+  // as a firmware does that lands: the ground carries what comes down gently
+  Scenario scenario = hovering();
+  scenario.vehicles[0].start = {10, 6, 0.5};
+  scenario.vehicles[0].lidars.clear();
+  scenario.duration = 6.0;
+  const Executor executor(1);
+  Simulation simulation(scenario, testing::hall(), executor);
+  ByteSink sink;
+  const double hover = simulation.vehicle(0).settings().hover_speed();
+  const auto turn = [&](double share, double until) {
+    while (to_seconds(simulation.time()) < until) {
+      simulation.command(0, RotorSpeedCommand{std::vector<double>(4, share * hover)});
+      simulation.step(sink);
+    }
+  };
+  turn(0.95, 2.0);
+  EXPECT_TRUE(simulation.status(0).landed);
+  EXPECT_TRUE(simulation.status(0).autopilot.armed);
+  EXPECT_NEAR(simulation.status(0).state.body.p_world.z(), 0.27, 0.03);
+  turn(0.5, 3.0);
+  EXPECT_NEAR(simulation.status(0).state.body.p_world.z(), 0.27, 0.03);
+  turn(1.1, 4.0);
+  EXPECT_FALSE(simulation.status(0).landed);
+  EXPECT_GT(simulation.status(0).state.body.p_world.z(), 0.6);
+  EXPECT_TRUE(sink.events.empty());
+}
+
 TEST(Commands, DisarmedInTheAirItFallsAndLiesWhereItFell) {
   Scenario scenario = hovering();
   scenario.vehicles[0].commands.resize(1);
