@@ -106,8 +106,9 @@ int MapLayers::level_of(double z) const {
 void MapLayers::fill_columns(const SurfelMap& map) {
   occupied_.assign(columns_ * rows_, 0);
   floor_.assign(columns_ * rows_, kNone);
-  map.for_each_surfel([&](const Vector3d& p, const Vector3d&, double, std::uint32_t) {
-    if (p.z() < box_.min.z()) return;  // stray
+  map.for_each_surfel([&](const Vector3d& p, const Vector3d&, double, std::uint32_t word) {
+    if (p.z() < box_.min.z()) return;                          // stray
+    if (map.notes().opacity(word) == Opacity::kWater) return;  // no ceiling of its bed
     const std::size_t cell = cell_of(p);
     occupied_[cell] |= Column{1} << level_of(p.z());
     floor_[cell] = std::min(floor_[cell], static_cast<float>(p.z()));
@@ -207,8 +208,9 @@ bool MapLayers::covers_much() const {
 bool MapLayers::is_level(const SurfelMap& map) const {
   std::size_t hanging = 0;
   std::size_t level = 0;
-  map.for_each_surfel([&](const Vector3d& p, const Vector3d& normal, double, std::uint32_t) {
+  map.for_each_surfel([&](const Vector3d& p, const Vector3d& normal, double, std::uint32_t word) {
     if (static_cast<float>(p.z()) < ceiling_[cell_of(p)]) return;
+    if (map.notes().opacity(word) == Opacity::kWater) return;
     ++hanging;
     if (std::abs(normal.z()) > kLevelNormal) ++level;
   });
