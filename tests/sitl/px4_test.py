@@ -224,7 +224,8 @@ sensors: [{{kind: range_finder, rotation_rpy_deg: [0, 0, 0], range_min: 0.05}}]
         length = data[1]
         obstacles = unpack(330, data[10:10 + length])
         for direction, wanted in ((0, 6.0), (18, 7.0), (36, 2.0), (54, 3.0)):  # clockwise, each 5 degrees
-            self.assertAlmostEqual(obstacles[1 + direction] / 100, wanted, delta=0.15)
+            # the nearest of some noisy points
+            self.assertAlmostEqual(obstacles[1 + direction] / 100, wanted, delta=0.25)
 
     def test_firmwares_and_our_own_autopilot_in_one_run(self):
         flight = self.flight(text=f"""map: {MAP}
