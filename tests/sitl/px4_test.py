@@ -192,11 +192,11 @@ class Px4Test(unittest.TestCase):
         """A room of 10 by 8 by 3 m; the vehicle stands at (3, 2) and heads north."""
         room = os.path.join(self.folder.name, "room.xyz")
         with open(room, "w", encoding="utf-8") as file:
-            for i in range(101):
-                for k in range(81):
-                    x, y, z = 0.1 * i, 0.1 * k, 0.1 * (k % 31)
-                    file.write(f"{x} {y} 0\n{x} 0 {z}\n{x} 8 {z}\n0 {y} {0.1 * (i % 31)}\n10 {y} {0.1 * (i % 31)}\n")
-        subprocess.run([PROGRAM, "map", "import", room, "-o", room + ".pfmap", "--resolution", "0.2"], check=True,
+            for i in range(251):
+                for k in range(201):
+                    x, y, z, w = 0.04 * i, 0.04 * k, 0.04 * (k % 76), 0.04 * (i % 76)
+                    file.write(f"{x} {y} 0\n{x} 0 {z}\n{x} 8 {z}\n0 {y} {w}\n10 {y} {w}\n")
+        subprocess.run([PROGRAM, "map", "import", room, "-o", room + ".pfmap", "--resolution", "0.1"], check=True,
                        capture_output=True)
         flight = self.flight(text=f"""map: {room}.pfmap
 duration: 1.0
