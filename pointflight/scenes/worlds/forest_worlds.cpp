@@ -139,7 +139,7 @@ WorldKind dense_forest() {
   return {"dense_forest",
           "trees close together, understorey, fallen trunks, branches down to the ground",
           {30, 72, 19},
-          {{"trees", "a hectare", 1100, 1600}, {"conifers", "their share", 0.4, 0.8}},
+          {{"trees", "a hectare", 1000, 1300}, {"conifers", "their share", 0.4, 0.8}},
           [](SceneBuilder& to, const WorldValues& values) {
             return build_stand(to,
                                {30,
