@@ -120,7 +120,12 @@ void ArduPilotLink::answer(SimTime now) {
 }
 
 void ArduPilotLink::receive() {
-  while (const auto datagram = socket_.receive_datagram()) take(*datagram);
+  constexpr int kDatagrams = 64;  // at a time: who floods us does not hold us
+  for (int i = 0; i < kDatagrams; ++i) {
+    const auto datagram = socket_.receive_datagram();
+    if (!datagram) return;
+    take(*datagram);
+  }
 }
 
 void ArduPilotLink::take(const Socket::Datagram& datagram) {

@@ -281,7 +281,7 @@ void Px4Link::take_scan(const ScanSample& sample) {
 }
 
 void Px4Link::on_step(const StepDone& done) {
-  if (!firmware_.is_open()) accept();
+  if (!has_spoken_) accept();
   if (!is_answered_ && !out_.empty()) clock_.ask();
   flush();
   receive();
@@ -290,7 +290,7 @@ void Px4Link::on_step(const StepDone& done) {
 }
 
 void Px4Link::on_wait(SimTime /*now*/, Waiting why) {
-  if (!firmware_.is_open()) accept();
+  if (!has_spoken_) accept();
   receive();
   if (why == Waiting::kForAnswer) {
     give_up();
@@ -325,6 +325,7 @@ std::vector<Order> Px4Link::take_orders() {
   return std::exchange(orders_, {});
 }
 
+/// One that has said nothing makes way for the next: a stranger must not keep PX4 out.
 void Px4Link::accept() {
   Socket other = server_.accept();
   if (!other.is_open()) return;
@@ -334,6 +335,7 @@ void Px4Link::accept() {
   out_.clear();
   sensor_.updated = 0;
   truth_interval_.reset();
+  has_spoken_ = false;
   is_locked_ = false;
   is_answered_ = true;
   clock_.restart_pace();
@@ -346,6 +348,7 @@ void Px4Link::disconnect(const std::string& why) {
   say(fmt::format("PX4 is gone ({}); its rotors stop; waiting for another", why));
   firmware_.close();
   out_.clear();
+  has_spoken_ = false;
   is_locked_ = false;
   clock_.restart_pace();
   is_answered_ = true;
@@ -361,13 +364,15 @@ void Px4Link::flush() {
 }
 
 void Px4Link::receive() {
+  constexpr int kReads = 16;  // at a time: who floods us does not hold us
   if (!firmware_.is_open()) return;
-  for (;;) {
+  for (int i = 0; i < kReads; ++i) {
     const auto bytes = firmware_.receive();
     if (!bytes) return disconnect("it has closed the connection");
     if (bytes->empty()) return;
     reader_.add(*bytes);
     while (const auto frame = reader_.next()) {
+      has_spoken_ = true;
       if (const auto controls = mavlink::message_in<mavlink::HilActuatorControls>(*frame)) {
         obey(*controls);
       } else if (const auto command = mavlink::message_in<mavlink::CommandLong>(*frame)) {

@@ -116,6 +116,7 @@ class Px4Link : public Link {
   std::uint64_t sent_ = 0;            ///< us; of the last HIL_SENSOR, 0: none.
   std::optional<std::uint64_t> truth_interval_;  ///< us, as PX4 asked.
   std::uint64_t truth_due_ = 0;                  ///< us
+  bool has_spoken_ = false;                      ///< A message has come on this connection.
   bool is_locked_ = false;                       ///< It answers: it is waited for.
   bool is_answered_ = true;                      ///< The last HIL_SENSOR is.
   bool is_armed_ = false;

@@ -12,6 +12,7 @@ import subprocess
 import sys
 import tempfile
 import threading
+import time
 import unittest
 
 from px4_stack import GPS, SENSOR, TRUTH, Peer, Stack, Vehicle, unpack
@@ -187,6 +188,26 @@ class Px4Test(unittest.TestCase):
         self.peer(flight).run(100.0)
         self.assertEqual(flight.end(), 0, flight.err)
         self.assertIn("bytes of junk", flight.err)
+
+    def test_one_that_says_nothing_does_not_keep_px4_out(self):
+        flight = self.flight(duration=2.0)
+        with socket.create_connection(("127.0.0.1", flight_port(flight)), timeout=20):
+            self.peer(flight).run(100.0)
+            self.assertEqual(flight.end(), 0, flight.err)
+        self.assertIn("0 waited for in vain", flight.err)
+
+    def test_one_that_floods_is_survived(self):
+        flight = self.flight(duration=2.0)
+        flood = socket.create_connection(("127.0.0.1", flight_port(flight)), timeout=5)
+        until = time.time() + 1.5
+        while time.time() < until:
+            try:
+                flood.sendall(b"\xfd\xff" * 100000)
+            except OSError:
+                break
+        flood.close()
+        self.peer(flight).run(100.0)
+        self.assertEqual(flight.end(), 0, flight.err)
 
     def test_vision_ranges_and_obstacles_are_where_they_are(self):
         """A room of 10 by 8 by 3 m; the vehicle stands at (3, 2) and heads north."""

@@ -35,6 +35,15 @@ sockaddr_in address_of(const std::string& address, std::uint16_t port) {
   return to;
 }
 
+void send_to(int descriptor, const sockaddr_in& to, std::span<const std::byte> bytes) {
+  ::sendto(descriptor,
+           bytes.data(),
+           bytes.size(),
+           MSG_NOSIGNAL,
+           reinterpret_cast<const sockaddr*>(&to),
+           sizeof(to));
+}
+
 Socket bound(int type, const std::string& address, std::uint16_t port) {
   const sockaddr_in at = address_of(address, port);
   Socket socket(::socket(AF_INET, type | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
@@ -161,24 +170,13 @@ void Socket::answer(const Datagram& to, std::span<const std::byte> bytes) {
   at.sin_family = AF_INET;
   at.sin_port = to.port;
   at.sin_addr.s_addr = to.address;
-  ::sendto(descriptor_,
-           bytes.data(),
-           bytes.size(),
-           MSG_NOSIGNAL,
-           reinterpret_cast<const sockaddr*>(&at),
-           sizeof(at));
+  send_to(descriptor_, at, bytes);
 }
 
 void Socket::send_datagram(const std::string& address,
                            std::uint16_t port,
                            std::span<const std::byte> bytes) {
-  const sockaddr_in at = address_of(address, port);
-  ::sendto(descriptor_,
-           bytes.data(),
-           bytes.size(),
-           MSG_NOSIGNAL,
-           reinterpret_cast<const sockaddr*>(&at),
-           sizeof(at));
+  send_to(descriptor_, address_of(address, port), bytes);
 }
 
 }  // namespace pointflight
