@@ -158,7 +158,7 @@ TEST(WorldTasks, CanBeFlown) {
 }
 
 /// Three fifths of the floor plan of each can be flown over: of one seed, or of a hundred
-/// (`./dev deep`), which takes half an hour.
+/// (`./dev deep`), which takes an hour.
 TEST(SceneSpace, Slow_WorldsAreConnected) {
   const bool is_thorough = std::getenv("POINTFLIGHT_THOROUGH") != nullptr;
   const std::size_t seeds = is_thorough ? 100 : 1;
