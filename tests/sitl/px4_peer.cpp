@@ -9,8 +9,8 @@
 
 #include "pointflight/core/hash.hpp"
 #include "pointflight/core/input_error.hpp"
-#include "pointflight/sitl/internal/socket.hpp"
 #include "pointflight/sitl/internal/mavlink.hpp"
+#include "pointflight/sitl/internal/socket.hpp"
 
 using namespace pointflight;
 
