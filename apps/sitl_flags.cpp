@@ -16,7 +16,6 @@ namespace {
 
 constexpr double kImuRate = 250.0;  // Hz, as PX4's start-up expects of simulators
 constexpr double kOutputRate = 200.0;
-constexpr double kEndless = kLongestRun;
 
 /// What firmware needs to fly by, unless the vehicle has one: as a sensor that was calibrated.
 template <class Settings>
@@ -124,7 +123,7 @@ void SitlPart::prepare(Scenario& scenario, double /*rate*/) {
     lockstep_ = std::max(lockstep_, vehicle.autopilot.wait + 2.0);
   }
   scenario.output.trajectory_rate = std::max(scenario.output.trajectory_rate, kOutputRate);
-  if (scenario.duration <= 0.0) scenario.duration = kEndless;
+  if (scenario.duration <= 0.0) scenario.duration = kLongestRun;
 }
 
 void SitlPart::place(Scenario& scenario, const std::shared_ptr<const SurfelMap>& map) const {
