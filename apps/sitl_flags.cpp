@@ -113,6 +113,10 @@ void SitlPart::prepare(Scenario& scenario, double /*rate*/) {
       vehicle.mission.waypoints.clear();
       vehicle.commands.clear();
     }
+    if (vehicle.autopilot.obstacles && vehicle.lidars.empty()) {
+      throw InputError(
+          fmt::format("{}: autopilot.obstacles: is for a vehicle with a LiDAR", vehicle.name));
+    }
     vehicle.landed = true;
     vehicle.command_timeout = 0.0;  // the link says when nothing comes any more
     if (vehicle.autopilot.kind == AutopilotKind::kPx4) {

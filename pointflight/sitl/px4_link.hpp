@@ -78,7 +78,6 @@ class Px4Link : public Link {
   void take_measurement(const Measurement& measurement);
   void take_imu(const ImuSample& sample);
   void take_truth(const StateSample& sample);
-  void take_odometry(const OdometrySample& sample);
   void take_scan(const ScanSample& sample);
   [[nodiscard]] std::uint64_t usec(SimTime time) const;
   void accept();

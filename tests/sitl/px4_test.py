@@ -248,6 +248,11 @@ sensors: [{{kind: range_finder, rotation_rpy_deg: [0, 0, 0], range_min: 0.05}}]
             # the nearest of some noisy points
             self.assertAlmostEqual(obstacles[1 + direction] / 100, wanted, delta=0.25)
 
+    def test_obstacles_need_a_lidar(self):
+        flight = self.flight(text=f"map: {MAP}\nlidars: []\nvehicle: {{start: [10, 5, 2], autopilot: {{kind: px4, obstacles: true}}}}\n")
+        self.assertEqual(flight.end(), 2)
+        self.assertEqual(flight.err, "pointflight: drone0: autopilot.obstacles: is for a vehicle with a LiDAR\n")
+
     def test_firmwares_and_our_own_autopilot_in_one_run(self):
         flight = self.flight(text=f"""map: {MAP}
 duration: 6.0
