@@ -13,6 +13,8 @@ void add_scenario_command(CLI::App& app, int& exit_code);
 void add_lidar_command(CLI::App& app, int& exit_code);
 void add_lidar_fit_command(CLI::App& lidar);
 void add_vehicle_command(CLI::App& app, int& exit_code);
+void add_vehicle_fit_command(CLI::App& vehicle);
+void add_replay_command(CLI::App& app, int& exit_code);
 void add_picture_command(CLI::App& app, int& exit_code);
 void add_compare_command(CLI::App& app, int& exit_code);
 void add_bag_command(CLI::App& app, int& exit_code);

@@ -63,6 +63,7 @@ int run(int argc, char** argv) {
   add_raycast_command(app, exit_code);
   add_lidar_command(app, exit_code);
   add_vehicle_command(app, exit_code);
+  add_replay_command(app, exit_code);
   add_picture_command(app, exit_code);
   add_bag_command(app, exit_code);
   add_compare_command(app, exit_code);

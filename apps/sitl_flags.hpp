@@ -1,10 +1,10 @@
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "apps/cli.hpp"
 #include "apps/flight_part.hpp"
 #include "apps/sitl_process.hpp"
 #include "pointflight/sitl/ardupilot_link.hpp"

@@ -192,6 +192,7 @@ void add_vehicle_command(CLI::App& parent, int& /*exit_code*/) {
   px4->add_flag("--vision", parameters->vision, "To fly by external vision, without satellites");
   add_force_flag(*px4, parameters->force);
   px4->callback([parameters] { write_px4_parameters(*parameters); });
+  add_vehicle_fit_command(*app);
   auto* keys = app->add_subcommand(
       "keys", "All keys of a vehicle file as a Markdown table (docs/vehicles.md)");
   keys->callback([] { print_reference(vehicle_reference()); });

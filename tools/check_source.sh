@@ -28,8 +28,9 @@ allowed() {
     sim) echo "$step" ;;
     learn) echo "$step run" ;;
     sitl) echo "$step run" ;;
+    flight_log) echo "$step" ;;
     run) echo "$step" ;;
-    picture) echo "$step run survey fidelity" ;;
+    picture) echo "$step run flight_log survey fidelity" ;;
     ros/common) echo "$step run" ;;
     ros/ros1) echo "ros/common" ;;
     ros/ros2) echo "core ros/common" ;;

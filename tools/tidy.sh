@@ -2,12 +2,15 @@
 # clang-tidy over the libraries, the program, the Python module and the benchmarks (not over tests). A source that was found clean is not looked at again as long as nothing
 # that it includes, the rules and clang-tidy itself have changed: a stamp of all that lies in the user's cache, so that
 # other clones find it, too.
-# usage: tidy.sh CLANG_TIDY BUILD_FOLDER JOBS [--all]
+# --all: over everything; --lately: only over what the last 40 commits have touched.
+# usage: tidy.sh CLANG_TIDY BUILD_FOLDER JOBS [--all|--lately]
 set -eu
 cd "$(dirname "$0")/.."
 export tidy=$1 build=$2
 jobs=$3
 export all=${4:-}
+lately=""
+[ "$all" != --lately ] || { all="" lately=$(git log -40 --format= --name-only | sort -u); }
 export stamps=${XDG_CACHE_HOME:-$HOME/.cache}/pointflight/tidy
 mkdir -p "$stamps"
 find "$stamps" -type f -name '????????????????????????????????????????????????????????????????' -mtime +60 -delete
@@ -28,12 +31,19 @@ one() {
 }
 export -f one
 
-python3 - "$build" <<'END' | xargs -0 -P "$jobs" -n 2 bash -c 'one "$1" "$2"' one
+python3 - "$build" "$lately" <<'END' | xargs -0 -P "$jobs" -n 2 bash -c 'one "$1" "$2"' one
 import json, re, sys
+lately = tuple(name[:-4] for name in sys.argv[2].split() if name.endswith((".cpp", ".hpp")))
+def is_touched(path):
+    """True of a source if it or its own header is among them, of a batch if one of its sources is."""
+    parts = re.findall(r'#include "([^"]+)"', open(path).read()) if "/batches/" in path else [path]
+    return any(part[:-4].endswith(lately) for part in parts)
 seen = 0
 for entry in json.load(open(sys.argv[1] + "/compile_commands.json")):
     if re.search(r"/batches/(?!tests_)|/(pointflight|bench|python)/[a-z0-9_/]+\.cpp$", entry["file"]):
-        print(entry["file"], entry["command"], sep="\0", end="\0")
         seen += 1
+        if lately and not is_touched(entry["file"]):
+            continue
+        print(entry["file"], entry["command"], sep="\0", end="\0")
 sys.exit(0 if seen else "nothing to lint")
 END

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "pointflight/flight_log/log_comparison.hpp"
 #include "pointflight/lidar/lidar.hpp"
 #include "pointflight/map/surfel_map.hpp"
 #include "pointflight/picture/canvas.hpp"
@@ -64,6 +65,14 @@ Color vehicle_color(std::size_t number);
 /// A vehicle's step responses beside what its loops were designed for.
 void draw_step_responses(const VehicleSettings& vehicle,
                          const std::vector<StepResponse>& responses,
+                         const std::string& path);
+
+/// What the IMU measured beside what `vehicle` does by the logged outputs, over the twelve seconds
+/// that turn most; `window`: as it was compared with.
+void draw_log_comparison(const FlightLog& log,
+                         const VehicleSettings& vehicle,
+                         const LogComparison& comparison,
+                         double window,
                          const std::string& path);
 
 /// A sensor's pattern after 0.1 s and after 1 s, and how its coverage grows. Throws InputError if

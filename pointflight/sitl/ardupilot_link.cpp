@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "pointflight/core/constants.hpp"
+#include "pointflight/geometry/frames.hpp"
 #include "pointflight/geometry/rotation.hpp"
-#include "pointflight/sitl/frames.hpp"
 
 namespace pointflight {
 namespace {

@@ -13,7 +13,7 @@
 #include "pointflight/run/link.hpp"
 #include "pointflight/sitl/internal/answer_clock.hpp"
 #include "pointflight/sitl/internal/socket.hpp"
-#include "pointflight/sitl/motor_outputs.hpp"
+#include "pointflight/vehicle/motor_outputs.hpp"
 
 namespace pointflight {
 

@@ -8,8 +8,8 @@
 #include <utility>
 
 #include "pointflight/core/constants.hpp"
+#include "pointflight/geometry/frames.hpp"
 #include "pointflight/geometry/rotation.hpp"
-#include "pointflight/sitl/frames.hpp"
 #include "pointflight/sitl/internal/px4_messages.hpp"
 
 namespace pointflight {

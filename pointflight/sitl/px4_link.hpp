@@ -14,7 +14,7 @@
 #include "pointflight/sitl/internal/answer_clock.hpp"
 #include "pointflight/sitl/internal/mavlink.hpp"
 #include "pointflight/sitl/internal/socket.hpp"
-#include "pointflight/sitl/motor_outputs.hpp"
+#include "pointflight/vehicle/motor_outputs.hpp"
 
 namespace pointflight {
 

@@ -8,8 +8,8 @@
 #include <cmath>
 
 #include "pointflight/core/input_error.hpp"
-#include "pointflight/sitl/frames.hpp"
-#include "pointflight/sitl/motor_outputs.hpp"
+#include "pointflight/geometry/frames.hpp"
+#include "pointflight/vehicle/motor_outputs.hpp"
 
 namespace pointflight {
 namespace {

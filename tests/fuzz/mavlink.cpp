@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cstdint>
 
-#include "pointflight/sitl/motor_outputs.hpp"
+#include "pointflight/vehicle/motor_outputs.hpp"
 
 namespace {
 

@@ -72,9 +72,11 @@ TEST(Lidar, Statistics_AScanTakenWhileFlyingUsesThePoseOfEachBeam) {
 
 /// Mean of measured minus true range by ring, m.
 std::vector<double> ring_errors(const LidarSettings& settings, std::uint64_t seed, bool as_lines) {
-  ShapeScene scene;
-  scene.add_box({-6, -6, -2}, {6, 6, 4});
-  const auto renderer = make_renderer("beam", Scene{map_of(scene, 0.1)});
+  static const auto renderer = [] {
+    ShapeScene scene;
+    scene.add_box({-6, -6, -2}, {6, 6, 4});
+    return make_renderer("beam", Scene{map_of(scene, 0.1)});
+  }();
   LidarSettings chosen = settings;
   if (as_lines) chosen.optics.sub_rays = 1;
   const Lidar lidar(chosen, 0, nullptr, Surroundings{});

@@ -6,8 +6,8 @@
 
 #include "pointflight/core/constants.hpp"
 #include "pointflight/core/math.hpp"
+#include "pointflight/geometry/frames.hpp"
 #include "pointflight/geometry/rotation.hpp"
-#include "pointflight/sitl/frames.hpp"
 
 namespace pointflight {
 namespace {

@@ -1,4 +1,4 @@
-#include "pointflight/sitl/motor_outputs.hpp"
+#include "pointflight/vehicle/motor_outputs.hpp"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "pointflight/sitl/frames.hpp"
+#include "pointflight/geometry/frames.hpp"
 
 namespace pointflight {
 namespace {

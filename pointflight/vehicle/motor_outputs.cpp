@@ -1,4 +1,4 @@
-#include "pointflight/sitl/motor_outputs.hpp"
+#include "pointflight/vehicle/motor_outputs.hpp"
 
 #include <algorithm>
 #include <array>
