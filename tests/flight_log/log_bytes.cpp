@@ -183,7 +183,7 @@ std::string dataflash_of(const FlightLog& log) {
     bytes.put(static_cast<float>(a)).put(static_cast<float>(b)).put(static_cast<float>(c));
   };
   for (const LoggedImu& imu : log.imu) {
-    for (const std::uint8_t instance : {0, 1}) {
+    for (const std::uint8_t instance : {std::uint8_t{0}, std::uint8_t{1}}) {
       LogBytes bytes = packet(65).put(microseconds(imu.time)).put(instance);
       const double wrong = instance == 0 ? 1.0 : 5.0;  // the second IMU is not read
       put_floats(bytes, wrong * imu.gyro.x(), -imu.gyro.y(), -imu.gyro.z());

@@ -187,7 +187,7 @@ TEST(LogComparison, ATrueFileFliesAsTheLogHasIt) {
   EXPECT_LT(good.accel_rms.norm(), 1e-6);
   EXPECT_LT(good.turn_rms, 1e-6);
   EXPECT_LT(good.speed_rms, 1e-6);
-  EXPECT_NEAR(good.windows, 39.0, 2.0);  // from a quarter of a second on
+  EXPECT_NEAR(static_cast<double>(good.windows), 39.0, 2.0);  // from a quarter of a second on
   const LogComparison bad = fly_outputs(log, wrong(truth));
   EXPECT_GT(bad.gyro_rms.norm(), 0.05);
   EXPECT_GT(bad.accel_rms.norm(), 0.5);
