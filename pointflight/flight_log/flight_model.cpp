@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "pointflight/core/math.hpp"
 #include "pointflight/vehicle/imu.hpp"
@@ -92,6 +93,20 @@ FlightModel::FlightModel(const VehicleSettings& like, std::vector<FlownSample> s
     kept_.push_back(row);
     clusters_.push_back(rows_[row].block / kBlocksInCluster);
   }
+}
+
+double FlightModel::velocity_vagueness() const {
+  constexpr double kVelocityError = 0.1;  // m/s, of an estimator; assumed
+  Vector3d mean = Vector3d::Zero();
+  for (const Row& row : rows_) mean += samples_[row.sample].state.v_world;
+  mean /= static_cast<double>(rows_.size());
+  double variance = 0.0;
+  for (const Row& row : rows_) {
+    variance += (samples_[row.sample].state.v_world - mean).squaredNorm() / 3.0;
+  }
+  variance /= static_cast<double>(rows_.size());
+  const double error = kVelocityError * kVelocityError;
+  return variance > error ? error / (variance - error) : std::numeric_limits<double>::infinity();
 }
 
 Eigen::MatrixXd FlightModel::residuals(const Unknowns& values) const {

@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 
+#include "pointflight/core/constants.hpp"
 #include "pointflight/core/input_error.hpp"
 #include "pointflight/flight_log/internal/flight_model.hpp"
 
@@ -29,7 +30,8 @@ using Free = std::array<bool, fl::kUnknowns>;
 /// What is held to be likely before the log is seen: wide, so that nothing is divided by zero.
 Unknowns prior_deviations(const VehicleSettings& like) {
   Unknowns s;
-  s.setConstant(3.0);  // logarithms; wind in m/s
+  s.setConstant(1.0);                         // logarithms
+  s.segment<2>(fl::kWindX).setConstant(3.0);  // m/s
   s[fl::kIdle] = 1.0;
   s[fl::kRotorDrag] = 1.0;
   s[fl::kDragAcross] = s[fl::kDragAlong] = 1.0;
@@ -67,17 +69,24 @@ class LogFit {
         prior_(prior_deviations(like).cwiseAbs2().cwiseInverse()) {}
 
   [[nodiscard]] Estimate solve(const Free& free, Unknowns values, const Progress& progress) const {
+    Linearization at = linearize(free, values);
     for (int step = 0; step < kMostSteps; ++step) {
       report(progress, "fitting", static_cast<double>(step) / kMostSteps);
-      const Linearization at = linearize(free, values);
       Unknowns change = at.inverse * at.gradient;
       const double largest = change.head<fl::kWindX>().cwiseAbs().maxCoeff();
       if (largest > kLargestStep) change *= kLargestStep / largest;
+      // what the model bends away from a straight line is no step to take whole
+      const double before = cost(at, at.residuals, values);
+      for (int halvings = 0; halvings < 5; ++halvings) {
+        if (cost(at, model_.residuals(values + change), values + change) <= before) break;
+        change *= 0.5;
+      }
       values += change;
+      at = linearize(free, values);
       const Unknowns deviations = at.inverse.diagonal().cwiseMax(0.0).cwiseSqrt();
       if ((change.cwiseAbs().array() <= 0.01 * deviations.array() + 1e-9).all()) break;
     }
-    return {values, covariance(linearize(free, values))};
+    return {values, covariance(at)};
   }
 
  private:
@@ -114,6 +123,12 @@ class LogFit {
       if (!free[i]) at.inverse(i, i) = 0.0;
     }
     return at;
+  }
+
+  [[nodiscard]] double cost(const Linearization& at,
+                            const Eigen::MatrixXd& residuals,
+                            const Unknowns& values) const {
+    return at.weighed(residuals, residuals) + (values - start_).cwiseAbs2().dot(prior_);
   }
 
   /// By clusters, and not below what independent noise would leave.
@@ -175,6 +190,7 @@ constexpr double kDrift = 0.005;
 constexpr double kIdleDrift = 0.005;  // of the greatest speed
 constexpr double kDragDrift = 0.02;
 
+/// In the order of `fl::Unknown`.
 constexpr std::array<FigureRow, 9> kFigures = {{
     {fl::kThrust,
      "rotor.thrust_coefficient",
@@ -253,19 +269,47 @@ FittedFigure figure_of(const FigureRow& row,
   return figure;
 }
 
-/// Deviation by what it would have to be below to be told, 1 at the limit.
-double vagueness(const FigureRow& row, const FittedFigure& figure, const VehicleSettings& like) {
-  const double size =
-      row.unknown == fl::kIdle ? 0.3 * like.rotor.speed_max : std::max(figure.value, figure.before);
-  constexpr double kMost = 0.3;
-  return size > 0.0 ? figure.sigma / (kMost * size) : figure.sigma > 0.0 ? 1e9 : 0.0;
+bool is_drag(fl::Unknown unknown) {
+  return unknown == fl::kRotorDrag || unknown == fl::kDragAcross || unknown == fl::kDragAlong;
 }
 
-/// What an unknown that is not told stays at, and why.
+/// True if the deviation is small enough beside the figure for it to be of use.
+bool is_told(const FigureRow& row, const FittedFigure& figure, const VehicleSettings& like) {
+  constexpr double kMost = 0.25;
+  double size = figure.value;
+  if (row.unknown == fl::kIdle) size = 0.3 * like.rotor.speed_max;
+  if (is_drag(row.unknown)) size = std::max(figure.value, figure.before);
+  return figure.sigma <= kMost * size;
+}
+
+/// Leaves a figure as it was.
 void leave(FittedFigure& figure, std::string why) {
   figure.value = figure.before;
   figure.is_told = false;
   figure.remark = std::move(why);
+}
+
+/// What goes with the figures that are left as they were: the weight is carried as before, and
+/// nothing turns by itself.
+void settle(const LogFit& fit,
+            const VehicleSettings& like,
+            Estimate& estimate,
+            const Progress& progress,
+            std::vector<FittedFigure>& figures) {
+  const bool is_all_told =
+      std::all_of(figures.begin(), figures.end(), [](const FittedFigure& f) { return f.is_told; });
+  if (is_all_told) return;
+  const double bias = std::sqrt(estimate.covariance(fl::kBiasZ, fl::kBiasZ));
+  const bool knows_curve = figures[fl::kIdle].is_told;
+  Free free{};
+  free[fl::kThrust] = !knows_curve;
+  free[fl::kTorqueX] = free[fl::kTorqueY] = free[fl::kTorqueZ] = true;
+  estimate = fit.solve(free, estimate.values, progress);
+  if (knows_curve) return;
+  FittedFigure& thrust = figures[fl::kThrust];
+  thrust = figure_of(kFigures[fl::kThrust], like, estimate);
+  thrust.sigma = std::hypot(thrust.sigma, thrust.value * bias / kGravity);
+  thrust.remark = "with the file's speed_min";
 }
 
 LogResiduals rms_of(const Eigen::MatrixXd& residuals) {
@@ -295,52 +339,40 @@ VehicleFit fit_vehicle(const FlightLog& log,
   Free free;
   free.fill(true);
   const bool is_slow = std::min(rate_of(log.outputs), rate_of(log.imu)) < kLeastRate;
-  const std::string too_slow =
-      fmt::format("{} at {:.0f} Hz, IMU at {:.0f} Hz: at least {:.0f} Hz are needed",
-                  log.outputs_from,
-                  rate_of(log.outputs),
-                  rate_of(log.imu),
-                  kLeastRate);
   if (is_slow || like.rotor.natural_frequency <= 0.0) free[fl::kLag] = false;
-  if (is_slow) free[fl::kInertiaX] = free[fl::kInertiaY] = free[fl::kInertiaZ] = false;
-
+  if (is_slow) {
+    for (const auto unknown : {fl::kIdle, fl::kInertiaX, fl::kInertiaY, fl::kInertiaZ}) {
+      free[unknown] = false;
+    }
+  }
   const LogFit fit(model, like, executor);
   const Unknowns start = fl::unknowns_of(like);
+  Estimate estimate = fit.solve(free, start, options.progress);
+
   VehicleFit result;
   result.flown = model.duration();
-  std::array<FittedFigure, kFigures.size()> vague;
-  Estimate estimate;
-  for (;;) {
-    Unknowns from = estimate.values.isZero() ? start : estimate.values;
-    for (std::size_t j = 0; j < fl::kUnknowns; ++j) from[j] = free[j] ? from[j] : start[j];
-    estimate = fit.solve(free, from, options.progress);
-    // the vaguest is left as it was, for what is left is told with it
-    std::size_t worst = kFigures.size();
-    double most = 1.0;
-    for (std::size_t i = 0; i < kFigures.size(); ++i) {
-      if (!free[kFigures[i].unknown]) continue;
-      const FittedFigure figure = figure_of(kFigures[i], like, estimate);
-      const double v = vagueness(kFigures[i], figure, like);
-      if (v <= most) continue;
-      most = v;
-      worst = i;
-      vague[i] = figure;
+  for (const FigureRow& row : kFigures) {
+    FittedFigure& figure = result.figures.emplace_back(figure_of(row, like, estimate));
+    if (!free[row.unknown]) {
+      leave(figure,
+            is_slow ? fmt::format("{} at {:.0f} Hz, IMU at {:.0f} Hz: {:.0f} Hz are needed",
+                                  log.outputs_from,
+                                  rate_of(log.outputs),
+                                  rate_of(log.imu),
+                                  kLeastRate)
+                    : "the file's motors have no lag");
+      continue;
     }
-    if (worst == kFigures.size()) break;
-    free[kFigures[worst].unknown] = false;
-    leave(vague[worst], "the flight does not excite it enough");
-  }
-  for (std::size_t i = 0; i < kFigures.size(); ++i) {
-    FittedFigure figure = figure_of(kFigures[i], like, estimate);
-    if (!free[kFigures[i].unknown]) {
-      figure = vague[i];
-      if (figure.key.empty()) {
-        figure = figure_of(kFigures[i], like, estimate);
-        leave(figure, is_slow ? too_slow : "the file's motors have no lag");
-      }
+    // what is measured against a velocity that is off itself comes out too small
+    if (is_drag(row.unknown)) {
+      const double vague = model.velocity_vagueness();
+      figure.sigma = std::isfinite(vague) ? std::hypot(figure.sigma, figure.value * vague) : vague;
     }
-    result.figures.push_back(std::move(figure));
+    if (row.unknown == fl::kThrust || is_told(row, figure, like)) continue;
+    leave(figure, "the flight does not excite it enough");
+    estimate.values[row.unknown] = start[row.unknown];
   }
+  settle(fit, like, estimate, options.progress, result.figures);
   result.vehicle = fl::vehicle_with(like, estimate.values);
   result.before = rms_of(model.residuals(start));
   result.after = rms_of(model.residuals(estimate.values));

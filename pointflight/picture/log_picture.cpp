@@ -129,11 +129,12 @@ void draw_log_comparison(const FlightLog& log,
       room);
   const auto samples = drawn_samples(comparison);
   for (std::size_t i = 0; i < std::size(kLogCurves); ++i) {
+    const std::size_t row = i / 2;
     draw_log_panel(canvas,
                    samples,
                    kLogCurves[i],
                    kLogLeft + static_cast<double>(i % 2) * column,
-                   kLogTop + static_cast<double>(i / 2) * (kLogHeight + kLogGap));
+                   kLogTop + static_cast<double>(row) * (kLogHeight + kLogGap));
   }
   canvas.save(path);
 }

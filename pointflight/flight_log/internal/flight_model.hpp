@@ -56,6 +56,10 @@ class FlightModel {
   /// s of flight in all rows.
   [[nodiscard]] double duration() const { return duration_; }
 
+  /// How much of the variance of the logged velocity may be error, by what is left: the share by
+  /// which figures measured against it may be too small.
+  [[nodiscard]] double velocity_vagueness() const;
+
   /// Measured less modelled: six columns, specific force (m/s^2) and rates without each block's
   /// mean (rad/s). Callable from several threads.
   [[nodiscard]] Eigen::MatrixXd residuals(const Unknowns& values) const;
