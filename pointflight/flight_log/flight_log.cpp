@@ -40,6 +40,19 @@ void keep_ascending(std::vector<Record>& records, FlightLog& log) {
   log.skipped += std::erase_if(records, is_wrong);
 }
 
+/// Takes out the outputs at the end that never drove a motor: messages have room for more than
+/// there are.
+void trim_outputs(std::vector<LoggedOutputs>& records) {
+  std::size_t most = 0;
+  for (const LoggedOutputs& record : records) {
+    for (std::size_t i = most; i < record.outputs.size(); ++i) {
+      if (std::isfinite(record.outputs[i])) most = i + 1;
+    }
+  }
+  for (LoggedOutputs& record : records)
+    record.outputs.resize(std::min(most, record.outputs.size()));
+}
+
 /// Index of the record at or before a time, and how far it is to the next, 0 to 1.
 template <class Record>
 std::pair<std::size_t, double> place_of(const std::vector<Record>& records, double time) {
@@ -96,6 +109,7 @@ FlightLog parse_flight_log(std::span<const std::byte> bytes, const std::string& 
                      ": byte 0: neither a ULog of PX4 nor a DataFlash log (.bin) of ArduPilot");
   }
   keep_ascending(log.outputs, log);
+  trim_outputs(log.outputs);
   keep_ascending(log.imu, log);
   keep_ascending(log.attitude, log);
   keep_ascending(log.motion, log);

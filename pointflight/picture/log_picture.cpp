@@ -12,7 +12,7 @@ namespace pointflight::picture {
 namespace {
 
 constexpr double kLogWidth = 560.0;  // of a panel's plot, pixels
-constexpr double kLogHeight = 130.0;
+constexpr double kLogHeight = 160.0;
 constexpr double kLogGap = 62.0;
 constexpr double kLogTop = 86.0;
 constexpr double kLogLeft = kLeftRoom + 10.0;
