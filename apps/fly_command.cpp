@@ -204,6 +204,10 @@ int fly(const FlyFlags& flags) {
     throw InputError(
         "give a folder for the results with -o, or --view, --ros1, --ros2 or --record");
   }
+  if (!flags.policy.empty() && (flags.sitl.px4 || flags.sitl.ardupilot)) {
+    throw InputError(
+        "--policy: a firmware flies the vehicles; it and a policy would both command them");
+  }
   RunOptions options = run_options(flags);
   const Executor executor(flags.threads);
   auto parts = parts_of(flags, executor.threads());

@@ -24,6 +24,11 @@ void PolicyPart::prepare(Scenario& scenario, double /*rate*/) {
   scenario.vehicles = scenario.fleet();  // each with goals of its own
   scenario.is_short = scenario.vehicles.size() == 1;
   for (VehicleSetup& vehicle : scenario.vehicles) {
+    if (vehicle.autopilot.kind != AutopilotKind::kOwn) {
+      throw InputError(fmt::format(
+          "--policy: a firmware flies {} (autopilot); it and a policy would both command it",
+          vehicle.name));
+    }
     std::vector<Vector3d> goals = std::exchange(vehicle.mission.waypoints, {});
     if (policy_->settings().task == "hover") goals = {vehicle.start};
     if (goals.empty()) {

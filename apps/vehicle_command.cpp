@@ -9,10 +9,13 @@
 #include "apps/flags.hpp"
 #include "apps/settings_json.hpp"
 #include "pointflight/core/constants.hpp"
+#include "pointflight/core/mapped_file.hpp"
 #include "pointflight/core/number_text.hpp"
 #include "pointflight/core/output_file.hpp"
 #include "pointflight/core/resources.hpp"
 #include "pointflight/picture/pictures.hpp"
+#include "pointflight/sitl/ardupilot_parameters.hpp"
+#include "pointflight/sitl/px4_airframe.hpp"
 #include "pointflight/sitl/px4_parameters.hpp"
 #include "pointflight/vehicle/step_response.hpp"
 
@@ -150,9 +153,9 @@ struct ParameterFlags {
   bool force = false;
 };
 
-void write_px4_parameters(const ParameterFlags& flags) {
-  const VehicleSettings vehicle = load_vehicle(flags.name);
-  const std::string text = px4_parameter_file(vehicle, flags.vision);
+void write_parameters(const ParameterFlags& flags,
+                      const std::string& text,
+                      const VehicleSettings& vehicle) {
   if (flags.output.empty()) {
     fmt::print("{}", text);
     return;
@@ -161,6 +164,77 @@ void write_px4_parameters(const ParameterFlags& flags) {
   OutputFile file(flags.output);
   file.write(text);
   file.commit();
+}
+
+CLI::App* add_parameters(CLI::App& parent,
+                         const std::string& command,
+                         const std::string& help,
+                         const std::shared_ptr<ParameterFlags>& flags) {
+  auto* app = parent.add_subcommand(command, help);
+  app->add_option("name", flags->name, "A shipped vehicle or the path of a .yaml file")->required();
+  app->add_option("-o,--output", flags->output, "Parameter file; without it: stdout");
+  add_force_flag(*app, flags->force);
+  return app;
+}
+
+void add_firmware_commands(CLI::App& parent) {
+  auto px4 = std::make_shared<ParameterFlags>();
+  auto* app =
+      add_parameters(parent,
+                     "px4-params",
+                     "A vehicle as parameters of PX4: rotors, thrust, gains (docs/autopilots.md)",
+                     px4);
+  app->add_flag("--vision", px4->vision, "To fly by external vision, without satellites");
+  app->callback([px4] {
+    const VehicleSettings vehicle = load_vehicle(px4->name);
+    write_parameters(*px4, px4_parameter_file(vehicle, px4->vision), vehicle);
+  });
+  auto ardupilot = std::make_shared<ParameterFlags>();
+  app = add_parameters(parent,
+                       "ardupilot-params",
+                       "A quadrotor as parameters of ArduCopter: frame, thrust, gains "
+                       "(docs/autopilots.md)",
+                       ardupilot);
+  app->callback([ardupilot] {
+    const VehicleSettings vehicle = load_vehicle(ardupilot->name);
+    write_parameters(*ardupilot, ardupilot_parameter_file(vehicle), vehicle);
+  });
+}
+
+struct ImportFlags {
+  std::string airframe;
+  std::string like;
+  std::string output;
+  bool force = false;
+};
+
+void import_vehicle(const ImportFlags& flags) {
+  const VehicleSettings like = load_vehicle(flags.like);
+  check_outputs({flags.output}, {flags.airframe, like.path}, flags.force);
+  const MappedFile file(flags.airframe);
+  VehicleSettings vehicle = vehicle_from_px4_airframe(file.text(), flags.airframe, like);
+  SettingsWriter writer;
+  describe(writer, vehicle);
+  OutputFile output(flags.output);
+  output.write(writer.text());
+  output.commit();
+}
+
+void add_import_command(CLI::App& parent) {
+  auto* app = parent.add_subcommand(
+      "import", "A vehicle file with the rotors of one of PX4's airframes (docs/autopilots.md)");
+  auto flags = std::make_shared<ImportFlags>();
+  app->add_option("--px4-airframe",
+                  flags->airframe,
+                  "Start script of PX4 (param set-default CA_ROTOR0_PX ...) or parameter file")
+      ->required();
+  app->add_option("--like",
+                  flags->like,
+                  "Vehicle whose mass, thrust and the rest it has: a shipped one or a .yaml file")
+      ->required();
+  app->add_option("-o,--output", flags->output, "Vehicle file to write")->required();
+  add_force_flag(*app, flags->force);
+  app->callback([flags] { import_vehicle(*flags); });
 }
 
 }  // namespace
@@ -183,15 +257,8 @@ void add_vehicle_command(CLI::App& parent, int& /*exit_code*/) {
   show->add_flag("--path", flags->path, "Say where its file lies, to copy it");
   add_force_flag(*show, flags->force);
   show->callback([flags] { show_vehicle(*flags); });
-  auto* px4 = app->add_subcommand(
-      "px4-params", "A vehicle as parameters of PX4: rotors, thrust, gains (docs/autopilots.md)");
-  auto parameters = std::make_shared<ParameterFlags>();
-  px4->add_option("name", parameters->name, "A shipped vehicle or the path of a .yaml file")
-      ->required();
-  px4->add_option("-o,--output", parameters->output, "Parameter file; without it: stdout");
-  px4->add_flag("--vision", parameters->vision, "To fly by external vision, without satellites");
-  add_force_flag(*px4, parameters->force);
-  px4->callback([parameters] { write_px4_parameters(*parameters); });
+  add_firmware_commands(*app);
+  add_import_command(*app);
   add_vehicle_fit_command(*app);
   auto* keys = app->add_subcommand(
       "keys", "All keys of a vehicle file as a Markdown table (docs/vehicles.md)");

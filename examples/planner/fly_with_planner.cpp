@@ -28,6 +28,7 @@
 #include "pointflight/core/random.hpp"
 #include "pointflight/sim/flight_recorder.hpp"
 #include "pointflight/sim/simulation.hpp"
+#include "pointflight/sim/start_check.hpp"
 
 using namespace pointflight;
 
@@ -136,6 +137,7 @@ Scenario scenario_for(const Options& options, const SurfelMap& map, int seed, Ve
 /// `is_route`.
 Scenario scenario_from(const std::string& path, bool is_route, std::vector<Vector3d>& goals) {
   Scenario s = load_scenario(path);
+  require_own_autopilots(s);
   MissionSettings& mission = s.vehicles.front().mission;
   if (mission.waypoints.empty()) {
     throw InputError(path + ": mission.waypoints: names no place to fly to");

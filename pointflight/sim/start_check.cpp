@@ -67,6 +67,17 @@ bool is_lost(const SurfelMap& map, const Vector3d& p_world) {
   return below.maxCoeff() > kBeside || above.head<2>().maxCoeff() > kBeside || above.z() > kAbove;
 }
 
+void require_own_autopilots(const Scenario& scenario) {
+  for (std::size_t i = 0; i < scenario.vehicles.size(); ++i) {
+    const VehicleSetup& vehicle = scenario.vehicles[i];
+    if (vehicle.autopilot.kind == AutopilotKind::kOwn) continue;
+    throw InputError(fmt::format(
+        "{}: a firmware flies '{}' (autopilot): only `pointflight fly` lets one connect",
+        scenario.location(scenario.vehicle_key(i, "autopilot")),
+        vehicle.name));
+  }
+}
+
 void check_names(const Scenario& scenario, const std::vector<VehicleSetup>& fleet) {
   std::set<std::string> names;
   for (std::size_t i = 0; i < fleet.size(); ++i) {

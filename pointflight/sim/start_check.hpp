@@ -15,6 +15,10 @@ class Simulation;
 /// Names make folders and topics: each its own, and nothing but plain letters. Throws InputError.
 void check_names(const Scenario& scenario, const std::vector<VehicleSetup>& fleet);
 
+/// For programs that step a simulation themselves, where no firmware can connect. Throws InputError
+/// if the scenario has one fly a vehicle.
+void require_own_autopilots(const Scenario& scenario);
+
 /// Copies stay where numbers in files are taken, too. Throws InputError.
 void check_reach(const Scenario& scenario, const std::vector<VehicleSetup>& fleet);
 

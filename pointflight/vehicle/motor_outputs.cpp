@@ -31,8 +31,9 @@ MotorOutputs::MotorOutputs(const VehicleSettings& vehicle)
     : speed_min_(vehicle.rotor.speed_min),
       speed_max_(vehicle.rotor.speed_max),
       hover_speed_(vehicle.hover_speed()),
-      rotors_(x_order(vehicle.rotors)) {
-  if (!rotors_.empty()) return;
+      rotors_(x_order(vehicle.rotors)),
+      is_x_quad_(!rotors_.empty()) {
+  if (is_x_quad_) return;
   rotors_.resize(vehicle.rotors.size());
   std::iota(rotors_.begin(), rotors_.end(), std::size_t{0});
 }

@@ -17,6 +17,8 @@ class MotorOutputs {
   /// Of a vehicle file, which is not needed afterwards.
   explicit MotorOutputs(const VehicleSettings& vehicle);
 
+  /// True of quadrotors with a rotor in each quarter.
+  [[nodiscard]] bool is_x_quad() const { return is_x_quad_; }
   /// Rotor (number in the vehicle file) of each output.
   [[nodiscard]] const std::vector<std::size_t>& rotors() const { return rotors_; }
   /// Speeds of all rotors, in the order of the vehicle file, rad/s; 0 unless it is armed. Outputs
@@ -33,6 +35,7 @@ class MotorOutputs {
  private:
   double speed_min_, speed_max_, hover_speed_;
   std::vector<std::size_t> rotors_;
+  bool is_x_quad_;
 };
 
 }  // namespace pointflight

@@ -14,6 +14,7 @@
 #include "pointflight/run/run_loop.hpp"
 #include "pointflight/sim/flight_recorder.hpp"
 #include "pointflight/sim/run_summary.hpp"
+#include "pointflight/sim/start_check.hpp"
 #include "python/bindings/arrays.hpp"
 #include "python/bindings/link.hpp"
 #include "python/bindings/map_object.hpp"
@@ -233,6 +234,7 @@ class SimulationObject {
 
 std::shared_ptr<SimulationObject> make_simulation(const Scenario& scenario,
                                                   const std::shared_ptr<MapObject>& map) {
+  require_own_autopilots(scenario);
   const py::gil_scoped_release unlocked;
   return std::make_shared<SimulationObject>(scenario,
                                             map == nullptr ? scenario.open_map() : map->map);

@@ -27,6 +27,13 @@ def scenario(**changes: object) -> pf.Scenario:
     return pf.Scenario({**keys, **changes})
 
 
+class Firmware(unittest.TestCase):
+    def test_a_simulation_of_a_program_has_no_firmware(self) -> None:
+        wish = scenario(vehicle={"name": "scout", "start": [0, 0, 1.5], "autopilot": "px4"})
+        with self.assertRaisesRegex(pf.InputError, "only `pointflight fly`"):
+            pf.Simulation(wish)
+
+
 def samples_of(sim: pf.Simulation) -> list:
     """Some figures of all samples to the end, to be compared exactly."""
     figures = []
