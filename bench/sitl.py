@@ -17,7 +17,7 @@ def cpu():
     return used.ru_utime + used.ru_stime
 
 
-def fly(folder, map_path, firmware, lidar, seconds, rate):
+def fly(folder, map_path, firmware, lidar, seconds, rate, more=()):
     """CPU time of the program and wall time, both s."""
     scenario = os.path.join(folder, "scenario.yaml")
     instance = 180
@@ -28,7 +28,7 @@ def fly(folder, map_path, firmware, lidar, seconds, rate):
                    f"lidars: {'[{model: mid360}]' if lidar else '[]'}\n{sensors}")
     before, start = cpu(), time.time()
     run = subprocess.Popen([PROGRAM, "fly", scenario, "-o", folder + "/run", "--force", "--no-picture", "--no-scans",
-                            "--rate", rate, "--json"], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+                            "--rate", rate, "--json", *more], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
     peer = subprocess.Popen([PEER, str(4560 + instance)], stdout=subprocess.PIPE, text=True) if firmware else None
     run.communicate()
     used, took = cpu() - before, time.time() - start  # of the program alone: the peer is not collected yet
@@ -50,6 +50,10 @@ with tempfile.TemporaryDirectory() as folder:
         print(f"{seconds} s at real time, no LiDAR: own autopilot {own[-1]:.2f} s of CPU, PX4's link {px4[-1]:.2f} s", flush=True)
     more = (sorted(px4)[rounds // 2] - sorted(own)[rounds // 2]) / seconds
     print(f"the link takes {100 * more:.1f} % of a core more than our own autopilot (medians)")
-    for name, firmware in (("own autopilot", False), ("PX4's link", True)):
-        took = sorted(fly(folder, map_path, firmware, True, seconds, "max")[1] for _ in range(rounds))
-        print(f"{seconds} s with a Mid-360, {name}: {seconds / took[rounds // 2]:.1f} times real time (median of {rounds}, start included)")
+    for what, lidar, more in (("with a Mid-360, wide beams (the default)", True, ()),
+                              ("with a Mid-360, --fidelity line", True, ("--fidelity", "line")),
+                              ("without a LiDAR", False, ())):
+        for name, firmware in (("own autopilot", False), ("PX4's link", True)):
+            took = sorted(fly(folder, map_path, firmware, lidar, seconds, "max", more)[1] for _ in range(rounds))
+            print(f"{seconds} s {what}, {name}: {seconds / took[rounds // 2]:.1f} times real time (median of {rounds}, start included)",
+                  flush=True)
