@@ -25,6 +25,8 @@ void add_gpu_command(CLI::App& app, int& exit_code);
 void add_study_command(CLI::App& app, int& exit_code);
 void add_world_command(CLI::App& app, int& exit_code);
 void add_raycast_command(CLI::App& app, int& exit_code);
+void add_doctor_command(CLI::App& app, int& exit_code);
+void add_self_test_command(CLI::App& app, int& exit_code);
 void add_world_tasks_command(CLI::App& world);
 
 /// Exit codes that scripts can trust.

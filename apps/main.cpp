@@ -72,6 +72,8 @@ int run(int argc, char** argv) {
   add_study_command(app, exit_code);
   add_campaign_command(app, exit_code);
   add_gpu_command(app, exit_code);
+  add_doctor_command(app, exit_code);
+  add_self_test_command(app, exit_code);
   add_shell_commands(app);
   app.footer(  // not of the commands, which have examples of their own
       "A first tour: pointflight map forest -o forest.pcd\n"
