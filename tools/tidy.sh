@@ -2,7 +2,7 @@
 # clang-tidy over the libraries, the program, the Python module and the benchmarks (not over tests). A source that was found clean is not looked at again as long as nothing
 # that it includes, the rules and clang-tidy itself have changed: a stamp of all that lies in the user's cache, so that
 # other clones find it, too.
-# --all: over everything; --lately: only over what the last 40 commits have touched.
+# --all: over everything; --lately: only over what the last 20 commits have touched.
 # usage: tidy.sh CLANG_TIDY BUILD_FOLDER JOBS [--all|--lately]
 set -eu
 cd "$(dirname "$0")/.."
@@ -10,7 +10,7 @@ export tidy=$1 build=$2
 jobs=$3
 export all=${4:-}
 lately=""
-[ "$all" != --lately ] || { all="" lately=$(git log -40 --format= --name-only | sort -u); }
+[ "$all" != --lately ] || { all="" lately=$(git log -20 --format= --name-only | sort -u); }
 export stamps=${XDG_CACHE_HOME:-$HOME/.cache}/pointflight/tidy
 mkdir -p "$stamps"
 find "$stamps" -type f -name '????????????????????????????????????????????????????????????????' -mtime +60 -delete
