@@ -27,8 +27,7 @@ TEST(Doctor, SaysWhatThereIs) {
   EXPECT_GE(json.size(), 12u);
   for (const auto& row : json) {
     EXPECT_FALSE(row["said"].get<std::string>().empty()) << row["what"];
-    if (row["finding"] != "ok")
-      EXPECT_FALSE(row["remedy"].get<std::string>().empty()) << row["what"];
+    EXPECT_NE(row["finding"] == "ok", !row["remedy"].get<std::string>().empty()) << row["what"];
   }
 }
 
