@@ -58,7 +58,7 @@ class FlightHashes : public SampleSink {
 
 Scenario self_test_scenario(const char* renderer) {
   Scenario scenario;
-  scenario.duration = 3.0;
+  scenario.duration = 1.0;
   scenario.unfinished = Unfinished::kTimeUp;
   scenario.seed = 7;
   VehicleSetup& vehicle = scenario.vehicles.front();

@@ -15,7 +15,7 @@ struct SelfTestHash {
   std::string hash;  ///< Of its bytes.
 };
 
-/// Makes a world and flies three seconds in it with two LiDARs, one that turns and one that does
+/// Makes a world and flies a second in it with two LiDARs, one that turns and one that does
 /// not, in turbulent wind: hashes of the map, the vehicle's states, its IMU, and its scans with
 /// `beam` and `paper`. Bits do not depend on threads, the instruction set, or what the machine is
 /// busy with.
