@@ -104,7 +104,7 @@ class UlogReader {
   /// Fields of messages that are logged, by the number of the subscription.
   struct Subscription {
     LogTable* table = nullptr;
-    std::vector<UlogField> fields;
+    const std::vector<UlogField>* fields = nullptr;
   };
 
   void take(std::size_t at, char kind, Bytes message) {
@@ -178,12 +178,18 @@ class UlogReader {
         ulog_number(&message[1 + length], declared->type);
   }
 
-  /// Unfolds a format; `offset` moves on by its size. False if it makes no sense.
+  /// A format with all that it holds, written out one after the other.
+  struct Layout {
+    std::vector<UlogField> fields;
+    std::size_t size = 0;
+    std::size_t steps = 0;  ///< Elements gone through, empty ones and padding, too.
+  };
+
+  /// False if it makes no sense.
   bool unfold(const std::string& format,
               const std::string& prefix,
               int depth,
-              std::size_t& offset,
-              std::vector<UlogField>& fields) const {
+              Layout& layout) const {
     const auto found = formats_.find(format);
     if (found == formats_.end() || depth > kDeepest) return false;
     std::string_view rest = found->second;
@@ -194,19 +200,17 @@ class UlogReader {
       if (!declared) return false;
       const std::size_t size = size_of_type(declared->type);
       for (std::size_t i = 0; i < declared->count; ++i) {
+        if (++layout.steps > kMostFields) return false;
         const std::string name = prefix + std::string(declared->name) +
                                  (declared->is_array ? fmt::format("[{}]", i) : std::string());
         if (size == 0) {
-          if (!unfold(std::string(declared->type), name + ".", depth + 1, offset, fields)) {
-            return false;
-          }
+          if (!unfold(std::string(declared->type), name + ".", depth + 1, layout)) return false;
           continue;
         }
-        if (fields.size() >= kMostFields) return false;
         if (!declared->name.starts_with("_padding")) {
-          fields.push_back({name, std::string(declared->type), offset});
+          layout.fields.push_back({name, std::string(declared->type), layout.size});
         }
-        offset += size;
+        layout.size += size;
       }
     }
     return true;
@@ -218,10 +222,10 @@ class UlogReader {
     const std::string name(as_text(message.subspan(3)));
     subscriptions_.erase(number);
     if (std::to_integer<int>(message[0]) != 0 || !wanted_.contains(name)) return;
-    Subscription subscription;
-    std::size_t size = 0;
-    if (!unfold(name, "", 0, size, subscription.fields) || subscription.fields.empty() ||
-        subscription.fields[0].name != "timestamp") {
+    const auto [known, is_new] = layouts_.try_emplace(name);
+    Layout& layout = known->second;
+    if (is_new && (!unfold(name, "", 0, layout) || layout.fields.empty() ||
+                   layout.fields[0].name != "timestamp")) {
       throw InputError(
           fmt::format("{}: byte {}: the format of '{}' is not in the log, or makes no sense",
                       path_,
@@ -230,13 +234,9 @@ class UlogReader {
     }
     LogTable& table = tables_.tables[name];
     if (table.columns.empty()) {
-      for (const UlogField& field : subscription.fields) table.columns.push_back(field.name);
-    } else if (table.columns.size() != subscription.fields.size()) {
-      ++tables_.skipped;
-      return;
+      for (const UlogField& field : layout.fields) table.columns.push_back(field.name);
     }
-    subscription.table = &table;
-    subscriptions_[number] = std::move(subscription);
+    subscriptions_[number] = {&table, &layout.fields};
   }
 
   void take_data(Bytes message) {
@@ -246,12 +246,12 @@ class UlogReader {
     const Bytes data = message.subspan(2);
     const auto& [table, fields] = found->second;
     // padding at the end may be missing, nothing else
-    const UlogField& last = fields.back();
+    const UlogField& last = fields->back();
     if (last.offset + size_of_type(last.type) > data.size()) {
       ++tables_.skipped;
       return;
     }
-    for (const UlogField& field : fields) {
+    for (const UlogField& field : *fields) {
       table->values.push_back(ulog_number(&data[field.offset], field.type));
     }
   }
@@ -261,6 +261,7 @@ class UlogReader {
   const std::set<std::string, std::less<>>& wanted_;
   std::vector<std::size_t> appended_;
   std::map<std::string, std::string> formats_;
+  std::map<std::string, Layout> layouts_;  ///< Of messages that are wanted.
   std::map<std::uint16_t, Subscription> subscriptions_;
   LogTables tables_;
 };
