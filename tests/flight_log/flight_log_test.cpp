@@ -157,6 +157,13 @@ TEST(FlightLog, ErrorsSayWhatIsMissing) {
                        ulog_subscription(1, "sensor_combined"))
                 .find("makes no sense"),
             std::string::npos);
+  std::string empty = ulog_format("sensor_combined:uint64_t timestamp;b[4000] a;");
+  for (const char* format : {"b:c[4000] x;", "c:d[4000] x;", "d:e[4000] x;", "e:"}) {
+    empty += ulog_format(format);  // 256 T times nothing
+  }
+  EXPECT_NE(message_of(ulog_start() + empty + ulog_subscription(1, "sensor_combined"))
+                .find("makes no sense"),
+            std::string::npos);
   EXPECT_NE(message_of(ulog_start() + ulog_format("sensor_combined:uint64_t timestamp;b[4000] a;") +
                        ulog_format("b:float[4000] c;") + ulog_subscription(1, "sensor_combined"))
                 .find("makes no sense"),
