@@ -80,13 +80,13 @@ TEST_F(DeskewingFitTest, MotionOfEachScanIsFound) {
   EXPECT_NEAR(found.translation.sigma, std::sqrt(translations), 0.002);
 }
 
-TEST_F(DeskewingFitTest, WithoutMotionNoneIsFound) {
+TEST_F(DeskewingFitTest, Slow_WithoutMotionNoneIsFound) {
   const DeskewingFit found = fit(load_lidar("os0_32"));
   EXPECT_LT(found.rotation.sigma, 0.03 * kDegree);
   EXPECT_LT(found.translation.sigma, 0.004);
 }
 
-TEST_F(DeskewingFitTest, ASensorThatDoesNotSpinTellsNothing) {
+TEST_F(DeskewingFitTest, Slow_ASensorThatDoesNotSpinTellsNothing) {
   LidarSettings sensor = load_lidar("avia");
   sensor.deskewing = {0.15, 0.02};
   EXPECT_TRUE(fit(sensor).motions.empty());

@@ -97,7 +97,7 @@ std::size_t seen_about(const Lidar& lidar, const ScanRequest& request, const Vec
       }));
 }
 
-TEST(Lidar, WhatIsBlockedBringsNothingBackForItsShareOfTheTime) {
+TEST(Lidar, Slow_WhatIsBlockedBringsNothingBackForItsShareOfTheTime) {
   const TemporaryFolder folder;
   testing::write_file(folder / "mine_blocked.csv",
                       "azimuth_from_deg,azimuth_to_deg,elevation_from_deg,elevation_to_deg,share\n"

@@ -81,7 +81,7 @@ TEST(Mcap, TheSameMessagesGiveTheSameBytes) {
   EXPECT_EQ(read_file(folder / "a.mcap"), read_file(folder / "b.mcap"));
 }
 
-TEST(Mcap, CutAtAnyByteItKeepsAllWholeChunks) {
+TEST(Mcap, Slow_CutAtAnyByteItKeepsAllWholeChunks) {
   const TemporaryFolder folder;
   record(folder / "a.mcap", "lz4", 60, true);
   const std::string bytes = read_file(folder / "a.mcap");

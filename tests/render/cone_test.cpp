@@ -117,7 +117,7 @@ std::vector<Echoes> traced(const WideScan& scan,
   return echoes;
 }
 
-TEST(Cones, TheSameBitsHoweverBeamsGoTogether) {
+TEST(Cones, Slow_TheSameBitsHoweverBeamsGoTogether) {
   for (const double speed : {0.0, 40.0}) {  // m/s
     const WideScan scan({0, 0, 0}, speed, 0.4, 24, 60);
     for (const bool takes_strongest : {false, true}) {
@@ -145,7 +145,7 @@ TEST(Cones, TheSameBitsHoweverBeamsGoTogether) {
   }
 }
 
-TEST(Cones, TheSameBitsByEveryInstructionSet) {
+TEST(Cones, Slow_TheSameBitsByEveryInstructionSet) {
   const WideScan scan({0, 0, 0}, 40.0, 2.0, 24, 60);
   const EvenSurfaces receiver;
   const std::vector<std::uint32_t> order =

@@ -77,7 +77,7 @@ void expect_same_returns(const Clouds& clouds, std::size_t rows) {
   }
 }
 
-TEST(OrganizedClouds, HaveARowForEachRing) {
+TEST(OrganizedClouds, Slow_HaveARowForEachRing) {
   const Clouds vlp16 = clouds_of("vlp16", "velodyne", "cloud");
   expect_same_returns(vlp16, 16);
   EXPECT_NEAR(vlp16.organized[0].width, 1808, 2);  // firings in 0.1 s: one every 55.296 us

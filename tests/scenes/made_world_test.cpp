@@ -58,7 +58,7 @@ void expect_sound(const WorldKind& kind, std::uint64_t seed) {
   for (const std::string& tag : scene.tags) EXPECT_TRUE(known.contains(tag)) << tag;
 }
 
-TEST(MadeWorlds, AreSoundWhateverTheSeed) {
+TEST(MadeWorlds, Slow_AreSoundWhateverTheSeed) {
   for (const WorldKind& kind : WorldKind::table().rows()) {
     for (std::uint64_t seed = 1; seed <= 3; ++seed) expect_sound(kind, seed);
   }
@@ -80,7 +80,7 @@ TEST(MadeWorlds, HaveRoomToFly) {
   }
 }
 
-TEST(MadeWorlds, ASeedIsAWorld) {
+TEST(MadeWorlds, Slow_ASeedIsAWorld) {
   for (const WorldKind& kind : WorldKind::table().rows()) {
     const ExactScene one = make_world({kind.name, 7, {}});
     const ExactScene again = make_world({kind.name, 7, {}});

@@ -131,7 +131,7 @@ void expect_free(const ExactScene& scene, const SceneTree& tree, const WorldTask
   }
 }
 
-TEST(WorldTasks, CanBeFlown) {
+TEST(WorldTasks, Slow_CanBeFlown) {
   for (const char* name : {"indoor_1", "simple_garage"}) {
     SCOPED_TRACE(name);
     const ExactScene scene = make_world({name, 2, {}});

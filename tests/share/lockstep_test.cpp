@@ -95,7 +95,7 @@ void expect_as_one_process(const Scenario& scenario,
   }
 }
 
-TEST(FleetShare, LockstepGivesTheBytesOfOneProcess) {
+TEST(FleetShare, Slow_LockstepGivesTheBytesOfOneProcess) {
   const Scenario scenario = three(ShareTime::kLockstep);
   RunEnd end{};
   SimTime time;

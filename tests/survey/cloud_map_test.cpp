@@ -93,7 +93,7 @@ TEST(LeftOutPoints, AreSeenFromWithinARoomAndNotThroughItsWalls) {
   EXPECT_LT(through, static_cast<int>(rays.size() / 50));
 }
 
-TEST(LeftOutPoints, DoNotDependOnTheThreads) {
+TEST(LeftOutPoints, Threads_DoNotDependOnTheThreads) {
   const auto points = single(divided_room(0.05));
   const auto one = rays_to_left_out(points, Vector3d::Zero(), 0.04, Executor(1));
   const auto three = rays_to_left_out(points, Vector3d::Zero(), 0.04, Executor(3));
