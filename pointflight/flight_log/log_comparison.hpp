@@ -49,11 +49,12 @@ LogComparison fly_outputs(const FlightLog& log,
                           const VehicleSettings& vehicle,
                           const LogComparisonOptions& options = {});
 
-/// From the first to the last sample in flight, s; throws InputError if there is none.
+/// From the first to the last sample in flight.
 struct FlownTime {
   double from = 0.0;   ///< s, in the log's time.
   double until = 0.0;  ///< s
 };
+/// Of a log. Throws InputError if there is none.
 FlownTime flown_time(const FlightLog& log, const VehicleSettings& vehicle);
 
 }  // namespace pointflight
