@@ -130,12 +130,16 @@ std::vector<LoggedOutputs> pulse_outputs(const LogTables& tables, std::string_vi
     LoggedOutputs& record = list.emplace_back();
     record.time = kMicrosecond * table->at(row, 0);
     for (const PulseRange& range : motors) {
-      const double value = range.column < 0 ? 0.0 : table->at(row, range.column);
+      if (range.column < 0) {
+        record.outputs.push_back(kStopped);
+        continue;
+      }
+      const double value = table->at(row, range.column);
       // simulated outputs are from 0 to 1 already
       const bool is_pulse = value > 2.0;
       const double share = is_pulse ? (value - range.low) / (range.high - range.low) : value;
-      record.outputs.push_back(is_pulse && value < range.low ? kStopped
-                                                             : static_cast<float>(share));
+      const bool turns = !is_pulse || value >= range.low;
+      record.outputs.push_back(turns ? static_cast<float>(share) : kStopped);
     }
   }
   return list;
