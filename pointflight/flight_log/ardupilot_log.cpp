@@ -37,8 +37,7 @@ std::vector<int> motor_columns(const LogTables& tables, const LogTable& table) {
   // SERVOn_FUNCTION: 33 to 40 are motors 1 to 8, 82 to 85 motors 9 to 12
   std::vector<int> columns;
   for (int n = 1; n <= 14; ++n) {
-    const int function = static_cast<int>(
-        tables.parameter(fmt::format("SERVO{}_FUNCTION", n), n <= 4 ? 32.0 + n : 0.0));
+    const int function = tables.choice(fmt::format("SERVO{}_FUNCTION", n), n <= 4 ? 32 + n : 0);
     int motor = -1;
     if (function >= 33 && function <= 40) motor = function - 33;
     if (function >= 82 && function <= 85) motor = function - 82 + 8;

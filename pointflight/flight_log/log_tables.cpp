@@ -25,4 +25,9 @@ double LogTables::parameter(std::string_view name, double otherwise) const {
   return found == parameters.end() ? otherwise : found->second;
 }
 
+int LogTables::choice(std::string_view name, int otherwise) const {
+  const double value = parameter(name, otherwise);
+  return value >= 0.0 && value <= 1000.0 ? static_cast<int>(value) : otherwise;
+}
+
 }  // namespace pointflight::flight_log

@@ -74,7 +74,7 @@ std::vector<LoggedOutputs> allocated_outputs(const LogTables& tables) {
       tables.with("actuator_motors", std::array<std::string_view, 1>{"control[0]"});
   if (table == nullptr) return list;
   const double square_share = std::clamp(tables.parameter("THR_MDL_FAC", 0.0), 0.0, 1.0);
-  const auto rotors = static_cast<int>(tables.parameter("CA_ROTOR_COUNT", 12.0));
+  const int rotors = tables.choice("CA_ROTOR_COUNT", 12);
   std::vector<int> columns;
   for (int i = 0; i < std::min(rotors, 12); ++i) {
     const int column = table->find(fmt::format("control[{}]", i));
@@ -103,9 +103,9 @@ std::vector<PulseRange> pulse_ranges(const LogTables& tables, const LogTable& ta
   constexpr int kFirstMotor = 101;  // in PWM_MAIN_FUNCn
   std::vector<PulseRange> motors;
   for (int n = 1; n <= 16; ++n) {
-    const double function =
-        tables.parameter(fmt::format("PWM_MAIN_FUNC{}", n), n <= 8 ? kFirstMotor + n - 1 : 0.0);
-    const int motor = static_cast<int>(function) - kFirstMotor;
+    const int function =
+        tables.choice(fmt::format("PWM_MAIN_FUNC{}", n), n <= 8 ? kFirstMotor + n - 1 : 0);
+    const int motor = function - kFirstMotor;
     const int column = table.find(fmt::format("output[{}]", n - 1));
     if (motor < 0 || motor >= 12 || column < 0) continue;
     if (motors.size() <= static_cast<std::size_t>(motor)) {

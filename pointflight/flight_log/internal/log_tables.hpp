@@ -39,6 +39,8 @@ struct LogTables {
                                      std::span<const std::string_view> columns) const;
   /// A parameter, or `otherwise`.
   [[nodiscard]] double parameter(std::string_view name, double otherwise) const;
+  /// The same of one that counts or chooses, from 0 to 1000; `otherwise` for what is beyond.
+  [[nodiscard]] int choice(std::string_view name, int otherwise) const;
 };
 
 /// True if a file begins as a log of PX4 (ULog, docs.px4.io/main/en/dev_log/ulog_file_format.html).
