@@ -189,6 +189,7 @@ using V = const VehicleSettings&;
 constexpr double kDrift = 0.005;
 constexpr double kIdleDrift = 0.005;  // of the greatest speed
 constexpr double kDragDrift = 0.02;
+constexpr double kDragAlongDrift = 0.06;  // climbs are slow, and the thrust lies on the same axis
 
 /// In the order of `fl::Unknown`.
 constexpr std::array<FigureRow, 9> kFigures = {{
@@ -233,7 +234,7 @@ constexpr std::array<FigureRow, 9> kFigures = {{
      [](V v) { return v.drag_area.z(); },
      [](V v) { return v.mass; },
      accel_scale,
-     [](V v) { return kDragDrift * v.drag_area.z(); }},
+     [](V v) { return kDragAlongDrift * v.drag_area.z(); }},
     {fl::kInertiaX,
      "inertia_diagonal x",
      "kg m^2",
