@@ -31,7 +31,7 @@ namespace {
 struct ReplayFlags {
   std::string log;
   std::string map;  ///< Empty: the outputs are flown, nothing is seen.
-  std::string vehicle = "x500";
+  std::string vehicle;
   std::string lidar = "mid360";
   std::vector<double> origin;  ///< x, y, z, heading in degrees, of the log's frame in the map.
   double window = 0.5;
@@ -120,6 +120,7 @@ void compare_outputs(const ReplayFlags& flags,
   if (!flags.png.empty()) {
     picture::draw_log_comparison(log, vehicle, comparison, flags.window, flags.png);
   }
+  if (flags.json && !flags.map.empty()) return;  // what is seen along the way is the one document
   if (flags.json) {
     print_json(json_of(log, comparison, flags.window));
   } else {
@@ -225,7 +226,8 @@ void add_replay_command(CLI::App& parent, int& exit_code) {
                   flags->map,
                   "A .pfmap or a made-up world: the logged way is followed in it, and scanned");
   app->add_option(
-      "--vehicle", flags->vehicle, "Flies the logged outputs: a shipped vehicle or a path");
+         "--vehicle", flags->vehicle, "Flies the logged outputs: a shipped vehicle or a path")
+      ->required();
   app->add_option("--window",
                   flags->window,
                   "The vehicle is put where the log has it after so long, s, again and again")

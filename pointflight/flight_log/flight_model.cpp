@@ -64,8 +64,13 @@ VehicleSettings vehicle_with(const VehicleSettings& like, const Unknowns& values
   vehicle.rotor.natural_frequency *= scale_of(-values[kLag]);
   vehicle.rotor.drag_coefficient =
       std::max(0.0, values[kRotorDrag]) * like.mass / like.rotor.speed_max;
+  // x and y keep their ratio
   const double across = std::max(0.0, values[kDragAcross]) * like.mass;
-  vehicle.drag_area = {across, across, std::max(0.0, values[kDragAlong]) * like.mass};
+  const double across_before = 0.5 * (like.drag_area.x() + like.drag_area.y());
+  const Vector3d shape =
+      across_before > 0.0 ? Vector3d(like.drag_area / across_before) : Vector3d(Vector3d::Ones());
+  vehicle.drag_area = {
+      across * shape.x(), across * shape.y(), std::max(0.0, values[kDragAlong]) * like.mass};
   vehicle.inertia_diagonal.x() *= scale_of(values[kInertiaX]);
   vehicle.inertia_diagonal.y() *= scale_of(values[kInertiaY]);
   vehicle.inertia_diagonal.z() *= scale_of(values[kInertiaZ]);

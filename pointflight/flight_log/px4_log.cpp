@@ -14,8 +14,6 @@ namespace {
 constexpr double kMicrosecond = 1e-6;
 constexpr float kStopped = std::numeric_limits<float>::quiet_NaN();
 
-using Names = std::span<const std::string_view>;
-
 Vector3d vector_in(const LogTable& table, std::size_t row, const std::array<int, 3>& columns) {
   return {table.at(row, columns[0]), table.at(row, columns[1]), table.at(row, columns[2])};
 }
@@ -47,10 +45,11 @@ void convert_px4_imu(const LogTables& tables, FlightLog& log) {
 void convert_px4_estimate(const LogTables& tables, FlightLog& log) {
   constexpr std::array<std::string_view, 4> kAttitude = {"q[0]", "q[1]", "q[2]", "q[3]"};
   if (const LogTable* table = tables.with("vehicle_attitude", kAttitude)) {
-    const int w = table->find("q[0]");
+    std::array<int, 4> c{};  // in any order: a file says it
+    for (std::size_t i = 0; i < c.size(); ++i) c[i] = table->find(kAttitude[i]);
     for (std::size_t row = 0; row < table->rows(); ++row) {
       const Quaterniond q(
-          table->at(row, w), table->at(row, w + 1), table->at(row, w + 2), table->at(row, w + 3));
+          table->at(row, c[0]), table->at(row, c[1]), table->at(row, c[2]), table->at(row, c[3]));
       if (!(q.squaredNorm() > 0.5 && q.squaredNorm() < 2.0)) continue;
       log.attitude.push_back({kMicrosecond * table->at(row, 0), q_ned_frd(q).normalized()});
     }

@@ -184,7 +184,8 @@ double no_scale(const ImuErrors&) {
 }
 
 // What flicker, leaning axes, and attitudes held between samples leave is the same over a flight,
-// so that stretches do not differ by it: as found over flights of other seeds (docs/autopilots.md).
+// so that stretches do not differ by it: as found over flights whose truth is known
+// (docs/autopilots.md).
 using V = const VehicleSettings&;
 constexpr double kDrift = 0.005;
 constexpr double kIdleDrift = 0.005;  // of the greatest speed

@@ -141,6 +141,23 @@ TEST(FlightLog, JunkInADataFlashLogIsSkipped) {
   EXPECT_GT(log.imu.size(), flown.imu.size() - 20);
 }
 
+TEST(FlightLog, ColumnsMayStandInAnyOrder) {
+  std::string text = ulog_of(short_flight());
+  const std::string usual = "float[4] q;float[4] delta_q_reset;";
+  const std::string turned = "float q[1];float q[2];float q[3];float q[0];float[4] x;";
+  const std::size_t at = text.find(usual);
+  ASSERT_NE(at, std::string::npos);
+  const std::string definition = "vehicle_attitude:uint64_t timestamp;uint64_t timestamp_sample;";
+  const std::string whole =
+      ulog_format(definition + usual + "uint8_t quat_reset_counter;uint8_t[7] _padding0;");
+  ASSERT_NE(text.find(whole), std::string::npos);
+  text.replace(text.find(whole), whole.size(), ulog_format(definition + turned));
+  const FlightLog log = parsed(text);
+  const FlightLog flown = parsed(ulog_of(short_flight()));
+  ASSERT_EQ(log.attitude.size(), flown.attitude.size());
+  EXPECT_GT(log.attitude[9].q_world_body.angularDistance(flown.attitude[9].q_world_body), 0.1);
+}
+
 TEST(FlightLog, ErrorsSayWhatIsMissing) {
   EXPECT_NE(message_of("no log at all, and long enough to be one").find("neither a ULog"),
             std::string::npos);

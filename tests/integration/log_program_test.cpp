@@ -109,7 +109,8 @@ TEST(LogProgram, WrongCommandsAreALine) {
   expect_user_error(run(fmt::format("replay {} --vehicle x500 -o {}", flight, folder / "r")),
                     "without a map");
   write_file(folder / "junk.ulg", std::string(5000, 'x'));
-  expect_user_error(run(fmt::format("replay {}", folder / "junk.ulg")), "neither a ULog");
+  expect_user_error(run(fmt::format("replay {} --vehicle x500", folder / "junk.ulg")),
+                    "neither a ULog");
 }
 
 }  // namespace
