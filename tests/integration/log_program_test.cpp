@@ -75,7 +75,8 @@ TEST(LogProgram, PicturesAndTablesOfAnArduPilotLog) {
   expect_contains(result.out, "rates ");
   EXPECT_EQ(read_file(folder / "l.png").substr(1, 3), "PNG");
   expect_contains(read_file(folder / "l.csv"), "time,in_window,logged_gx");
-  expect_user_error(run(fmt::format("replay {} --csv {}", flight, folder / "l.csv")), "--force");
+  expect_user_error(run(fmt::format("replay {} --vehicle x500 --csv {}", flight, folder / "l.csv")),
+                    "--force");
 }
 
 TEST_F(Program, AReplaySeesTheMapAlongTheLoggedWay) {
